@@ -28,7 +28,7 @@ STATUS = 'echo $?'
 COMMAND = re.compile(r'(?:^(?:\$ )?|`)(?:\.venv/bin/)?engine-mount ((?:[^`\n\\]|\\\n)*)', re.MULTILINE)
 WRITTEN = ('docs/explanation/recorded_drive.md',)  # by a command; it needs a recording that is not shipped
 RUN = [page for page in GUIDES if any(blocks(page, *LANGUAGES))]
-FIRST = ('README.md', 'docs/tutorials/first_drive.md', 'docs/reference/python.md')
+FIRST = ('README.md',)
 """Pages whose commands `make test` runs."""
 
 

@@ -41,7 +41,13 @@ def said(made):
     return options
 
 
-each_format = pytest.mark.parametrize('made', list(MAKERS), indirect=True)
+FIRST = ('csv', 'mdf', 'mcap')
+"""Formats that `make test` passes through the commands; `src/mount_signals/test` reads all of them."""
+each_format = pytest.mark.parametrize(
+    'made',
+    [pytest.param(name, marks=() if name in FIRST else pytest.mark.slow) for name in MAKERS],
+    indirect=True,
+)
 
 
 @each_format

@@ -68,6 +68,7 @@ def setpoints(folder):
     return stamps[after], series['coil_current'][first][after]
 
 
+@pytest.mark.slow
 @pytest.mark.real_time
 def test_a_recorded_drive_played_to_the_control_gives_the_recorded_setpoints(replay, tmp_path):
     code, output = replay(bag=str(REFERENCE), rate='0.25')  # beside three other suites samples were lost

@@ -27,7 +27,7 @@ def _node_pids(parent: int) -> dict[str, int]:
     """Return {node: pid} of the children of the command."""
     found = {}
     listing = subprocess.run(
-        ['ps', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
+        ['ps', '-ww', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
     ).stdout
     for line in listing.splitlines():
         pid, _, arguments = line.strip().partition(' ')
@@ -66,6 +66,7 @@ def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while
     _expect_a_sound_end(bus_listener, out)
 
 
+@pytest.mark.slow
 def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
     process, out = command.start_drive(*ENDLESS)
     wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)

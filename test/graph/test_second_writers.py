@@ -48,7 +48,9 @@ rclpy.spin(node)
     ('topic', 'sentence'),
     [
         ('current_setpoint', 'coil switched off: /elsewhere/evil must not publish current_setpoint too'),
-        ('displacement', '0 A: /elsewhere/evil must not publish displacement too'),
+        pytest.param(
+            'displacement', '0 A: /elsewhere/evil must not publish displacement too', marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_second_node_ends_the_drive_at_0_ampere_with_its_name(command, bus_listener, topic, sentence):

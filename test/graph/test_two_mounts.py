@@ -1,11 +1,14 @@
 """One engine on two mounts through the whole graph: each under its own name, as in core."""
 
+import pytest
+
 import engine_mount
 
 OPTIONS = ('--mounts', 'left,right', '--duration', '1.2', '--set', 'mount_sim.timeline.start=2.9')
 OWN = ('--set', 'mount_sim.motorway.gap_time=0.2', '--set', 'mount_sim.mount_right.friction.scale=0.8')
 
 
+@pytest.mark.slow
 def test_two_mounts_give_the_same_in_lockstep_and_in_core_to_the_bit(command):
     lockstep, core = (command.drive(mode, *OPTIONS, *OWN) for mode in ('--lockstep', '--core'))
     recordings = [engine_mount.open(result.folder / 'recording') for result in (lockstep, core)]

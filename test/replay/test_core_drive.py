@@ -277,7 +277,7 @@ def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run
 
     def take_many_and_poison(mount, chain, samples, pending):
         if mount.time > 5.0 and not poisoned:
-            controller = chain.answering.controller
+            controller = chain.loop.controller
             controller.memory.state.view(controller.compiled.state)['policy']['band']['z1'] = np.nan
             poisoned.append(mount.sample)
         return take_many(mount, chain, samples, pending)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_control.answering import Answering
+from mount_control.control_loop import ControlLoop
 from mount_replay.loop.run import run_core
 from mount_ros import topics
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
@@ -35,7 +35,7 @@ def messages_of(case):
 @pytest.mark.parametrize('case', CASES)
 def test_many_samples_at_once_are_those_taken_one_by_one(case, monkeypatch):
     _, at_once = messages_of(case)
-    monkeypatch.setattr(Answering, 'expects', lambda self, stamp: False)
+    monkeypatch.setattr(ControlLoop, 'expects', lambda self, stamp: False)
     _, one_by_one = messages_of(case)
     assert at_once == one_by_one
 

@@ -38,7 +38,7 @@ def changed_drive(tmp_path_factory):
         if len(told) < len(CHANGES) and stamp >= CHANGES[len(told)][0] * 1e9:
             _, _, changes = CHANGES[len(told)]
             values.update({name: new for name, (_, new) in changes.items()})
-            chain.answering.controller.change(_law(chain, values))
+            chain.loop.controller.change(_law(chain, values))
             told.append((stamp, dated(stamp, change_text('mount_control', changes))))
         return take_many(mount, chain, samples, pending)
 

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.compare.accept import ACCEPTED_NAME, LARGEST_TOTAL
-from engine_mount.recordings.compare.reference import differences_from_reference
+from engine_mount.recordings.compare.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
 from engine_mount.recordings.events.switching_changes import switching_times
-from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
-from engine_mount.recordings.run.versions import version_differences, versions_sentence
+from engine_mount.recordings.run.session import (
+    recorded_session,
+    session_content,
+    session_parameters,
+    version_differences,
+    versions_sentence,
+)
 from mount_recorder.versions import versions
 from mount_replay.given.input import Notes, recorded_parameters
 from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay

@@ -2,7 +2,6 @@
 
 import html
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -14,9 +13,7 @@ from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
 import engine_mount
-from engine_mount.recordings.container import scratch
 from engine_mount.recordings.events.recorded_events import event_time, recorded_events
-from engine_mount.recordings.messages import columns
 from mount_cli.command import app
 from mount_recorder.bag_writer import BagWriter
 from mount_report import report
@@ -152,6 +149,7 @@ def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figu
     assert result.exit_code == 1  # what was promised is not there
 
 
+@pytest.mark.slow
 def test_reports_of_folders_whose_names_hold_dots_do_not_overwrite_each_other(bench, tmp_path):
     for name in ('drive.1', 'drive.2'):
         shutil.copytree(bench / 'recording', tmp_path / name)
@@ -159,22 +157,6 @@ def test_reports_of_folders_whose_names_hold_dots_do_not_overwrite_each_other(be
         assert result.exit_code == 0, result.output
     made = {path.name for path in tmp_path.iterdir()}
     assert made == {f'drive.{number}{what}' for number in (1, 2) for what in ('', '_report.html', '_report')}
-
-
-def test_signals_in_files_give_the_same_page_and_pictures(bench, tmp_path, monkeypatch):
-    assert command('report', bench, '--out', tmp_path / 'memory.html').exit_code == 0
-    files = []
-    made_room = os.posix_fallocate
-    monkeypatch.setattr(scratch.os, 'posix_fallocate', lambda *of: files.append(of) or made_room(*of))
-    monkeypatch.setattr(scratch, 'LONG', 64)
-    monkeypatch.setattr(columns, '_PUT_AWAY', 500)
-    assert command('report', bench, '--out', tmp_path / 'files.html').exit_code == 0
-    assert len(files) > 20
-    assert (tmp_path / 'files.html').read_bytes() == (tmp_path / 'memory.html').read_bytes()
-    pictures = sorted((tmp_path / 'memory').iterdir())
-    assert pictures
-    for picture in pictures:
-        assert (tmp_path / 'files' / picture.name).read_bytes() == picture.read_bytes()
 
 
 @pytest.mark.parametrize(

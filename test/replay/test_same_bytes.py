@@ -19,7 +19,6 @@ from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import engine_mount
 from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.compare.words import differences
 from mount_recorder.versions import versions
 from mount_ros.topics import EVENT, SESSION, TOPICS
 
@@ -70,7 +69,7 @@ def differences_of(here: Path, there: Path) -> list[str]:
         a, b = engine_mount.open(here / path), engine_mount.open(there / path)
         changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
         if changed:
-            words = differences(compare(a, b, topics=changed))
+            words = compare(a, b, topics=changed).difference_sentences()
             told.append(f'{path}, {", ".join(topic.name for topic in changed)}: {"; ".join(words)}')
     a, b = np.load(here / 'numbers.npz'), np.load(there / 'numbers.npz')
     distances = {name: np.abs(a[name] - b[name]) for name in a if a[name].tobytes() != b[name].tobytes()}

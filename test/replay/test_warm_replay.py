@@ -3,7 +3,7 @@
 import pytest
 
 import engine_mount
-from engine_mount.recordings.compare.accept import accept
+from engine_mount.recordings.compare.reference import accept
 from mount_recorder.session import session_text
 from mount_replay.given.ramps import measured_gaps
 from mount_replay.loop.recording import record_core

@@ -3,10 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from mount_control.parameters import ControlParameters
 from mount_control.policy.contract import Policy
 from mount_control.policy.registry import UNPREFIXED
-from mount_control.settings import ControlSettings, control_settings, policy_parameters
+from mount_control.settings import ControlParameters, ControlSettings, control_settings, policy_parameters
 from mount_models.quantity import with_flattened
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of

@@ -119,11 +119,3 @@ def test_electronics_outlive_whoever_watches_them_and_the_recorder_outlives_all(
     ended = [node.name for node in ending_order(SIMULATED)]
     assert ended == ['mount_control', 'mount_init', 'mount_driver', 'mount_sim', 'mount_recorder']
     assert [node.name for node in ending_order(VEHICLE)] == [name for name in ended if name != 'mount_sim']
-
-
-def test_a_middleware_that_does_not_start_is_an_error_of_the_graph_and_leaves_nothing_to_close():
-    graph = Graph(SIMULATED, GraphSettings(domain=-1))
-    with pytest.raises(GraphError, match=r'^the middleware does not start: Domain id \(-1\) '):
-        graph.open()
-    graph.close()
-    assert graph.notes == []

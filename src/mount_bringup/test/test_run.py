@@ -91,6 +91,11 @@ def test_what_cannot_be_is_refused_before_anything_starts(supervise, words, sent
     assert sentence in output
 
 
+def test_help_tells_how_to_call_it(capsys):
+    assert run.run(['--help']) == 0
+    assert capsys.readouterr().out.startswith('usage: mount_supervisor vehicle|sim|replay')
+
+
 def test_a_second_graph_in_a_namespace_is_refused(supervise):
     with domain.domain_lock(5, 'left'):
         code, output = supervise(Supervised(), 'namespace:=/left')

@@ -170,7 +170,7 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
     job = Job(('rack',), {'mount_sim': quiet_bench, 'mount_control': paper})
     found = []
     for step in (5e-5, 2.5e-5):
-        monkeypatch.setattr('mount_sim.excitation.scenario.STEP_TIME', step)
+        monkeypatch.setattr('mount_sim.excitation.building.STEP_TIME', step)
         found.append(np.array(run_job(job)[1]['harmonics_n'])[[0, 2, 4, 6]])
     assert not np.array_equal(*found)
     assert found[1] == pytest.approx(found[0], rel=0.005)
@@ -263,6 +263,7 @@ def test_a_gap_that_does_not_reach_the_level_is_told_as_such(tmp_path):
 # Sensitivity.
 
 
+@pytest.mark.slow
 def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     told = []
     settings = {

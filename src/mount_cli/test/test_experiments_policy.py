@@ -42,6 +42,7 @@ def test_figures_are_plain_and_hold_what_is_promised(compared):
     assert list(figures['thd'][CONTINUOUS]) == ['8']
 
 
+@pytest.mark.slow
 def test_continuous_law_is_below_the_hydromount_where_the_paper_policy_is_not(compared):
     figures = compared.figures
     assert (

@@ -26,6 +26,8 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
 from mount_sim.excitation.scenario import STEP_TIME
 
+pytestmark = pytest.mark.slow
+
 REPOSITORY = Path(__file__).resolve().parents[3]
 I280 = REPOSITORY.parent / 'shared' / 'data' / 'motorway_i280'
 needs_i280 = pytest.mark.skipif(

@@ -15,6 +15,8 @@ from mount_cli.command import main
 from mount_control.policy.registry import POLICIES
 from mount_sim.excitation.road import RandomRoad, random_road
 
+pytestmark = pytest.mark.slow
+
 STONE = 0.16  # m
 SPEEDS = ('30', '60', '120')
 
@@ -57,7 +59,6 @@ def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
 
 
-@pytest.mark.slow
 def test_belgian_blocks_are_driven_at_three_speeds_by_each_policy_and_the_hydromount(blocks, tmp_path):
     figures = tmp_path / 'figures.json'
     own = (f'measured_road.road={blocks}', 'measured_road.speeds=30,60,120', 'measured_road.workers=1')

@@ -56,10 +56,8 @@ def design(eigenfrequency: float, quality: float, lead_time: float, sample_time:
 @compiled
 def settle(band_pass, state, displacement):
     """Set the state to that of a mount which has always been at `displacement`."""
-    state.z1 = -band_pass.gain * displacement
-    state.z2 = -band_pass.gain * displacement
-    state.displacement = 0.0
-    state.earlier = 0.0
+    state.z1 = state.z2 = -band_pass.gain * displacement
+    state.displacement = state.earlier = 0.0
 
 
 @compiled

@@ -1,17 +1,26 @@
 """From a displacement sample to a coil current: a policy says which force, the force maker makes it.
 
-What a step does is in `compiled_steps`, compiled once for each policy.
+The step in reading order is `_step`; the policy has its place in `_decide`. All of it is compiled
+once for each policy, with its functions and records in it: written out for two policies it would stand twice.
 """
 
-from typing import NamedTuple
+import functools
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_control import force_maker, force_to_current
-from mount_control.compiled_steps import compiled_with
+from mount_control import force_maker
+from mount_control.policy.contract import Policy, trace_dtype
 from mount_control.settings import ControlSettings
-from mount_models.arithmetic.record import record_bytes
+from mount_models.arithmetic.compiled import compiled, specialised
+from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+
+FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
+_EXPONENT = 0x7FF0000000000000  # bits that are all set where a float64 is no finite number
+_AHEAD = 64  # samples, chosen: so far the policy is ahead of the force maker in a run
 
 
 class Tables(NamedTuple):
@@ -30,10 +39,22 @@ class Memory(NamedTuple):
     window: NDArray[np.float64]
 
 
-class ControlLaw:
-    """All that a control step needs and does not change: made beforehand, taken by one controller."""
+class Compiled(NamedTuple):
+    """The controller with one policy: types of its records, and its compiled functions."""
 
-    def __init__(self, settings: ControlSettings, table: force_to_current.CurrentTable):
+    law: type[NamedTuple]
+    state: np.dtype
+    trace: np.dtype
+    start: Callable[..., None]
+    transfer: Callable[..., None]
+    step: Callable[..., float]
+    run: Callable[..., None]
+
+
+class ControlLaw:
+    """All that a control step needs and does not change: made beforehand, used by one controller."""
+
+    def __init__(self, settings: ControlSettings, table: force_maker.CurrentTable):
         self.compiled = compiled_with(settings.policy)
         sample_time = 1.0 / settings.parameters.sample_rate
         maker = force_maker.design(settings.friction, settings.contact, table.limits, sample_time)
@@ -43,61 +64,52 @@ class ControlLaw:
 
 
 class Controller:
-    """The control law with its memory; the same compiled step serves node, lock-step and core runs."""
+    """A control law with its memory; it knows neither stamps nor doubts, see `control_loop`."""
 
     def __init__(self, law: ControlLaw):
         self.compiled = law.compiled
-        self._law, self._tables, self._window = law.record, law.tables, law.window
-        self._state = np.zeros(1, self.compiled.state).view(np.uint8)
-        self._state_record = self._state.view(self.compiled.state)[0]
-        self._trace = np.zeros(1, self.compiled.trace).view(np.uint8)
-        self._trace_record = self._trace.view(self.compiled.trace)[0]
+        state = np.zeros(1, self.compiled.state).view(np.uint8)
+        self.counts = state.data.cast('q')
+        """The state as integers; the last one counts the faults."""
+        self.trace_record = np.zeros(1, self.compiled.trace).view(np.uint8)
+        """The bytes of the trace of the last step."""
+        self.trace: np.void = self.trace_record.view(self.compiled.trace)[0]
+        self._use(Memory(law.record, law.tables, state, law.window))
         self.restart(0.0)
 
-    @property
-    def memory(self) -> Memory:
-        """What the compiled `step` takes before trace and sample, for a compiled loop that calls it."""
-        return Memory(self._law, self._tables, self._state, self._window)
-
-    @property
-    def trace(self) -> np.void:
-        """The intermediates of the last step."""
-        return self._trace_record
-
-    @property
-    def trace_bytes(self) -> bytes:
-        """The intermediates of the last step as little-endian float64 numbers."""
-        return self._trace.tobytes()
+    def _use(self, memory: Memory) -> None:
+        self.memory = memory
+        self.advance = functools.partial(self.compiled.step, *memory, self.trace_record)
+        """`step` without a call between."""
 
     @property
     def faults(self) -> int:
-        """How often the memory was found to hold something that is no finite number, and was cleared."""
-        return int(self._state_record['faults'])
+        """How often the memory was found to hold NaN or infinity, and was cleared."""
+        return self.counts[-1]
 
     def restart(self, displacement: float) -> None:
         """Forget the past: a mount at rest at `displacement` (m), damping off."""
-        self.compiled.start(self._law, self._state, self._window, displacement)
+        self.compiled.start(*self.memory, displacement)
 
     def change(self, law: ControlLaw) -> None:
-        """Go on with another law of the same policy, from the next sample on and without a jump.
+        """Continue with another law of the same policy, from the next sample on and without a jump.
 
-        The policy carries its memory over, and where damping is on the current goes over to what the new law
-        asks for within `force_maker.FADE_TIME`.
+        The policy carries its memory over, and while damping the current moves to that of the new law
+        within `force_maker.FADE_TIME`.
         """
-        self.compiled.transfer(self._law, law.record, self._state, self._window, law.window)
-        self._law, self._tables, self._window = law.record, law.tables, law.window
+        old, _, state, window = self.memory
+        self.compiled.transfer(old, law.record, state, window, law.window)
+        self._use(Memory(law.record, law.tables, state, law.window))
 
     def step(self, displacement: float, bridged_samples: int = 0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
 
-        `bridged_samples` samples missing before it are replaced by a straight line. NaN and what lies
+        `bridged_samples` samples missing before it are replaced by a straight line. NaN and displacements
         beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory. Where the
-        memory itself holds what is no finite number, the answer is 0 A, it is cleared as by `restart`, and
-        that is counted in `faults`.
+        memory itself holds NaN or infinity, the answer is 0 A, the memory is cleared as by `restart`, and
+        `faults` counts it.
         """
-        return self.compiled.step(
-            self._law, self._tables, self._state, self._window, self._trace, displacement, bridged_samples
-        )
+        return self.advance(displacement, bridged_samples)
 
     def run(
         self, displacement: NDArray[np.float64], traces: NDArray[np.void] | None = None
@@ -109,14 +121,186 @@ class Controller:
         if traces is None:
             traces = np.zeros(len(displacement), self.compiled.trace)
         samples = np.ascontiguousarray(displacement, dtype=float)
-        self.compiled.run(self._law, self._tables, self._state, self._window, traces.view(np.uint8), samples)
+        self.compiled.run(*self.memory, traces.view(np.uint8), samples)
         return traces
 
 
 def load_compiled_law(settings: ControlSettings) -> None:
     """Run the compiled law once, so that the first sample need not wait for the compiler."""
-    table = force_to_current.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
-    controller = Controller(ControlLaw(settings, table))
+    table = force_maker.resample(np.array([0.4, 3.0]), np.array([0.0, 300.0]), 0.5, 3.0)
+    law = ControlLaw(settings, table)
+    controller = Controller(law)
     controller.step(0.0)
     controller.run(np.zeros(1))
-    controller.change(ControlLaw(settings, table))
+    controller.change(law)
+
+
+@functools.cache
+def compiled_with(policy: Policy) -> Compiled:
+    """Return the controller compiled with a policy; compiled on the first call of each function."""
+    law = NamedTuple('law', [('policy', policy.Law), ('maker', force_maker.Law)])  # noqa: UP014
+    state = record_type(
+        [('policy', policy.STATE), ('maker', force_maker.STATE), ('displacement', 'f8'), ('faults', 'i8')]
+    )
+    trace = trace_dtype(policy)
+    bound: dict[str, Any] = {'policy': policy, 'LAW': record_dtype(law), 'STATE': state, 'TRACE': trace}
+    bound['OF_POLICY'], bound['OF_TRACE'] = policy.STATE.itemsize // 8, len(trace)
+    for function in (_rest, _refuse, _clear, _decide, _make, _step, _decide_ahead, _make_behind):
+        bound[function.__name__] = specialised(function, policy.__name__, bound)
+    interface = (specialised(each, policy.__name__, bound) for each in (_start, _transfer, _single, _run))
+    return Compiled(law, state, trace, *interface)
+
+
+# What follows is compiled for each policy, with these names as `compiled_with` binds them. A `mount` is its
+# law, tables, state, the bits of the state, and window.
+
+policy: Any = None
+LAW = STATE = TRACE = np.dtype([])
+OF_POLICY = 0  # numbers of its state, with which that of the controller begins
+OF_TRACE = 0  # numbers
+
+
+def _start(law, tables, state, window, displacement):
+    """Set the memory to a mount at rest at `displacement` (m), damping off; arguments as for `_single`."""
+    _rest((law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window), displacement)
+
+
+def _transfer(law, new_law, state, window, new_window):
+    """Make the memory of one law that of a new one; arguments are the bytes of records and two windows."""
+    memory = state.view(STATE)[0]
+    policy.transfer(law.view(LAW)[0].policy, new_law.view(LAW)[0].policy, memory.policy, window, new_window)
+    force_maker.begin_fade(new_law.view(LAW)[0].maker, memory.maker)
+
+
+def _single(law, tables, state, window, trace, displacement, bridged_samples):
+    """Take one displacement sample (m), fill `trace`, return the current setpoint in A.
+
+    `law`, `state` and `trace` are the bytes of their records.
+    """
+    mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
+    sound = _all_finite(mount[3])
+    return _step(mount, sound, trace.view(np.float64), trace.view(TRACE)[0], displacement, bridged_samples)
+
+
+def _run(law, tables, state, window, traces, displacements):
+    """Fill `traces` with one step for each displacement; arguments as for `_single`.
+
+    In blocks first all by the policy, then all by the force maker: the processor overlaps the steps of
+    either, but not of both in turn (a third faster). A policy that is ahead when the memory of the force
+    maker is spoiled needs no way back, for then both are cleared.
+    """
+    mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
+    sound = _all_finite(mount[3])
+    records, numbers, place = traces.view(TRACE), traces.view(np.float64), 0
+    wanted = np.empty((_AHEAD, 3))
+    while place < len(displacements):
+        end = min(place + _AHEAD, len(displacements))
+        if sound:
+            decided = _decide_ahead(mount, records[place:end], displacements[place:end], wanted)
+            place += _make_behind(mount, records[place : place + decided], wanted)
+        if place < end:  # too far, or the memory is spoiled
+            of_sample = numbers[place * OF_TRACE : (place + 1) * OF_TRACE]
+            _step(mount, False, of_sample, records[place], displacements[place], 0)
+            sound = sound or abs(displacements[place]) <= FARTHEST_DISPLACEMENT
+            place += 1
+
+
+def _decide_ahead(mount, traces, displacements, wanted):
+    """Let the policy take samples and fill `wanted`; return how many before one that is too far or spoils."""
+    _, _, _, bits, _ = mount
+    for index in range(len(displacements)):
+        if not abs(displacements[index]) <= FARTHEST_DISPLACEMENT:  # also NaN
+            return index
+        wanted[index] = _decide(mount, traces[index], displacements[index])
+        if not _all_finite(bits[:OF_POLICY]):
+            return index
+    return len(displacements)
+
+
+def _make_behind(mount, traces, wanted):
+    """Let the force maker take what the policy wants; return how many samples before one that spoils."""
+    _, _, _, bits, _ = mount
+    for index in range(len(traces)):
+        traces[index].bridged_samples = 0
+        sound = _make(mount, traces[index], wanted[index])
+        if not (sound and _all_finite(bits[OF_POLICY:])):
+            return index
+    return len(traces)
+
+
+def _step(mount, sound, numbers, trace, displacement, bridged_samples):
+    """Take one sample; `numbers` are those of `trace`, `sound`: whether all of the state are finite."""
+    _, _, state, bits, _ = mount
+    if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
+        return _refuse(numbers, trace, displacement)
+    if not sound:
+        return _clear(mount, numbers, trace, displacement)
+    rise = (displacement - state.displacement) / (bridged_samples + 1)
+    for _ in range(bridged_samples):
+        _make(mount, trace, _decide(mount, trace, state.displacement + rise))
+    trace.bridged_samples = bridged_samples
+    sound = _make(mount, trace, _decide(mount, trace, displacement))
+    if not (sound and _all_finite(bits)):
+        return _clear(mount, numbers, trace, displacement)
+    return trace.current
+
+
+def _decide(mount, trace, displacement):
+    """Let the policy take one sample; return the force (N), velocity (m/s) and activity that it wants."""
+    law, tables, state, _, window = mount
+    trace.displacement = displacement
+    trace.velocity = (displacement - state.displacement) / law.maker.sample_time
+    state.displacement = displacement
+    return policy.step(law.policy, tables.policy, state.policy, window, trace, displacement)
+
+
+def _make(mount, trace, wanted):
+    """Let the force maker make what the policy wants; return whether all results are finite numbers."""
+    law, tables, state, _, _ = mount
+    force, velocity, active = wanted[0], wanted[1], wanted[2]
+    normal_force, coefficient, current = force_maker.make(
+        law.maker, tables.current, state.maker, force, velocity, active
+    )
+    trace.damping_active = active
+    trace.desired_force = force
+    trace.friction_deflection = state.maker.deflection
+    trace.friction_coefficient = coefficient
+    trace.normal_force = normal_force
+    trace.current = current
+    return 0.0 <= active <= 1.0 and math.isfinite(force + velocity + current)
+
+
+def _rest(mount, displacement):
+    law, _, state, bits, window = mount
+    bits[:-1] = 0  # all but the count of faults
+    window[:] = 0.0
+    policy.start(law.policy, state.policy, window, displacement)
+    state.displacement = displacement
+
+
+def _clear(mount, numbers, trace, displacement):
+    """Begin afresh with a memory that was spoiled: whatever the cause, no current is made of it."""
+    _rest(mount, displacement)
+    mount[2].faults += 1
+    return _refuse(numbers, trace, displacement)
+
+
+def _refuse(numbers, trace, displacement):
+    """Trace that nothing is known of a step, and 0 A."""
+    numbers[:] = np.nan
+    trace.displacement = displacement
+    trace.damping_active = trace.desired_force = trace.normal_force = trace.current = 0.0
+    trace.bridged_samples = 0.0
+    return 0.0
+
+
+@compiled
+def _all_finite(bits):
+    """Return whether `bits` are those of finite float64, and of int64 that are not negative.
+
+    One by one: to load several at once, a processor waits until the last ones written are in its cache.
+    """
+    for place in range(len(bits)):  # noqa: SIM110 - numba compiles no generator
+        if (bits[place] & _EXPONENT) == _EXPONENT:
+            return False
+    return True

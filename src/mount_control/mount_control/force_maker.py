@@ -5,12 +5,14 @@ inverted for the force and carried on by one step, and the current-force table o
 current.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mount_control import force_to_current
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.interpolation import each_interpolated
 from mount_models.arithmetic.record import record_type
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -19,6 +21,27 @@ from mount_models.friction.simplified import normal_force_for, simplified_step_w
 FADE_TIME = 0.050
 """s, chosen: in it the current goes over to a new law: first it stands for a sample, and its distance from
 what the new law asks for then falls evenly to zero."""
+FORCE_STEP = 0.5  # N, chosen: the table's own step
+_FIRST_TOUCH = 1.0  # N, chosen
+_HIGHEST_FORCE = 1e4  # N, chosen: far beyond any magnet of this size; the table has a place for every 0.5 N
+
+
+class ForceTableError(ValueError):
+    """A current-force table cannot be used; the text says why."""
+
+
+class CurrentLimits(NamedTuple):
+    """`offset_current` (A) holds the pads ready, `highest_current` (A) limits every setpoint."""
+
+    offset_current: float
+    highest_current: float
+
+
+class CurrentTable(NamedTuple):
+    """Currents in A at the normal forces 0, `FORCE_STEP`, 2 `FORCE_STEP`, ... and their limits."""
+
+    currents: NDArray[np.float64]
+    limits: CurrentLimits
 
 
 class Law(NamedTuple):
@@ -26,7 +49,7 @@ class Law(NamedTuple):
 
     friction: FrictionCoefficients
     contact: FrictionContact
-    limits: force_to_current.CurrentLimits
+    limits: CurrentLimits
     sample_time: float
     fade_samples: int
 
@@ -43,25 +66,52 @@ STATE = record_type(
 )
 
 
+def resample(
+    current: NDArray[np.float64],
+    normal_force: NDArray[np.float64],
+    offset_current: float,
+    highest_current: float,
+) -> CurrentTable:
+    """Return the table of `current` (A) over `normal_force` (N), (n,) and rising, on an even grid of forces.
+
+    Raises `ForceTableError` where it does not rise from the first touch, reaches beyond any magnet, or the
+    offset current lies outside.
+    """
+    if not 0.0 <= normal_force[0] <= _FIRST_TOUCH:
+        raise ForceTableError(
+            f'current_force_table starts at {normal_force[0]:.2f} N (limit {_FIRST_TOUCH:g} N), '
+            'not at the first touch of the pads; activate mount_init again'
+        )
+    if not (np.all(np.diff(normal_force) > 0.0) and np.all(np.diff(current) > 0.0)):
+        raise ForceTableError(
+            'current and normal force of the current_force_table must rise strictly; '
+            'activate mount_init again'
+        )
+    if not normal_force[-1] <= _HIGHEST_FORCE:
+        raise ForceTableError(
+            f'current_force_table ends at {normal_force[-1]:g} N (limit {_HIGHEST_FORCE:g} N), more than '
+            'the magnet can pull; activate mount_init again'
+        )
+    if not 0.0 < offset_current < highest_current:
+        raise ForceTableError(
+            f'offset_current ({offset_current:.3f} A) must lie within 0 .. {highest_current:g} A; '
+            'activate mount_init again, or raise highest_current'
+        )
+    forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
+    return CurrentTable(
+        each_interpolated(forces, np.array(normal_force), np.array(current)),  # copies: one type to compile
+        CurrentLimits(float(offset_current), float(highest_current)),
+    )
+
+
 def design(
     friction: FrictionCoefficients,
     contact: FrictionContact,
-    limits: force_to_current.CurrentLimits,
+    limits: CurrentLimits,
     sample_time: float,
 ) -> Law:
     """Return the law for samples that come `sample_time` s apart."""
     return Law(friction, contact, limits, sample_time, round(FADE_TIME / sample_time))
-
-
-@compiled
-def rest(state):
-    """Set the memory to pads that are not pressed."""
-    state.deflection = 0.0
-    state.normal_force = 0.0
-    state.current = 0.0
-    state.distance = 0.0
-    state.fading = 0
-    state.on = 0
 
 
 @compiled
@@ -84,7 +134,7 @@ def make(law, currents, state, force, velocity, active):
     if state.on == 1:
         wanted = 0.0 if force * velocity < 0.0 else force
         normal_force, coefficient = _normal_force(of_speed, law, currents, state, wanted, velocity)
-        current = _faded(law, state, force_to_current.current_for(currents, law.limits, normal_force))
+        current = _faded(law, state, current_for(currents, law.limits, normal_force))
     else:
         state.fading = 0
     state.current = current
@@ -114,4 +164,26 @@ def _normal_force(of_speed, law, currents, state, wanted, velocity):
     force, coefficient = normal_force_for(
         of_speed, law.friction, wanted, velocity, direction * state.deflection, state.normal_force
     )
-    return min(force, force_to_current.highest_force(currents)), coefficient
+    return min(force, highest_force(currents)), coefficient
+
+
+@compiled
+def highest_force(currents):
+    """Return the largest normal force in N that the table holds."""
+    return FORCE_STEP * (len(currents) - 1)
+
+
+@compiled
+def current_for(currents, limits, normal_force):
+    """Return the current in A for a normal force in N, within `limits`; 0 A where it is not a number."""
+    if math.isnan(normal_force):
+        return 0.0  # as a place in the table it would be anywhere in memory
+    place = max(normal_force, 0.0) / FORCE_STEP
+    last = len(currents) - 1
+    if place >= last:
+        current = currents[last]
+    else:
+        left = int(place)
+        share = place - left
+        current = (1.0 - share) * currents[left] + share * currents[left + 1]
+    return min(max(current, limits.offset_current), limits.highest_current)

@@ -78,17 +78,10 @@ def design(lead_time: float, sample_time: float) -> IdleLine:
 
 @compiled
 def rest(line, state, displacement):
-    """Set the state to that of a mount which has always been at `displacement` (m), no line in it."""
+    """Set a state of zeros to that of a mount which has always been at `displacement` (m), no line in it."""
     state.first_z1 = -line.gain * displacement
     state.first_z2 = line.gain * displacement
-    state.second_z1 = 0.0
-    state.second_z2 = 0.0
-    state.cosine_part = 0.0
-    state.sine_part = 0.0
-    state.double_real = 0.0
-    state.double_imaginary = 0.0
     state.turns = line.first
-    state.amplitude = 0.0
 
 
 @compiled

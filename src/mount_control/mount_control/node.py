@@ -3,21 +3,20 @@
 import contextlib
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
 
-from mount_control.activation import Activation, AirGap
-from mount_control.answering import OFF, Answering
+from mount_control.activation import Activation, AirGap, check_rate
+from mount_control.control_loop import OFF, ControlLoop, SampleCounts
 from mount_control.controller import load_compiled_law
-from mount_control.damping_log import DampingLog
-from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
+from mount_control.diagnosis import ControlFigures, counted_since, verdict
 from mount_control.policy.contract import trace_fields
-from mount_control.sample_watch import Judgement
 from mount_control.settings import (
     FRICTION,
     check_policies,
@@ -50,6 +49,9 @@ _MEASURED_BEFORE = (
         'break since before the present table was made, so that it holds'
     ),
 )
+_KEPT_DURATIONS = 100_000  # chosen: many more than come between two verdicts
+
+T = TypeVar('T')
 
 
 class MountControl(SafeLifecycleNode):
@@ -64,15 +66,14 @@ class MountControl(SafeLifecycleNode):
         self.declare_parameter(*_MEASURED_BEFORE)
         self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
-        self.answering = Answering()
+        self.loop = ControlLoop()
         self._activation = Activation()
-        self._damping_log = DampingLog()
-        self._foreign = False  # whether another node publishes what this one hears
+        self._foreign = False  # whether another node publishes what this one subscribes to
         self._nameless = UnnamedPublisher()
-        self._unread = Unread()
-        self._last_sample: tuple[int, float] | None = None  # stamp ns, m
+        self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
-        self._order = threading.Lock()  # in lock-step the first answer may come from the activation's thread
+        self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
+        self._order = threading.Lock()  # no answer is made while an activation begins or ends
 
     def configure(self) -> None:
         values = self._values()
@@ -84,7 +85,7 @@ class MountControl(SafeLifecycleNode):
         usual = defaults()
         self._warn_without_effect(name for name, value in self._values().items() if value != usual.get(name))
         self._parameter_changes = 0
-        self._foreign, self._unread = False, Unread()
+        self._foreign, self._unread_reason = False, ''
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
@@ -92,7 +93,7 @@ class MountControl(SafeLifecycleNode):
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
         with compilation_told(self.get_logger().info):
             load_compiled_law(self._settings)
-        self.answering.watch.measured_before = bool(self.get_parameter(_MEASURED_BEFORE[0]).value)
+        self.loop.measured_before = bool(self.get_parameter(_MEASURED_BEFORE[0]).value)
         path = self.open_data_path()
         self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
         self._send_trace = path.sender(topics.CONTROL_TRACE)
@@ -104,36 +105,39 @@ class MountControl(SafeLifecycleNode):
 
     def activate(self) -> None:
         self.wait_for_sole_publishers()
-        table, air_gap = self._activation.wait(self.answering.watch, self.ending)
-        self.answering.watch.check_rate(self._settings.parameters.sample_rate)
+        table, air_gap = self._activation.wait(self.loop, self.ending)
+        check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
         self._latency = LatencyHistogram()
-        self._counted = SlidingWindow(Counted())
+        self._counted = SlidingWindow(SampleCounts())
         self._heard = time.monotonic()
-        self._damping_log = DampingLog()
-        self.answering.begin(self._settings, currents, air_gap.stamp)
+        with self._order:
+            waiting, self._waiting = self._waiting, b''
+            self.loop.begin(self._settings, currents, air_gap.stamp)
         self.report_publisher_conflict()
         self.get_logger().info(
             f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
             f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
         )
-        if self.lockstep and self._last_sample is not None:
-            self._answer(*self._last_sample)  # the electronics wait for an answer to what came before
+        if self.lockstep and waiting:
+            self._on_displacement(waiting)  # the electronics wait for an answer to what came before
 
     def deactivate(self) -> None:
         with self._order:  # no answer may overtake the last 0 A
-            self.answering.end()
-            if self._last_setpoint[1] != OFF:
-                self._publish_setpoint(self._last_setpoint[0], OFF)
+            self.loop.end()
+            stamp, current = self._last_setpoint
+            if current != OFF:
+                self._last_setpoint = stamp, OFF
+                self._send_setpoint(self._setpoint.pack(stamp, (OFF,)))
 
     def cleanup(self) -> None:
-        self.answering, self._activation, self._last_sample = Answering(), Activation(), None
+        self.loop, self._activation, self._waiting = ControlLoop(), Activation(), b''
 
     def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         self._foreign = bool(confirmed)
         if confirmed:
             self._activation = Activation()  # the table may be another node's
-        self.answering.on_publisher_conflict(confirmed, suspected)
+        self.loop.on_publisher_conflict(confirmed, suspected)
 
     def check_parameters(self, values: Mapping[str, Any]) -> None:
         control_settings(values, self._specimen)
@@ -143,46 +147,35 @@ class MountControl(SafeLifecycleNode):
         self._settings = control_settings(self._values(), self._specimen)
         self._parameter_changes += len(changes)
         self._warn_without_effect(changes)
-        told = ', '.join(f'{name} from {change.old} to {change.new}' for name, change in changes.items())
-        self.get_logger().info(f'goes on with {told}')
+        texts = (f'{name} from {change.old} to {change.new}' for name, change in changes.items())
+        self.get_logger().info(f'continues with {", ".join(texts)}')
         text = change_text(self.get_name(), changes)
-        if self.answering.controller is not None:
-            self.answering.change(self._settings, text)
+        if self.loop.controller is not None:
+            self.loop.change(self._settings, text)
         else:
-            self._tell(self.answering.watch.last or self.get_clock().now().nanoseconds, text)
+            self._send_change(self.loop.last or self.get_clock().now().nanoseconds, text)
 
     def judge(self) -> Verdict:
-        answering, now = self.answering, time.monotonic()
-        if line := self._damping_log.look(answering.damping_active, now):
-            self.get_logger().info(line)
-        counts = replace(answering.watch.counts)
-        earlier = self._counted.earlier(now, counted(counts, self._unread))
-        return verdict(
-            ControlFigures(
-                counts=counts,
-                earlier=earlier,
-                silence=0.0 if self.lockstep else now - self._heard,
-                longest_silence=self._settings.parameters.longest_bridge,
-                table_refusal=answering.refusal,
-                writer_doubt=answering.watch.writer_doubt,
-                foreign=answering.watch.foreign,
-                name_awaited=self._nameless.is_awaited(answering.watch.nameless),
-                unread=self._unread,
-                damping_active=answering.damping_active,
-                current=answering.current,
-                step_median=self._latency.quantile(0.5),
-                step_p99=self._latency.quantile(0.99),
-                last_stamp=answering.watch.last,
-                lockstep=self.lockstep,
-                faults=answering.faults,
-                last_fault=answering.last_fault,
-                policy=self._settings.parameters.policy,
-                damper=self.get_parameter('damper').value,
-                parameter_changes=self._parameter_changes,
-                doubt=answering.watch.plausibility.sentence,
-                doubted=answering.watch.plausibility.held,
-            )
+        loop, now = self.loop, time.monotonic()
+        while self._durations:
+            self._latency.add(self._durations.popleft())
+        counts = replace(loop.counts)
+        figures = ControlFigures(
+            lately=counted_since(self._counted.earlier(now, counts), counts),
+            silence=0.0 if self.lockstep else now - self._heard,
+            longest_silence=self._settings.parameters.longest_bridge,
+            step_median=self._latency.quantile(0.5),
+            step_p99=self._latency.quantile(0.99),
+            # In lock-step a supervisor ends the graph, with the name of the other node where there is one.
+            foreign_is_fatal=not self._nameless.is_awaited(loop.nameless) and self.lockstep,
+            unread_reason=self._unread_reason,
+            values={
+                'policy': self._settings.parameters.policy,
+                'damper': self.get_parameter('damper').value,
+                'parameter_changes': self._parameter_changes,
+            },
         )
+        return verdict(loop, figures)
 
     def _on_displacement(self, raw: bytes) -> None:
         begin = time.monotonic()
@@ -191,52 +184,47 @@ class MountControl(SafeLifecycleNode):
         except ScalarsError as error:
             self._note_unread(error)
             return
-        self._last_sample = stamp, displacement
-        if self._answer(stamp, displacement) is not Judgement.INACTIVE:
-            self._heard = begin
-            self._latency.add(time.monotonic() - begin)
-
-    def _answer(self, stamp: int, displacement: float) -> Judgement:
         with self._order:
-            answer = self.answering.answer(stamp, displacement)
-            if answer.current is not None:
-                self._publish_setpoint(stamp, answer.current)
-            if answer.trace is not None:
-                self._send_trace(self._trace.pack_record(stamp, answer.trace))
-            for text in answer.told:
-                self._tell(stamp, text)
-        return answer.reason
+            loop = self.loop
+            current = loop.step(stamp, displacement)
+            if current is not None:
+                self._last_setpoint = stamp, current
+                self._send_setpoint(self._setpoint.pack(stamp, (current,)))
+            elif loop.controller is None:
+                self._waiting = raw
+            if loop.trace is not None:
+                self._send_trace(self._trace.pack_record(stamp, loop.trace.tobytes()))
+            while loop.changes_made:
+                self._send_change(stamp, loop.changes_made.popleft())
+        self._heard = begin
+        self._durations.append(time.monotonic() - begin)
 
-    def _publish_setpoint(self, stamp: int, current: float) -> None:
-        self._last_setpoint = (stamp, current)
-        self._send_setpoint(self._setpoint.pack(stamp, (current,)))
-
-    def _tell(self, stamp: int, text: str) -> None:
+    def _send_change(self, stamp: int, text: str) -> None:
         self._send_event(serialised(String(data=dated(stamp, text))))
 
     def _on_air_gap(self, raw: bytes) -> None:
-        self._activation.air_gap = None
-        if self._foreign:
-            return
-        try:
-            stamp, numbers, _ = self._gap_layout.unpack(raw)
-        except ScalarsError as error:
-            self._note_unread(error)
-            return
-        offset_current = numbers[self._gap_layout.names.index('offset_current')]
-        self._activation.air_gap = AirGap(stamp, offset_current)
+        self._activation.air_gap = self._read(self._air_gap_of, raw)
 
     def _on_table(self, raw: bytes) -> None:
-        self._activation.table = None
+        self._activation.table = self._read(from_bytes, raw)
+
+    def _read(self, unpack: Callable[[bytes], T], raw: bytes) -> T | None:
+        """Return the content of a message; None where it is unreadable or may be another node's."""
         if self._foreign:
-            return
+            return None
         try:
-            self._activation.table = from_bytes(raw)
-        except ForceTableMessageError as error:
+            return unpack(raw)
+        except (ScalarsError, ForceTableMessageError) as error:
             self._note_unread(error)
+            return None
+
+    def _air_gap_of(self, raw: bytes) -> AirGap:
+        stamp, numbers, _ = self._gap_layout.unpack(raw)
+        return AirGap(stamp, numbers[self._gap_layout.names.index('offset_current')])
 
     def _note_unread(self, error: ValueError) -> None:
-        self._unread = self._unread.and_another(error)
+        self.loop.counts.messages_malformed += 1
+        self._unread_reason = str(error)
         self.get_logger().error(str(error), throttle_duration_sec=1.0)
 
     def _warn_without_effect(self, names: Iterable[str]) -> None:

@@ -1,8 +1,7 @@
 """Whether a displacement can be one: does it move as a mount can, with the noise of a sound sensor?
 
-What no sample tells is not looked for: a reading of wrong sign, unless it jumps there from beyond 0.5 mm, or
-one whose zero drifts within the range.
-Friction opposes the motion whatever sign it is told, and the band-pass takes drift away.
+A reading of wrong sign, unless it jumps there from beyond 0.5 mm, and a zero that drifts within the range
+stay undetected: friction opposes the motion whatever the sign, and the band-pass takes drift away.
 """
 
 import math
@@ -11,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlParameters
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
 
@@ -45,7 +44,7 @@ class Limits(NamedTuple):
     hold: int
 
 
-class Known(NamedTuple):
+class History(NamedTuple):
     """The newest displacements (m), how many are `known`, their noise (m); the last doubt and its value."""
 
     newest: float
@@ -61,11 +60,11 @@ class Known(NamedTuple):
 
 
 LIMITS = record_dtype(Limits)
-MEMORY = record_dtype(Known)
+MEMORY = record_dtype(History)
 
 
 class Plausibility:
-    """Keeps what is known of the displacement; `memory` for compiled code, see `doubt_of`."""
+    """The newest displacements and the verdict on the next one; compiled code calls `doubt_of`."""
 
     def __init__(self, parameters: ControlParameters):
         self.limits = record_bytes(
@@ -82,10 +81,6 @@ class Plausibility:
         self._record = self.memory.view(MEMORY)[0]
         self._parameters = parameters
 
-    def doubt(self, displacement: float, missing: int) -> bool:
-        """Take a sample (m) with so many missing before it; return whether it is not to be believed."""
-        return bool(doubt_of(self.limits, self.memory, displacement, missing))
-
     def believed(self, displacements: np.ndarray) -> int:
         """Take samples that follow each other up to the first that is not to be believed; return how many."""
         return int(_believed(self.limits, self.memory, displacements))
@@ -99,7 +94,7 @@ class Plausibility:
     def sentence(self) -> str:
         """What was last not believed, with value, limit and remedy; empty where everything was."""
         value, limits = float(self._record['value']), self._parameters
-        told = {
+        sentences = {
             Doubt.NONE: '',
             Doubt.STEP: (
                 f'displacement moved at {value:.2f} m/s (limit {limits.displacement_velocity:g} m/s): '
@@ -115,10 +110,10 @@ class Plausibility:
                 f'{1e6 * limits.displacement_noise:g} um: check the displacement sensor and its shield'
             ),
         }
-        return told[Doubt(int(self._record['doubt']))]
+        return sentences[Doubt(int(self._record['doubt']))]
 
 
-_STEP, _STUCK, _NOISE = int(Doubt.STEP), int(Doubt.STUCK), int(Doubt.NOISE)
+_NONE, _STEP, _STUCK, _NOISE = (int(doubt) for doubt in Doubt)
 
 
 @compiled
@@ -128,75 +123,51 @@ def doubt_of(limits, memory, displacement, missing):
     `limits` and `memory` are the bytes of their records. A doubt lasts for `Limits.hold` samples from the
     last reason on. More missing samples than displacements are kept leave nothing to compare with.
     """
-    now = _taken(limits.view(LIMITS)[0], _known(memory), displacement, missing)
-    _keep(memory, now)
+    law, now = limits.view(LIMITS)[0], memory.view(MEMORY)[0]
+    if missing > 0:
+        now.known = min(now.known, 1)
+    reason, value = _reason(law, now, displacement, missing)
+    now.held = max(0, now.held - 1 - missing)
+    if reason != _NONE:
+        if now.held == 0:  # while a doubt lasts, its first reason stands
+            now.doubt, now.value = reason, value
+        now.held = law.hold
+    now.fourth, now.third, now.second, now.newest = now.third, now.second, now.newest, displacement
+    now.known = min(now.known + 1, _ORDER)
     return now.held > 0
 
 
 @compiled
-def _taken(law, before, displacement, missing):
-    """Return what is known after one more displacement (m)."""
-    known = min(before.known, 1) if missing > 0 else before.known
-    noise, repeats = before.noise, before.repeats
-    doubt = max(0, before.held - 1 - missing), before.doubt, before.value
-    if known > 0:
-        velocity = abs(displacement - before.newest) / ((missing + 1) * law.sample_time)
-        if velocity > law.velocity:
-            doubt = _raised(law, doubt, _STEP, velocity)
-        if displacement == before.newest:
-            repeats += 1
-            if repeats >= law.stuck and noise >= _LEAST_NOISE:
-                doubt = _raised(law, doubt, _STUCK, displacement)
-        else:
-            repeats = 0
-            if known == _ORDER:
-                noise += law.share * (_noise(law, before, displacement) - noise)
-                if noise > law.noise:
-                    doubt = _raised(law, doubt, _NOISE, noise)
-    held, reason, value = doubt
-    newest = displacement, before.newest, before.second, before.third
-    return Known(*newest, noise, value, min(known + 1, _ORDER), repeats, held, reason)
-
-
-@compiled
-def _noise(law, before, displacement):
-    """Return the noise (m) that one more displacement tells, no more than a single reading counts for."""
-    difference = displacement - 4.0 * (before.newest + before.third) + 6.0 * before.second + before.fourth
-    return min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
-
-
-@compiled
-def _raised(law, doubt, reason, value):
-    """Return (samples for which it is held, reason, value) of a doubt; while one lasts, the first is told."""
-    held, told, its_value = doubt
-    return (law.hold, told, its_value) if held > 0 else (law.hold, reason, value)
+def _reason(law, now, displacement, missing):
+    """Return why one more displacement (m) is not believable, and the value; keeps repeats and noise."""
+    reason, value = _NONE, 0.0
+    if now.known == 0:
+        return reason, value
+    velocity = abs(displacement - now.newest) / ((missing + 1) * law.sample_time)
+    if velocity > law.velocity:
+        reason, value = _STEP, velocity
+    if displacement == now.newest:
+        now.repeats += 1
+        if reason == _NONE and now.repeats >= law.stuck and now.noise >= _LEAST_NOISE:
+            reason, value = _STUCK, displacement
+        return reason, value
+    now.repeats = 0
+    if now.known == _ORDER:
+        difference = displacement - 4.0 * (now.newest + now.third) + 6.0 * now.second + now.fourth
+        noise = min(abs(difference) / _NOISE_OF_DIFFERENCE, _CUT * law.noise)
+        now.noise += law.share * (noise - now.noise)
+        if reason == _NONE and now.noise > law.noise:
+            reason, value = _NOISE, now.noise
+    return reason, value
 
 
 @compiled
 def _believed(limits, memory, displacements):
-    law, now = limits.view(LIMITS)[0], _known(memory)
+    before = memory.copy()
     for index in range(len(displacements)):
-        after = _taken(law, now, displacements[index], 0)
-        if after.held > 0:
-            _keep(memory, now)
+        if doubt_of(limits, memory, displacements[index], 0):
+            memory[:] = before
+            for earlier in range(index):  # a copy at each sample would cost more
+                doubt_of(limits, memory, displacements[earlier], 0)
             return index
-        now = after
-    _keep(memory, now)
     return len(displacements)
-
-
-@compiled
-def _known(memory):
-    """Return what the bytes `memory` hold."""
-    now = memory.view(MEMORY)[0]
-    displacements = now.newest, now.second, now.third, now.fourth
-    return Known(*displacements, now.noise, now.value, now.known, now.repeats, now.held, now.doubt)
-
-
-@compiled
-def _keep(memory, known):
-    """Let the bytes `memory` hold what is known."""
-    now = memory.view(MEMORY)[0]
-    now.newest, now.second, now.third, now.fourth = known.newest, known.second, known.third, known.fourth
-    now.noise, now.value, now.known = known.noise, known.value, known.known
-    now.repeats, now.held, now.doubt = known.repeats, known.held, known.doubt

@@ -2,18 +2,17 @@
 
 import functools
 from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from numpy.typing import ArrayLike
 
-from mount_control.force_to_current import CurrentTable, resample
-from mount_control.parameters import ControlParameters
+from mount_control.force_maker import CurrentTable, resample
 from mount_control.policy.contract import Design, Policy
-from mount_control.policy.registry import POLICIES, chosen_policy, prefix_of
+from mount_control.policy.registry import DEFAULT, POLICIES, chosen_policy, prefix_of
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact, check_friction
-from mount_models.quantity import ParameterError, flattened, with_flattened, with_values
-from mount_models.sampling import sample_time_ns
+from mount_models.quantity import ParameterError, Quantity, flattened, with_flattened, with_values
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate, sample_time_ns
 from mount_models.specimen import Specimen, SpecimenError
 from mount_models.specimen_choice import SpecimenChoice
 
@@ -21,6 +20,34 @@ P = TypeVar('P', bound=NamedTuple)
 
 FRICTION = {'friction': FrictionCoefficients(), 'contact': FrictionContact()}
 """The sets of parameters that a specimen may know better, by their prefixes."""
+
+
+class ControlParameters(NamedTuple):
+    """Name of the policy, rate of the samples, what is believed of them, and the limit of the output."""
+
+    policy: Annotated[
+        str, Quantity('word', 'what decides when and how much is damped', words=tuple(POLICIES))
+    ] = DEFAULT
+    sample_rate: SampleRate = SAMPLE_RATE
+    longest_bridge: Annotated[
+        float,
+        Quantity('s', 'longest gap in the samples that is bridged; a longer one starts afresh', 0.002, 0.1),
+    ] = 0.020
+    displacement_range: Annotated[
+        float, Quantity('m', 'largest believable displacement to either side', 1e-3, 0.1)
+    ] = 0.020
+    displacement_velocity: Annotated[
+        float, Quantity('m/s', 'largest believable velocity of the displacement', 0.1, 100.0)
+    ] = 1.0
+    displacement_noise: Annotated[
+        float, Quantity('m', 'largest believable noise of the displacement', 1e-6, 0.1)
+    ] = 5e-5
+    displacement_stuck: Annotated[
+        float, Quantity('s', 'a noisy displacement that repeats for so long is stuck', 0.01, 10.0)
+    ] = 0.05
+    highest_current: Annotated[
+        float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
+    ] = HIGHEST_CURRENT
 
 
 class NoEffectError(ParameterError):

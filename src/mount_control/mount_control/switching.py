@@ -28,17 +28,6 @@ STATE = record_type(
 
 
 @compiled
-def rest(state, window):
-    """Set state and window to a mount at rest, damping off."""
-    state.place = 0
-    state.magnitude = 0.0
-    state.samples_above = 0
-    state.samples_below = 0
-    state.active = 0
-    window[:] = 0.0
-
-
-@compiled
 def transfer(state, window, new_window):
     """Carry the newest of the `window` over to the `new_window` of another period; damping stays as it is."""
     period, new_period = len(window), len(new_window)

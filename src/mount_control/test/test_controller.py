@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
 
-from mount_control.compiled_steps import FARTHEST_DISPLACEMENT, compiled_with
-from mount_control.controller import ControlLaw, Controller
+from mount_control.controller import FARTHEST_DISPLACEMENT, ControlLaw, Controller, compiled_with
 from mount_control.force_maker import FADE_TIME
 from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_fields
@@ -43,7 +42,7 @@ def test_trace_bytes_are_its_numbers(make_controller, sine):
     controller = make_controller()
     for x in sine(8.0, 1e-3, 0.4):
         controller.step(x)
-    numbers = np.frombuffer(controller.trace_bytes, '<f8')
+    numbers = np.frombuffer(controller.trace_record.tobytes(), '<f8')
     np.testing.assert_array_equal(numbers, [controller.trace[name] for name in PAPER.trace.names])
 
 
@@ -55,7 +54,7 @@ def test_single_steps_equal_a_run_to_the_bit(make_controller, sine):
     for number, x in enumerate(displacement):
         current = single.step(x)
         assert current == traces['current'][number]
-        assert single.trace_bytes == traces[number].tobytes()
+        assert single.trace_record.tobytes() == traces[number].tobytes()
 
 
 def test_two_runs_in_a_row_equal_one(make_controller, sine):
@@ -144,7 +143,7 @@ def test_a_doubtful_displacement_gives_0_ampere_and_leaves_no_mark(
     assert math.isnan(controller.trace['magnitude'])
     for x in sine(8.0, 1e-3, 0.2):
         assert controller.step(x) == undisturbed.step(x)
-        assert controller.trace_bytes == undisturbed.trace_bytes
+        assert controller.trace_record.tobytes() == undisturbed.trace_record.tobytes()
 
 
 def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
@@ -320,7 +319,7 @@ def test_a_run_in_which_the_memory_is_spoiled_equals_single_steps(make_controlle
     traces = whole.run(displacement[507:])
     for x, trace in zip(displacement[507:], traces, strict=True):
         single.step(x)
-        assert single.trace_bytes == trace.tobytes()
+        assert single.trace_record.tobytes() == trace.tobytes()
     assert whole.faults == single.faults > 0
     assert (traces['damping_active'][:100] == 1.0).any()  # it is spoiled later, within a run
 

@@ -1,30 +1,45 @@
 """The controller's verdict on itself, worst first."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import pytest
 
-from mount_control.diagnosis import ControlFigures, Counted, Unread, counted, verdict
-from mount_control.sample_watch import SampleCounts
+from mount_control.control_loop import SampleCounts
+from mount_control.diagnosis import ControlFigures, counted_since, verdict
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 
 GOOD = ControlFigures(
-    counts=SampleCounts(samples=10_000),
+    lately=SampleCounts(),
     silence=0.001,
     longest_silence=0.020,
-    table_refusal='',
-    damping_active=False,
-    current=0.0,
     step_median=80e-6,
     step_p99=210e-6,
-    last_stamp=123_000_000,
-    policy='switched_viscous',
-    damper='viscous_2000',
+    foreign_is_fatal=False,
+    unread_reason='',
+    values={'policy': 'switched_viscous', 'damper': 'viscous_2000', 'parameter_changes': 0},
 )
+OF_NODE = {field.name for field in fields(ControlFigures)}
+
+
+def _verdict(**changes):
+    """The verdict on a loop and a node at work, some of whose figures are changed."""
+    of_loop = {name: value for name, value in changes.items() if name not in OF_NODE}
+    of_node = {name: value for name, value in changes.items() if name in OF_NODE}
+    loop = SimpleNamespace(
+        counts=of_loop.pop('counts', SampleCounts(samples=10_000)),
+        plausibility=SimpleNamespace(sentence=of_loop.pop('doubt', ''), held=of_loop.pop('doubted', False)),
+        **{
+            'refusal': '', 'damping_active': False, 'current': 0.0, 'last': 123_000_000, 'faults': 0,
+            'last_fault': 0, 'foreign': '', 'writer_doubt': '', **of_loop,
+        },
+    )  # fmt: skip
+    of_node.setdefault('lately', loop.counts)
+    return verdict(loop, replace(GOOD, **of_node))
 
 
 def _judged(**changes):
-    judged = verdict(replace(GOOD, **changes))
+    judged = _verdict(**changes)
     return judged.level, judged.sentence
 
 
@@ -34,7 +49,7 @@ def test_all_is_well():
 
 
 def test_an_outdated_table_is_an_error_with_its_reason():
-    level, sentence = _judged(table_refusal='the measurements were interrupted', silence=9.0)
+    level, sentence = _judged(refusal='the measurements were interrupted', silence=9.0)
     assert (level, sentence) == (Level.ERROR, '0 A: the measurements were interrupted')
 
 
@@ -77,7 +92,7 @@ def test_more_than_one_bridged_sample_in_a_thousand_is_a_warning(bridged, level)
 
 def test_the_figures_hold_the_counts_and_the_last_stamp():
     counts = SampleCounts(samples=5, bridged=4, restarts=3, ignored=2, invalid=1)
-    assert verdict(replace(GOOD, counts=counts, current=1.23456)).figures == {
+    assert _verdict(counts=counts, current=1.23456).figures == {
         'samples': 5,
         'bridged': 4,
         'restarts': 3,
@@ -101,38 +116,29 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
 
 
 def test_a_controller_that_was_spoiled_is_an_error_until_the_next_activation():
-    judged = verdict(replace(GOOD, faults=2, damping_active=True))
+    judged = _verdict(faults=2, damping_active=True)
     assert judged.level is Level.ERROR
-    assert judged.sentence.startswith('the controller held what is no finite number: damping')
+    assert judged.sentence.startswith('controller state became NaN or infinite: output 0 A, state reset')
 
 
-@pytest.mark.parametrize('lockstep', [True, False])
-def test_another_writer_is_an_error_that_ends_a_graph_in_lock_step_alone(lockstep):
+@pytest.mark.parametrize('fatal', [True, False])
+def test_another_writer_is_an_error_that_may_end_the_graph(fatal):
     foreign = '/evil must not publish displacement: end it'
-    judged = verdict(replace(GOOD, foreign=foreign, lockstep=lockstep))
-    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, lockstep)
+    judged = _verdict(foreign=foreign, foreign_is_fatal=fatal)
+    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, fatal)
     assert judged.sentence == (
         '0 A: /evil must not publish displacement: end it, then activate mount_init and mount_control again'
     )
 
 
-def test_another_writer_whose_name_may_still_come_does_not_end_the_graph_yet():
-    judged = verdict(
-        replace(GOOD, foreign='10 samples were repeated: end one', lockstep=True, name_awaited=True)
-    )
-    assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
-    assert judged.sentence.startswith('0 A: 10 samples were repeated')
-
-
 def test_a_writer_in_doubt_is_an_error_while_it_lasts():
-    judged = verdict(replace(GOOD, writer_doubt='two of them: end one'))
+    judged = _verdict(writer_doubt='two of them: end one')
     assert (judged.level, judged.figures['fatal']) == (Level.ERROR, False)
     assert judged.sentence == '0 A while this lasts: two of them: end one'
 
 
 def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
-    unread = Unread().and_another(ValueError('first')).and_another(ValueError('cut'))
-    judged = verdict(replace(GOOD, unread=unread))
+    judged = _verdict(counts=SampleCounts(messages_malformed=2), unread_reason='cut')
     assert (judged.level, judged.figures['messages_malformed']) == (Level.WARN, 2)
     assert judged.sentence == (
         '2 messages could not be read and were not answered (limit: none in 10 s), the last for cut; which '
@@ -140,16 +146,14 @@ def test_messages_that_could_not_be_read_are_a_warning_with_the_reason():
     )
 
 
-@pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'unread'])
+@pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged', 'messages_malformed'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow(Counted()), ActiveFindings(), []
+    window, standing, told = SlidingWindow(SampleCounts()), ActiveFindings(), []
     for tenth in range(300):
         found = 100 * min(max(tenth - 49, 0), 5)
-        unread = Unread(found, 'cut') if count == 'unread' else Unread()
-        counts = SampleCounts(samples=100 * tenth, **{count: found} if count != 'unread' else {})
-        earlier = window.earlier(tenth / 10, counted(counts, unread))
-        figures = replace(GOOD, counts=counts, unread=unread, earlier=earlier, doubt='step')
-        verdict_told = standing.keep(verdict(figures))
+        counts = SampleCounts(samples=100 * tenth, **{count: found})
+        lately = counted_since(window.earlier(tenth / 10, counts), counts)
+        verdict_told = standing.keep(_verdict(counts=counts, lately=lately, doubt='step'))
         told.append((verdict_told.level, verdict_told.sentence))
     warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
     assert (warned[0], len(warned)) == (50, warned[-1] - 49)

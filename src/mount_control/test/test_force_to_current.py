@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_control.force_to_current import (
+from mount_control.force_maker import (
     FORCE_STEP,
     ForceTableError,
     current_for,

@@ -2,7 +2,9 @@
 
 import math
 import re
+import sys
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,6 +34,7 @@ from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.testing import wait_until
 
+SOURCES = Path(__file__).parents[2]
 MS = 1_000_000  # ns
 ACTIVATION = 5000 * MS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -196,6 +199,40 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
         np.testing.assert_array_equal(list(trace.values()), list(record.tolist()))
 
 
+def test_a_sample_passes_few_functions_and_its_setpoint_leaves_before_its_trace_is_packed(
+    active, sine, monkeypatch
+):
+    """Calls of the product's own functions, over 1000 samples, compiled ones and publishing among them."""
+    control, own, calls, until_setpoint = active(lockstep=False), str(SOURCES), [], []
+    layout, send = ScalarsLayout(topics.DISPLACEMENT), control._send_setpoint
+
+    def note(frame, event, argument):
+        file = frame.f_code.co_filename
+        if event == 'call' and file.startswith(own) and file != __file__:
+            calls.append(frame.f_code.co_name)
+
+    def send_and_note(raw):
+        send(raw)
+        until_setpoint.append(len(calls))
+
+    monkeypatch.setattr(control, '_send_setpoint', send_and_note)
+    motion = sine(8.0, 1e-3, 1.0)
+    raws = [layout.pack(ACTIVATION + (ms + 1) * MS, (x,)) for ms, x in enumerate(motion)]
+    control._on_displacement(raws[0])  # the first one begins afresh
+    until_setpoint.clear()
+    for raw in raws[1:]:
+        calls.clear()
+        sys.setprofile(note)
+        control._on_displacement(raw)
+        sys.setprofile(None)
+        assert len(calls) <= 10, calls
+        assert until_setpoint[-1] <= 8, calls
+        assert calls.index('pack_record') >= until_setpoint[-1]
+    assert len(until_setpoint) == 999
+    assert control.loop.counts.samples == 1000
+    assert control.loop.damping_active
+
+
 def test_what_came_up_to_the_activation_is_not_answered(configured, around):
     control = configured(lockstep=False)
     around.initialise()
@@ -209,7 +246,7 @@ def test_in_lock_step_the_sample_that_waits_is_answered_at_activation(configured
     control = configured()
     around.initialise()
     around.send(1.0, 0.001)
-    wait_until(lambda: control.answering.watch.last == ACTIVATION + MS, 'the sample')
+    wait_until(lambda: control.loop.last == ACTIVATION + MS, 'the sample')
     assert control.trigger_activate() == SUCCESS
     assert _answers(around, 1) == [(1.0, 0.0)]
 
@@ -278,7 +315,7 @@ def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_am
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
     other = stranger(topic)
-    wait_until(lambda: control.answering.watch.foreign, 'the other to be noticed')
+    wait_until(lambda: control.loop.foreign, 'the other to be noticed')
     around.send(401, 0.0)
     around.send(402, 0.0)
     assert _answers(around, 402)[400:] == [(401.0, 0.0), (402.0, 0.0)]
@@ -302,18 +339,32 @@ def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_am
     assert _answers(around, 403)[-1] == (403.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ('lockstep', 'awaited', 'fatal'), [(True, False, True), (True, True, False), (False, False, False)]
+)
+def test_another_writer_ends_a_graph_in_lock_step_alone_and_when_its_name_had_time_to_come(
+    active, monkeypatch, lockstep, awaited, fatal
+):
+    control = active(lockstep=lockstep)
+    control.loop.foreign = '10 samples were repeated: end one'
+    monkeypatch.setattr(control._nameless, 'is_awaited', lambda nameless: awaited)
+    verdict = control.judge()
+    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, fatal)
+    assert verdict.sentence.startswith('0 A: 10 samples were repeated')
+
+
 def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_then_goes_on(
     active, around, sine, stranger
 ):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
     twin = stranger(topics.DISPLACEMENT, '/surroundings_io')
-    wait_until(lambda: control.answering.watch.writer_doubt, 'the doubt')
+    wait_until(lambda: control.loop.writer_doubt, 'the doubt')
     around.send(401, 0.0)
     assert _answers(around, 401)[-1] == (401.0, 0.0)
     assert control.judge().sentence.startswith('0 A while this lasts: /surroundings_io must not publish')
     twin.destroy_node()
-    wait_until(lambda: not control.answering.watch.writer_doubt, 'the end of the doubt')
+    wait_until(lambda: not control.loop.writer_doubt, 'the end of the doubt')
     around.send(402, 0.0)
     assert _answers(around, 402)[-1][1] > 0.4
 
@@ -324,7 +375,7 @@ def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
     assert control.trigger_deactivate() == SUCCESS
     assert _answers(around, 401)[-1] == (400.0, 0.0)
     around.send(401, 0.001)
-    wait_until(lambda: control.answering.watch.last == ACTIVATION + 401 * MS, 'the sample')
+    wait_until(lambda: control.loop.last == ACTIVATION + 401 * MS, 'the sample')
     assert control.trigger_activate() == SUCCESS  # the same measurements, so the same table holds
     assert _answers(around, 402)[401:] == [(401.0, 0.0)]
 
@@ -378,7 +429,7 @@ def test_measurements_whose_time_goes_back_make_the_table_invalid(active, around
         ),
         (
             lambda around: (around.send_air_gap(), around.send_table(), around.send(5.0)),
-            'is of 5.000 s, but mount_control hears the measurements since 5.005 s only',
+            'is of 5.000 s, but mount_control has received the measurements since 5.005 s only',
         ),
         (
             lambda around: (around.send_air_gap(), around.send_table(), around.send(-5.0)),
@@ -443,7 +494,7 @@ def test_after_cleanup_the_old_table_is_forgotten(active, around):
     assert control.trigger_deactivate() == SUCCESS
     assert control.trigger_cleanup() == SUCCESS
     assert (control._activation.table, control._activation.air_gap) == (None, None)
-    assert control.answering.watch.first is None
+    assert control.loop.first is None
 
 
 def test_a_transition_that_is_not_valid_is_refused_and_the_node_goes_on(active, around):
@@ -513,7 +564,7 @@ def test_missing_samples_are_bridged_and_counted(active, around, sine):
 def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(active, around, sine, name):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
-    controller = control.answering.controller
+    controller = control.loop.controller
     state = controller.memory.state.view(controller.compiled.state)
     if name == 'band':
         state['policy']['band']['z1'] = math.nan
@@ -525,7 +576,7 @@ def test_a_controller_that_finds_itself_spoiled_answers_0_ampere_and_says_so(act
     assert (around.traces[-1][1]['damping_active'], around.traces[-1][1]['current']) == (0.0, 0.0)
     verdict = control.judge()
     assert verdict.level is Level.ERROR
-    assert verdict.sentence.startswith('the controller held what is no finite number: damping')
+    assert verdict.sentence.startswith('controller state became NaN or infinite: output 0 A, state reset')
     assert verdict.figures['last_fault'] == ACTIVATION + 401 * MS
     assert not verdict.figures['damping_active']
     # and it works on

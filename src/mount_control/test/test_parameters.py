@@ -2,9 +2,8 @@
 
 import pytest
 
-from mount_control.parameters import ControlParameters
 from mount_control.policy import switched_viscous
-from mount_control.settings import policy_parameters
+from mount_control.settings import ControlParameters, policy_parameters
 from mount_models.quantity import ParameterError, quantities
 from mount_models.sampling import SAMPLE_TIME
 

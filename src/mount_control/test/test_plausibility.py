@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mount_control.parameters import ControlParameters
-from mount_control.plausibility import HOLD, Plausibility
+from mount_control.plausibility import HOLD, Plausibility, doubt_of
+from mount_control.settings import ControlParameters
 from mount_models.quantity import with_values
 
 HELD = round(1e3 * HOLD)  # samples
@@ -19,10 +19,15 @@ def moving(samples=2000, amplitude=1e-3, frequency=8.0, noise=SOUND):
     return np.round((amplitude * np.sin(2.0 * np.pi * frequency * time) + drawn) / STEP) * STEP
 
 
+def doubt(plausibility, displacement, missing=0):
+    """Whether the next sample is not believed, so many missing before it."""
+    return doubt_of(plausibility.limits, plausibility.memory, float(displacement), missing)
+
+
 def doubted(displacements, **parameters):
     """Which of the samples are not believed, and what is told in the end."""
     plausibility = Plausibility(with_values(ControlParameters(), **parameters))
-    return [plausibility.doubt(float(x), 0) for x in displacements], plausibility
+    return [doubt(plausibility, x) for x in displacements], plausibility
 
 
 def _first(doubts):
@@ -87,7 +92,7 @@ def test_missing_samples_make_no_noise_and_no_velocity(lost):
     missing = [k for k in range(1, 5000) if k % lost]
     places = sorted({0, *missing})
     gaps = np.diff(places, prepend=-1) - 1
-    found = [plausibility.doubt(float(motion[k]), int(gap)) for k, gap in zip(places, gaps, strict=True)]
+    found = [doubt(plausibility, motion[k], int(gap)) for k, gap in zip(places, gaps, strict=True)]
     assert not any(found)
 
 
@@ -106,7 +111,7 @@ def test_many_samples_at_once_are_those_taken_one_by_one(fault):
         believed = many.believed(motion[len(found) :])
         found += [False] * believed
         if len(found) < len(motion):
-            found.append(many.doubt(float(motion[len(found)]), 0))
+            found.append(doubt(many, motion[len(found)]))
     assert found == expected
     assert many.memory.tobytes() == single.memory.tobytes()
 

@@ -55,10 +55,12 @@ def test_a_parameter_out_of_range_is_refused_by_its_full_name():
         control_settings(values, default_specimen())
 
 
-def test_a_trace_must_not_take_a_name_that_all_have(monkeypatch):
-    monkeypatch.setattr(viscous_example, 'TRACE', {'predicted_velocity': 'm/s', 'current': 'A'})
-    with pytest.raises(ParameterError, match='no field that every policy has'):
-        trace_fields(viscous_example)
+@pytest.mark.parametrize('policy', ALL)
+def test_a_trace_has_a_predicted_velocity_and_no_name_that_all_have(policy):
+    own = POLICIES[policy].TRACE
+    common = len(trace_fields(viscous_example)) - len(viscous_example.TRACE)
+    assert 'predicted_velocity' in own
+    assert len(trace_fields(POLICIES[policy])) == common + len(own) == 9 + len(own)
 
 
 def test_the_example_makes_the_force_that_it_wants(make, sine):
@@ -96,7 +98,7 @@ def test_single_steps_are_a_run_to_the_bit(make, sine, policy):
     traces = whole.run(displacement)
     for number, x in enumerate(displacement):
         assert single.step(x) == traces['current'][number]
-        assert single.trace_bytes == traces[number].tobytes()
+        assert single.trace_record.tobytes() == traces[number].tobytes()
 
 
 @pytest.mark.parametrize('policy', ALL)

@@ -82,19 +82,19 @@ class MessageLayout:
         self.data_id = _attribute(message, 'E2EDataId')
         self.max_delta_counter = _attribute(message, 'E2EMaxDeltaCounter')
         self.sync_frames = _attribute(message, 'E2ESyncFrames')
-        self._bits = bitstruct.c.compile(_reversed_bit_format(message, signals))
-        self.unpack_bits = self._bits.unpack
-        """Returns the raw numbers of the reversed bytes of a message."""
+        bits = bitstruct.c.compile(_reversed_bit_format(message, signals))
+        self.pack_bits, self.unpack_bits = bits.pack, bits.unpack
+        """Between the raw numbers in the order of the wire and the reversed bytes of a message."""
         # The bit format runs from the last bit to the first.
         known.reverse()
-        self._to_wire = itemgetter(*(list(names).index(name) for name in known))
+        self.to_wire = itemgetter(*(list(names).index(name) for name in known))
         self.from_wire = itemgetter(*(known.index(name) for name in names))
         """Returns the raw numbers in the order of `names`, from those that `unpack_bits` returns."""
 
     def pack(self, raw: Sequence[int]) -> bytearray:
         """Return the message with these raw numbers and its CRC; raises `OutOfRangeError`."""
         try:
-            data = bytearray(self._bits.pack(*self._to_wire(raw)))
+            data = bytearray(self.pack_bits(*self.to_wire(raw)))
         except OverflowError:
             numbers = ', '.join(f'{name} {number}' for name, number in zip(self.names, raw, strict=True))
             raise OutOfRangeError(f'{self.name}: a number does not fit its bits: {numbers}') from None

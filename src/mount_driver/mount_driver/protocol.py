@@ -10,7 +10,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
-from e2e.p05 import e2e_p05_check
+from e2e.p05 import e2e_p05_check, e2e_p05_protect
 
 from mount_driver.can_library import Database
 from mount_driver.layout import MessageLayout, OutOfRangeError, Scaling
@@ -208,7 +208,14 @@ class MountCodec:
                 f'send 0 A with enable off where no setpoint is known'
             )
         raw = round(min(max(current, limits.low), limits.high) * limits.steps)
-        return self.setpoint.pack((0, alive_counter, raw, answered_counter, enable))
+        layout, numbers = self.setpoint, (0, alive_counter, raw, answered_counter, enable)
+        try:
+            data = bytearray(layout.pack_bits(*layout.to_wire(numbers)))
+        except OverflowError:
+            return layout.pack(numbers)  # raises, with all the numbers
+        data.reverse()
+        e2e_p05_protect(data, layout.data_id, increment_counter=False)
+        return data
 
     def decode_setpoint(self, data: bytes | bytearray) -> tuple[int, Setpoint | None]:
         """Return alive counter and setpoint, which is None where its current exceeds the DBC's limit."""

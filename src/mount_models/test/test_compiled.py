@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from mount_models.arithmetic import compiled
 
 
@@ -26,6 +28,7 @@ def test_packages_that_a_file_imports_belong_to_its_digest(tmp_path, monkeypatch
     assert compiled._sources_digest(behind) != before
 
 
+@pytest.mark.slow
 def test_code_for_one_processor_is_not_taken_for_another(tmp_path):
     plain = {name: value for name, value in os.environ.items() if name != 'NUMBA_CPU_NAME'}
     for names in ({}, {'NUMBA_CPU_NAME': 'generic'}, {'NUMBA_CPU_NAME': 'generic'}):

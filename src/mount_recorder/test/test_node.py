@@ -123,7 +123,7 @@ def test_latched_topic_received_before_activation_is_recorded(make_recorder, sou
     publisher = source.node.create_publisher(String, SESSION.name, publisher_qos(SESSION))
     recorder = make_recorder(topics=['session'])
     recorder.trigger_configure()
-    kept = recorder._recorder._latched
+    kept = recorder._parts.recorder._latched
     publisher.publish(String(data='first'))
     wait_until(lambda: '/session' in kept, 'latched message')
     recorder.trigger_activate()

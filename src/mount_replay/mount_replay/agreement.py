@@ -5,9 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.compare.signal_difference import Column, SignalDifference, signal_difference
+from engine_mount.recordings.compare.compare import switching_sentence
+from engine_mount.recordings.compare.signals import (
+    Column,
+    Quantity,
+    SignalDifference,
+    signal_difference,
+    signal_sentences,
+)
 from engine_mount.recordings.compare.tolerances import EXACT
-from engine_mount.recordings.compare.words import signal_sentences, switching_sentence
 from engine_mount.recordings.events.switching_changes import Switching, paired_switchings, switching_times
 from mount_replay.core import ControlAnswers, RampAnswers, Replayed
 from mount_replay.given.input import ReplayInput, Times
@@ -147,7 +153,7 @@ def _judged(
     topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
 ) -> SignalDifference:
     unit = topic.unit(signal)
-    column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
+    column = Column(Quantity('', topic.name, signal, '' if unit == '1' else unit), time, a, b)
     return signal_difference(column, EXACT, None, sample_time)
 
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_bringup.chosen import Parameters, chosen_control
-from mount_control.answering import Answering
-from mount_control.sample_watch import SampleCounts
+from mount_control.control_loop import ControlLoop, SampleCounts
 from mount_control.settings import ControlSettings
 from mount_init.errors import InitialisationError
 from mount_models.sampling import SAMPLE_TIME_NS
@@ -124,14 +123,15 @@ class ControlReplay:
         self._begun = changed(parameters, [change for change in changes if change.time <= first])
         self._later = [change for change in changes if change.time > first]
         self._made = 0
-        self._answering = answering_from(gap, self._begun, activation_before(first))
+        self._loop = loop_from(gap, self._begun, activation_before(first))
 
     def answer(self, stamps: Times, displacement: Column) -> ControlAnswers:
         """Return the answers to the samples that follow (ns, m); counts and refusal are those until now."""
-        answers = self._answering.answer_many(stamps, displacement, self._changed_in(stamps))
-        counts, refusal = self._answering.watch.counts, self._answering.refusal
-        refusal = refusal and f'0 A: {refusal}'
-        return ControlAnswers(stamps, answers.currents, answers.traced, answers.traces, counts, refusal)
+        answers = self._loop.step_many(stamps, displacement, self._changed_in(stamps))
+        refusal = self._loop.refusal and f'0 A: {self._loop.refusal}'
+        return ControlAnswers(
+            stamps, answers.currents, answers.traced, answers.traces, self._loop.counts, refusal
+        )
 
     def _changed_in(self, stamps: Times) -> dict[int, list[ControlSettings]]:
         """Return the settings by the places of the samples that are the first to be answered by them."""
@@ -153,10 +153,10 @@ def activation_before(first: int) -> int:
     return first - SAMPLE_TIME_NS
 
 
-def answering_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> Answering:
+def loop_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> ControlLoop:
     """Return what answers as mount_control does, activated with `gap` as of the stamp `activation` (ns)."""
-    settings, answering = chosen_control(parameters), Answering()
+    settings, loop = chosen_control(parameters), ControlLoop()
     table = settings.table(gap.table.current, gap.table.normal_force, gap.numbers['offset_current'])
-    answering.watch.note(activation)
-    answering.begin(settings, table, activation)
-    return answering
+    loop.note(activation)
+    loop.begin(settings, table, activation)
+    return loop

@@ -246,13 +246,13 @@ def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) ->
 
 def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -> ControlAnswers:
     verdict = node.judge()
-    counts = node.answering.watch.counts
+    counts = node.loop.counts
     _wait_for(lambda: len(dialogue.traces) >= counts.samples, 'the last control_trace')
     answers = ControlAnswers(
         run.stamps,
         dialogue.setpoints(),
         np.zeros(len(run.stamps), bool),
-        np.zeros(len(run.stamps), node.answering.trace_type),
+        np.zeros(len(run.stamps), node.loop.trace_type),
         counts,
         verdict.sentence if verdict.level is Level.ERROR else '',
     )

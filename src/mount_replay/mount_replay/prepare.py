@@ -5,9 +5,6 @@ from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
-from engine_mount.recordings.messages.taken import find
 from mount_control.policy.registry import POLICIES
 from mount_replay.fleet.catalogue.places import places
 from mount_replay.fleet.catalogue.reading import read_place
@@ -31,4 +28,3 @@ def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tup
             read_place(place)
             for closed_loop in (False, True):
                 replay_one(place, {'mount_control': {'highest_current': 1.0}}, closed_loop)
-    find(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.bool_))  # of many chunks

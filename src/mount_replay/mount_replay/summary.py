@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.compare.signal_difference import Moment
+from engine_mount.recordings.compare.signals import Moment
 from engine_mount.recordings.events.switching_changes import Switching
 from engine_mount.recordings.run.screen import Screen, Table
-from engine_mount.recordings.run.versions import version_differences, versions_sentence
+from engine_mount.recordings.run.session import version_differences, versions_sentence
 from mount_recorder.versions import versions
 from mount_replay.agreement import (
     SETTLED,

@@ -14,8 +14,6 @@ import pyarrow as pa
 import pytest
 
 import engine_mount
-from engine_mount.recordings.messages.compact_times import compact
-from engine_mount.recordings.messages.packed_column import packed
 from mount_replay.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from mount_replay.fleet.catalogue.in_bands import in_bands
 from mount_replay.fleet.catalogue.index import indexed
@@ -151,6 +149,7 @@ def test_what_could_not_be_fetched_is_tried_again(drives, tmp_path, inside, monk
     assert indexed([drives / 'a'], tmp_path).read == 1
 
 
+@pytest.mark.slow
 def test_a_killed_index_leaves_what_can_be_gone_on_with(drives, tmp_path):
     """SIGKILL of the command itself: the same tables in the end as of one that was not stopped."""
     program = f"""
@@ -229,10 +228,10 @@ def test_a_place_is_the_same_from_wherever_it_is_named(drives, monkeypatch):
 
 def test_a_sine_is_in_its_own_band_alone():
     time = np.arange(40_000) * 1e-3
-    stamps = compact(np.arange(40_000) * 1_000_000)
+    stamps = np.arange(40_000) * 1_000_000
     values = 1e-3 * np.sin(2 * np.pi * 8.0 * time) + 5e-3
     values[1000:1003] = np.nan
-    found = dict(zip(BANDS, in_bands(stamps, packed(values), 1000.0, BANDS), strict=True))
+    found = dict(zip(BANDS, in_bands(stamps, values, 1000.0, BANDS), strict=True))
     own = found.pop((3.0, 14.0))
     assert own.rms == pytest.approx(1e-3 / np.sqrt(2), rel=0.01)
     assert own.peak == pytest.approx(1e-3, rel=0.2)
@@ -240,15 +239,15 @@ def test_a_sine_is_in_its_own_band_alone():
 
 
 def test_the_length_of_a_piece_does_not_change_what_is_in_bands(monkeypatch):
-    stamps = compact(np.arange(5_000) * 1_000_000)
-    values = packed(np.random.default_rng(1).normal(size=5_000))
+    stamps = np.arange(5_000) * 1_000_000
+    values = np.random.default_rng(1).normal(size=5_000)
     whole = in_bands(stamps, values, 1000.0, BANDS)
     monkeypatch.setattr('mount_replay.fleet.catalogue.in_bands._PIECE', 333)
     assert np.allclose(in_bands(stamps, values, 1000.0, BANDS), whole, rtol=1e-12)
 
 
 def test_too_short_a_signal_is_in_no_band():
-    assert np.isnan(in_bands(compact(np.arange(10) * 1_000_000), packed(np.ones(10)), 1000.0, BANDS)).all()
+    assert np.isnan(in_bands(np.arange(10) * 1_000_000, np.ones(10), 1000.0, BANDS)).all()
 
 
 def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():

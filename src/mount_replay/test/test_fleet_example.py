@@ -55,6 +55,7 @@ def test_the_same_order_makes_the_same_bytes(tmp_path):
         assert digests(once) == digests(again)
 
 
+@pytest.mark.slow
 def test_each_damage_is_seen_by_the_reader(tmp_path):
     damaged = {done.result.name[3:]: done.result for done in make_example(tmp_path, FEWEST, workers=1)}
     for damage, reason in (('garbage', 'is no MCAP file'), ('no_data', 'holds no MCAP file')):

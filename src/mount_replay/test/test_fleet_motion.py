@@ -1,13 +1,9 @@
 """What a catalogue tells of the displacement and of the control trace, collected part by part."""
 
-import tracemalloc
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from engine_mount.recordings.bag.column_parts import ColumnPart
-from engine_mount.recordings.messages import packed_column
 from mount_replay.fleet.catalogue.motion import Motion
 from mount_replay.fleet.catalogue.trace import Trace
 
@@ -85,22 +81,3 @@ def test_the_parts_of_the_files_do_not_change_the_figures_of_a_trace(drive):
     assert found[0]['pad_energy_j'] == pytest.approx(1e-3 * np.nansum(power), rel=1e-12)
     assert found[0]['damping_s'] == 1e-3 * np.count_nonzero(columns['damping_active'])
     assert found[0]['switched_on'] == np.count_nonzero(np.diff(columns['damping_active']) > 0)
-
-
-@pytest.mark.parametrize('repeated', [False, True])
-def test_a_long_displacement_is_kept_in_less_than_its_numbers(monkeypatch, repeated):
-    # `tracemalloc` sees no mapping
-    monkeypatch.setattr(
-        packed_column, 'mmap', SimpleNamespace(MAP_PRIVATE=0, mmap=lambda _, size, flags: bytearray(size))
-    )
-    peaks = []
-    for count in (600_000, 1_200_000):  # longer than the pieces that are looked at
-        stamps = START + PERIOD * np.arange(count)
-        stamps[1000] -= PERIOD * repeated
-        values = 1e-6 * np.round(1e3 * np.sin(np.arange(count) / 20.0))  # what comes by CAN has such steps
-        tracemalloc.start()
-        motion_of(stamps, values)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    # Where samples are sorted, there are those before it and behind it.
-    assert (peaks[1] - peaks[0]) / 600_000 < (10.0 if repeated else 5.0)

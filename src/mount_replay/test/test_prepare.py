@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 _AFTER = """
 import sys
 from mount_recorder.session import session_text
@@ -27,6 +29,7 @@ for place in places([sys.argv[1]]).values():
 """
 
 
+@pytest.mark.slow
 def test_a_worker_of_a_fleet_finds_everything_compiled_that_it_needs(tmp_path):
     run = subprocess.run(
         [sys.executable, '-c', _AFTER, str(tmp_path)], capture_output=True, text=True, check=True

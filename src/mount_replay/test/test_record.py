@@ -1,4 +1,4 @@
-"""What a recorder without a graph refuses before it starts."""
+"""A recorder without a graph refuses before it starts."""
 
 import pytest
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from engine_mount.recordings.events.switching_changes import Switching
+from mount_control.control_loop import SampleCounts
 from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_dtype
-from mount_control.sample_watch import SampleCounts
 from mount_replay.agreement import SETTLING, agreement, recorded_switching, switching_changes
 from mount_replay.core import ControlAnswers, Replayed
 from mount_replay.given.input import ControlRun, RecordedAnswers, ReplayInput

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.compare.compare import Comparison, matched_topics
-from engine_mount.recordings.compare.signal_difference import Column, SignalDifference
-from engine_mount.recordings.compare.words import by_importance
+from engine_mount.recordings.compare.signals import Column, SignalDifference, by_importance
 from mount_report.drawing.style import COLOURS, DIFFERENCE_COLOUR
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
@@ -57,7 +56,7 @@ def _chosen(comparison: Comparison) -> list[SignalDifference]:
     if drawable:
         return _distinct(drawable)[:_SIGNALS]
     known = [signal for signal in comparison.signals if signal.samples >= _LEAST_SAMPLES]
-    return [signal for signal in known if signal.quantity in _ALWAYS] or known[:1]
+    return [signal for signal in known if f'{signal.topic}.{signal.signal}' in _ALWAYS] or known[:1]
 
 
 def _distinct(signals: list[SignalDifference]) -> list[SignalDifference]:

@@ -10,8 +10,7 @@ from typing import Any
 from engine_mount.recordings.bag.recording import ReadingError, Recording
 from engine_mount.recordings.run.folder import RunFolder
 from engine_mount.recordings.run.place import open_run
-from engine_mount.recordings.run.session import session_parameters
-from engine_mount.recordings.run.told import duration_of, started_of, told_session
+from engine_mount.recordings.run.session import duration_of, session_parameters, started_of, told_session
 from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.local import local_path
 from mount_signals.sources.source import SourceError

@@ -7,11 +7,16 @@ from typing import Any
 from engine_mount.recordings.audit.audit import TopicAudit, audit
 from engine_mount.recordings.audit.losses import Losses, losses
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.events.event_marks import read_marks
+from engine_mount.recordings.events.recorded_events import read_marks
 from engine_mount.recordings.run.screen import Table
-from engine_mount.recordings.run.session import session_parameters
-from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
-from engine_mount.recordings.run.versions import version_differences
+from engine_mount.recordings.run.session import (
+    duration_of,
+    session_parameters,
+    started_of,
+    told_session,
+    version_differences,
+    versions_told,
+)
 from engine_mount.settings.changes import changed_parameters
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.compare.alignment import ComparisonError, share_stamps
-from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.page import page
 from mount_report.sections import overview, run_sections, signal_sections
 from mount_report.sections.section import Section
@@ -64,7 +63,6 @@ class Report:
             on_picture(f'drawing {chart.name}.png', place / len(charts))
             files.append(folder / f'{chart.name}.png')
             draw_chart(chart, files[-1])
-            put_away()
         return files
 
 
@@ -85,9 +83,7 @@ def subjects_of(
         signals = Signals(recording, name)
         if subjects and _shares_stamps(recordings[0], recording):
             signals.zero = subjects[0].signals.zero
-        put_away()
         subjects.append(Subject(signals, facts(signals)))
-        put_away()
     return subjects
 
 
@@ -98,7 +94,6 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda what, shar
     for place, make in enumerate(SECTIONS):
         on_step(make.__name__, place / len(SECTIONS))
         made += _section_or_reason(make, subjects, failures)
-        put_away()
     # Last, because it also says what the others did not find.
     first = _section_or_reason(overview.overview, subjects, failures)
     title = 'Report of ' + ' and '.join(subject.name for subject in subjects)

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.container.scratch import kept
 from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
 from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy.contract import Policy
@@ -105,7 +104,7 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
     # What the controller wants while damping is off is no force.
     active = np.interp(drive.truth.time, drive.seen.time, drive.seen.damping_active.astype(float)) > 0.5
     shown = np.where(active, wanted, 0.0)
-    tracking = Tracking(kept(drive.truth.time + shift), kept(shown), drive.truth.friction_force, error)
+    tracking = Tracking((drive.truth.time + shift), shown, drive.truth.friction_force, error)
     return tracking, _wanted_words(policy, own, drive.sample_time)
 
 

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.container.scratch import kept
 from engine_mount.recordings.events.recorded_events import recorded_marks
 from engine_mount.recordings.events.switching_changes import switching_times
-from engine_mount.recordings.messages.compact_times import Times, each_once
 from engine_mount.recordings.messages.series import Series, SeriesError
+from engine_mount.recordings.messages.times import Times, each_once
 from engine_mount.recordings.run.session import recorded_sample_rate, recorded_session
 from mount_report.drawing.chart import Array
 from mount_report.drive.signals import DRIVE_COLUMNS
@@ -127,14 +126,14 @@ class Signals:
             self._orders[series.topic] = next(alike, None) or self._order_of(series.stamps)
         order = self._orders[series.topic]
         found = np.asarray(values, np.float64)[order.places]
-        return Signal(order.time, found if isinstance(order.places, slice) else kept(found))
+        return Signal(order.time, found)
 
     def _order_of(self, stamps: Times) -> '_Order':
         rising, places = each_once(stamps)
         return _Order(
             stamps,
-            kept((rising - self.zero) / 1e9),
-            places if isinstance(places, slice) else kept(places),
+            (rising - self.zero) / 1e9,
+            places,
         )
 
     def _absence(self, topic: str) -> str:

@@ -77,7 +77,8 @@ def policy(name):
 class Spinning(SafeLifecycleNode):
     def __init__(self):
         super().__init__('spinning')
-        self.create_timer(0.1, self._turn)
+        self.create_timer(0.02, self._turn)
+        self.active_policy = 0, 0
         self.turn = iter(['configure', 'activate'])
     def configure(self):
         path = self.open_data_path()
@@ -85,7 +86,7 @@ class Spinning(SafeLifecycleNode):
     def _turn(self):
         getattr(self, 'trigger_' + next(self.turn, 'nothing'), lambda: None)()
         if self.real_time.held:
-            self.active_policy = policy('data')
+            self.active_policy = max(self.active_policy, policy('data'))
         if self.active and self.real_time.given_back:
             print(self.active_policy, policy('data'), policy('MainThread'), flush=True)
             print(self.sentence, flush=True)

@@ -19,6 +19,8 @@ from mount_signals.sources.remote import RemoteStore
 from mount_signals.sources.source import SourceError, StoreAwayError
 from mount_signals.sources.stores import fetched, traffic
 
+pytestmark = pytest.mark.slow
+
 DATA = bytes(range(256)) * 8192  # 2 MB
 SHORT = Patience(attempts=4, first=1e-3, longest=1e-3, seed=1)
 FETCH = 'import sys; from mount_signals.sources.stores import fetched; print(fetched(sys.argv[1]))'
@@ -51,7 +53,6 @@ def breaking(request, own_home):
     way.close()
 
 
-@pytest.mark.slow
 def test_a_connection_that_breaks_is_gone_on_with(breaking, copies, monkeypatch):
     way, uri = breaking
     monkeypatch.setattr(reading, 'BLOCK', 50_000)

@@ -151,6 +151,7 @@ def damped_ride(parameters, mount, **chosen):
     return books.account
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('idle', [0.0, 200.0])
 @pytest.mark.parametrize(
     'chosen',

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.csv_file import read_csv
+from engine_mount.recordings.signals.table import read_csv
 from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import (
     GAPS,

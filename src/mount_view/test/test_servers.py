@@ -21,6 +21,13 @@ from mount_view.view import ViewOrder, serve_view
 from mount_view.window.model import Model
 
 LIMIT = 30.0  # s
+UPGRADE = {
+    'Connection': 'Upgrade',
+    'Upgrade': 'websocket',
+    'Sec-WebSocket-Version': '13',
+    'Sec-WebSocket-Key': 'MDEyMzQ1Njc4OWFiY2RlZg==',
+    'Sec-WebSocket-Protocol': 'foxglove.websocket.v1',
+}
 
 
 def run(coroutine):
@@ -128,28 +135,59 @@ def test_a_recording_that_cannot_be_played_on_ends_the_view_and_says_why(drive, 
         ctrl_c.cancel()
 
 
-def test_others_need_the_token(drive, free_port):
+@pytest.mark.parametrize('kind', ['page', 'Foxglove server'])
+def test_others_need_the_token(drive, free_port, kind):
     feed = Recorded(drive)
-    web = Web(Model(feed, beside=False), feed.title, feed.mark, '0.0.0.0', free_port)
-    web.start()
+    if kind == 'page':
+        server = Web(Model(feed, beside=False), feed.title, feed.mark, '0.0.0.0', free_port)
+        server.start()
+    else:
+        server = FoxgloveServer(feed.topics, '0.0.0.0', free_port)
+    try:
+        for query in ('', '?token=guess', '?token=gue%C3%9F'):
+            assert status_of(free_port, query) == 403
+        own = '?' + server.address.split('?')[1]
+        assert status_of(free_port, own, upgrade=kind != 'page') == (200 if kind == 'page' else 101)
+    finally:
+        server.stop()
 
-    async def status(query):
-        address = f'http://127.0.0.1:{free_port}/{query}'
-        async with aiohttp.ClientSession() as session, session.get(address) as answer:
+
+def status_of(port, query='', *, upgrade=False, **headers):
+    """Return the status of the answer to a request for `/`."""
+
+    async def status():
+        address = f'http://127.0.0.1:{port}/{query}'
+        wanted = UPGRADE | headers if upgrade else headers
+        async with aiohttp.ClientSession() as session, session.get(address, headers=wanted) as answer:
             return answer.status
 
+    return run(status())
+
+
+@pytest.mark.parametrize(
+    ('headers', 'status'),
+    [
+        ({}, 101),
+        ({'Origin': 'https://app.foxglove.dev'}, 101),
+        ({'Origin': 'file://'}, 101),
+        ({'Origin': 'https://elsewhere.example'}, 403),
+        ({'Host': 'elsewhere.example:8765'}, 403),
+        ({'Host': 'elsewhere.example:8765', 'Origin': 'https://app.foxglove.dev'}, 403),
+    ],
+)
+def test_no_foreign_page_connects_to_the_foxglove_server(drive, free_port, headers, status):
+    server = FoxgloveServer(Recorded(drive).topics, '127.0.0.1', free_port)
     try:
-        assert run(status('')) == 403
-        assert run(status('?token=guess')) == 403
-        assert run(status('?token=gue%C3%9F')) == 403
-        assert run(status('?' + web.address.split('?')[1])) == 200
+        assert status_of(free_port, upgrade=True, **headers) == status
     finally:
-        web.stop()
+        server.stop()
 
 
 def test_a_port_that_is_taken_is_named(page, drive):
     feed = Recorded(drive)
-    other = Web(Model(feed, beside=False), feed.title, feed.mark, page._host, page._port)
+    other = Web(
+        Model(feed, beside=False), feed.title, feed.mark, '127.0.0.1', int(page.address[:-1].split(':')[-1])
+    )
     with pytest.raises(FeedError, match='choose another --port'):
         other.start()
 
@@ -198,3 +236,29 @@ def test_foxglove_gets_channels_with_definitions_and_the_very_messages(drive, fr
     stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in found]
     assert (np.diff(stamps) > 0).all()
     assert all(message.name == ['mount'] for message in found)
+
+
+def test_foxglove_is_sent_nothing_that_it_has_left_and_a_warning_for_what_is_no_request(drive, free_port):
+    feed = Recorded(drive, rate=5.0)
+    server = FoxgloveServer(feed.topics, '127.0.0.1', free_port)
+
+    async def answers():
+        options = {'protocols': ['foxglove.websocket.v1'], 'max_msg_size': 0}
+        async with aiohttp.ClientSession() as http, http.ws_connect(server.address, **options) as client:
+            channel = (await channels_of(client, len(feed.topics)))['/displacement']['id']
+            subscriptions = [{'id': 1, 'channelId': channel}]
+            await client.send_json({'op': 'subscribe', 'subscriptions': subscriptions})
+            await client.send_json({'op': 'unsubscribe', 'subscriptionIds': [1]})
+            for text in ('{', '[]', '{"op": "fetch"}', '{"op": "subscribe"}'):
+                await client.send_str(text)
+            statuses = [json.loads((await client.receive()).data) for _ in range(4)]
+            feed.start(server.take, lambda: None)
+            return statuses, [(await client.receive()).data[0] for _ in range(5)]
+
+    try:
+        statuses, opcodes = run(answers())
+    finally:
+        feed.stop()
+        server.stop()
+    assert {(each['op'], each['level']) for each in statuses} == {('status', 1)}
+    assert set(opcodes) == {2}  # the time alone

@@ -8,16 +8,10 @@ from recorded_drive import PERIOD, START, joint_state, write_drive
 
 import engine_mount
 from engine_mount.recordings import ReadingError, SeriesError
-from engine_mount.recordings.messages import columns
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
 COUNT = 500
-
-
-@pytest.fixture(autouse=True)
-def _short_blocks(monkeypatch):
-    monkeypatch.setattr(columns, '_BLOCK', 64)
 
 
 def test_columns_and_stamps_are_those_of_all_messages_in_one_pass(drive, monkeypatch):
@@ -170,5 +164,4 @@ def test_memory_grows_by_the_columns_and_not_by_the_messages(tmp_path):
     # At first what is compiled is loaded.
     folders = [tmp_path / f'bag_{count}' for count in (counts[0], *counts)]
     _, small, large = (peak_of_reading(folder, lambda each: each.load_columns(some)) for folder in folders)
-    # Heads, times, stamps and the column, each once more while they are put together.
     assert (large - small) / (counts[1] - counts[0]) < 250

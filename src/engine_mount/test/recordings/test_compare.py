@@ -9,8 +9,8 @@ from compared_drives import START, answers, write_answers
 import engine_mount
 from engine_mount.recordings.compare.alignment import ComparisonError
 from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.compare.signals import signal_table
 from engine_mount.recordings.compare.tolerances import ToleranceError, Tolerances
-from engine_mount.recordings.compare.words import as_json, as_table, sentences
 
 COUNT = 400
 LIVE = START + 90_000_000_317  # ns: another start, as of a second drive
@@ -44,7 +44,7 @@ def test_a_recording_equals_itself_to_the_bit_with_all_its_nans(compared):
     comparison = compared()
     assert comparison.equal
     assert np.isnan(SIGNALS['friction_coefficient']).any()
-    assert sentences(comparison) == ['everything is equal to the bit (16 signals of 4 topics)']
+    assert comparison.sentences() == ['everything is equal to the bit (16 signals of 4 topics)']
 
 
 def test_the_smallest_difference_is_found_with_place_and_values(compared):
@@ -70,9 +70,8 @@ def test_largest_difference_and_rms_are_those_of_the_signal(compared):
 
 def test_the_sign_of_a_zero_is_a_difference_without_a_tolerance_only(compared):
     comparison = compared(_changed('current', 10, -0.0))
-    assert 'current_setpoint.coil_current differs in the sign of zero, first at 0.010 s' in sentences(
-        comparison
-    )
+    sentence = 'current_setpoint.coil_current differs in the sign of zero, first at 0.010 s'
+    assert sentence in comparison.sentences()
     assert not comparison.equal
 
 
@@ -110,7 +109,8 @@ def test_nan_in_one_recording_alone_is_a_difference_whatever_the_tolerance(compa
     comparison = compared(_changed('displacement', 20, np.nan), ('100%',))
     signal = _signal(comparison, 'displacement.mount')
     assert (signal.differing, signal.unknown_in_one, signal.largest) == (1, 1, None)
-    assert 'displacement.mount: in one of them 1 sample is unknown, first at 0.020 s' in sentences(comparison)
+    sentence = 'displacement.mount: in one of them 1 sample is unknown, first at 0.020 s'
+    assert sentence in comparison.sentences()
 
 
 # Switching.
@@ -118,7 +118,7 @@ def test_nan_in_one_recording_alone_is_a_difference_whatever_the_tolerance(compa
 
 def test_a_later_switching_comes_first_in_words(compared):
     comparison = compared(answers(COUNT, on=112))
-    assert sentences(comparison)[0] == 'switched on 12 ms later in B, at 0.112 s'
+    assert comparison.sentences()[0] == 'switched on 12 ms later in B, at 0.112 s'
     assert [round(1e3 * change.moved) for change in comparison.switching_changes] == [12]
 
 
@@ -130,7 +130,7 @@ def test_a_switching_within_its_tolerance_has_not_moved(compared):
 
 def test_switchings_that_vanish_or_appear_are_told(compared):
     never = answers(COUNT, on=COUNT)
-    told = sentences(compared(never))
+    told = compared(never).sentences()
     assert told[:2] == [
         'damping is not switched on in B, in A it is at 0.100 s',
         'damping is not switched off in B, in A it is at 0.300 s',
@@ -138,7 +138,7 @@ def test_switchings_that_vanish_or_appear_are_told(compared):
 
 
 def test_switchings_that_appear_are_told(compared):
-    told = sentences(compared(first=answers(COUNT, on=COUNT)))
+    told = compared(first=answers(COUNT, on=COUNT)).sentences()
     assert told[0] == 'damping is switched on at 0.100 s in B, in A it is not'
 
 
@@ -164,14 +164,14 @@ def test_a_lag_is_told_where_a_signal_is_later(compared):
     comparison = compared(answers(COUNT, phase=0.004), start=LIVE)
     signal = _signal(comparison, 'displacement.mount')
     assert signal.lag.seconds == pytest.approx(4e-3, abs=0.1e-3)
-    assert any('; B is 3.98 ms later' in told for told in sentences(comparison))
+    assert any('; B is 3.98 ms later' in told for told in comparison.sentences())
 
 
 def test_missing_samples_are_a_difference_and_do_not_move_the_others(compared):
     comparison = compared(start=LIVE, missing=range(50, 60))
     assert not comparison.equal
     assert not comparison.differing
-    told = sentences(comparison)
+    told = comparison.sentences()
     assert 'samples missing in B: 10 of displacement, 10 of current_setpoint, 10 of control_trace' in told
     assert told[-1].startswith('everything that both have is equal to the bit')
 
@@ -209,11 +209,11 @@ def test_sessions_that_differ_are_told(compared):
         first_options={'session': session.format('now', 0.7)},
         session=session.format('later', 0.9),
     )
-    assert 'the sessions differ: mount_control.quality is 0.7 in A, 0.9 in B' in sentences(comparison)
+    assert 'the sessions differ: mount_control.quality is 0.7 in A, 0.9 in B' in comparison.sentences()
 
 
 def test_equal_inputs_and_sessions_leave_the_programs(compared):
-    told = sentences(compared(_changed('current', 150, 0.7)))
+    told = compared(_changed('current', 150, 0.7)).sentences()
     assert (
         'displacement and session are equal: the programs differ, or one of them began in another state'
         in told
@@ -223,7 +223,7 @@ def test_equal_inputs_and_sessions_leave_the_programs(compared):
 def test_marks_of_one_recording_are_told_and_no_difference(compared):
     comparison = compared(marks=((100, '{kind: mark, text: rough}'),))
     assert comparison.equal
-    assert 'marks only in B: mark rough' in sentences(comparison)
+    assert 'marks only in B: mark rough' in comparison.sentences()
 
 
 def test_topics_of_one_recording_are_named(drive, tmp_path):
@@ -238,7 +238,7 @@ def test_topics_of_one_recording_are_named(drive, tmp_path):
 
 def test_json_holds_what_the_words_say_and_no_nan(compared):
     comparison = compared({**answers(COUNT, on=112), 'displacement': SIGNALS['displacement']})
-    figures = json.loads(json.dumps(as_json(comparison), allow_nan=False))
+    figures = json.loads(json.dumps(comparison.figures(), allow_nan=False))
     assert figures['equal'] is False
     assert figures['switching'][0] == {
         'mount': '',
@@ -253,5 +253,5 @@ def test_json_holds_what_the_words_say_and_no_nan(compared):
 
 
 def test_the_table_names_topic_and_signal(compared):
-    table = as_table(compared(_changed('current', 150, 0.7)))
+    table = signal_table(compared(_changed('current', 150, 0.7)).signals)
     assert [row[0] for row in table.rows] == ['current_setpoint\ncoil_current', 'control_trace\ncurrent']

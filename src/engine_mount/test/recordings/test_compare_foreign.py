@@ -12,7 +12,6 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import engine_mount
 from engine_mount.recordings.compare.compare import compare
 from engine_mount.recordings.compare.tolerances import Tolerances
-from engine_mount.recordings.compare.words import sentences
 from engine_mount.recordings.events.recorded_events import recorded_events, recorded_marks
 from mount_recorder.bag_writer import BagWriter
 
@@ -74,7 +73,7 @@ def test_a_field_before_the_header_is_compared_and_the_stamp_is_not(fields, star
         return _values(fields, index + 5 * (index == 20), index)
 
     same = compared(tmp_path, fields, values, values, start=start)
-    assert same.equal, sentences(same)
+    assert same.equal, same.sentences()
     different = compared(tmp_path, fields, values, others, start=start)
     assert not different.equal
     if FIRST_FIELDS[fields] == 'of equal length':
@@ -82,7 +81,7 @@ def test_a_field_before_the_header_is_compared_and_the_stamp_is_not(fields, star
         assert (signal.name, signal.largest.difference) == ('thing.value', 5.0)
         assert signal.first.time == pytest.approx(0.2)
     else:
-        assert 'messages that differ: 1 of thing' in sentences(different)
+        assert 'messages that differ: 1 of thing' in different.sentences()
 
 
 HIDDEN = 'std_msgs/Header header\nfloat64 value\nfloat32[4] ranges\nstring text'
@@ -101,9 +100,9 @@ def test_what_no_signal_shows_is_compared_too(tolerances, tmp_path):
     assert compared(tmp_path, HIDDEN, values, values, tolerances=tolerances).equal
     told = compared(tmp_path, HIDDEN, values, array, tolerances=tolerances)
     assert not told.equal
-    assert 'messages that differ: 3 of thing' in sentences(told)
+    assert 'messages that differ: 3 of thing' in told.sentences()
     text = compared(tmp_path, HIDDEN, values, lambda k: {**values(k), 'text': 'else'}, tolerances=tolerances)
-    assert f'messages that differ: {COUNT} of thing' in sentences(text)
+    assert f'messages that differ: {COUNT} of thing' in text.sentences()
 
 
 def test_unknown_in_both_is_equal_and_the_sign_of_zero_counts_in_arrays_too(tmp_path):
@@ -141,7 +140,7 @@ def test_a_topic_of_another_type_is_never_equal(tmp_path):
     b = write_things(tmp_path / 'b.mcap', fields.format('value'), values, name='strange_msgs/msg/Other')
     comparison = compare(engine_mount.open(a), engine_mount.open(b))
     assert not comparison.equal
-    assert f'thing: in A it is {NAME}, in B strange_msgs/msg/Other' in sentences(comparison)
+    assert f'thing: in A it is {NAME}, in B strange_msgs/msg/Other' in comparison.sentences()
 
 
 # Names of this project that belong to others.

@@ -9,8 +9,8 @@ from compared_drives import START, answers, text, write_answers
 import engine_mount
 from engine_mount.recordings.compare.alignment import ComparisonError
 from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.compare.signals import signal_table
 from engine_mount.recordings.compare.tolerances import ToleranceError, Tolerances
-from engine_mount.recordings.compare.words import as_json, as_table, sentences
 from engine_mount.recordings.edit.merge import merge
 from engine_mount.recordings.events.recorded_events import recorded_events
 from mount_recorder.bag_writer import BagWriter
@@ -55,7 +55,7 @@ def test_both_mounts_are_compared_under_their_own_names(car):
         'mount_right/current_setpoint.coil_current',
         'mount_right/control_trace.current',
     }
-    figures = json.loads(json.dumps(as_json(comparison), allow_nan=False))
+    figures = json.loads(json.dumps(comparison.figures(), allow_nan=False))
     topics = ('air_gap', 'displacement', 'current_setpoint', 'control_trace')
     assert set(figures['topics']) == {f'mount_{side}/{name}' for side in ('left', 'right') for name in topics}
     found = {
@@ -63,14 +63,14 @@ def test_both_mounts_are_compared_under_their_own_names(car):
         for side in ('left', 'right')
     }
     assert found == {'left': 0, 'right': 1}
-    assert [row[0] for row in as_table(comparison).rows] == [
+    assert [row[0] for row in signal_table(comparison.signals).rows] == [
         'mount_right/current_setpoint\ncoil_current',
         'mount_right/control_trace\ncurrent',
     ]
 
 
 def test_a_recording_of_two_mounts_equals_itself(car):
-    assert sentences(compare(car('a'), car('b'))) == [
+    assert compare(car('a'), car('b')).sentences() == [
         'everything is equal to the bit (32 signals of 8 topics)'
     ]
 
@@ -79,16 +79,16 @@ def test_a_recording_of_two_mounts_equals_itself(car):
 def test_each_mount_is_aligned_by_its_own_first_sample(phase, car):
     """Their electronics sample at any time between the samples of the other."""
     comparison = compare(car('a'), car('b', start=LATER, phase=phase))
-    assert comparison.equal, sentences(comparison)
+    assert comparison.equal, comparison.sentences()
     assert (
-        'first samples of mount_right/displacement coincide' in as_json(comparison)['alignment']['sentence']
+        'first samples of mount_right/displacement coincide' in comparison.figures()['alignment']['sentence']
     )
 
 
 def test_switching_of_the_second_mount_is_told_with_its_name(car):
     comparison = compare(car('a'), car('b', right=answers(COUNT, on=112)))
-    assert sentences(comparison)[0] == 'mount_right: switched on 12 ms later in B, at 0.112 s'
-    told = as_json(comparison)['switching']
+    assert comparison.sentences()[0] == 'mount_right: switched on 12 ms later in B, at 0.112 s'
+    told = comparison.figures()['switching']
     assert [(each['mount'], each['kind'], round(each['moved_ms'])) for each in told] == [
         ('mount_left', 'on', 0),
         ('mount_right', 'on', 12),
@@ -100,8 +100,8 @@ def test_switching_of_the_second_mount_is_told_with_its_name(car):
 def test_sessions_and_marks_of_each_mount_are_compared(car):
     a = car('a', marks=((10, 'left behind'),))
     comparison = compare(a, car('b', session='scenario: sweep\n'))
-    assert 'the sessions differ: mount_right: scenario is bench in A, sweep in B' in sentences(comparison)
-    assert 'marks only in A: mount_right: mark left behind' in sentences(comparison)
+    assert 'the sessions differ: mount_right: scenario is bench in A, sweep in B' in comparison.sentences()
+    assert 'marks only in A: mount_right: mark left behind' in comparison.sentences()
     assert 'left behind' in [event.text for event in recorded_events(a)]
 
 

@@ -11,9 +11,7 @@ from recorded_drive import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
-from engine_mount.recordings.bag.metadata import read_metadata
-from engine_mount.recordings.bag.offered_qos import QosError, read_qos
-from engine_mount.recordings.bag.statement import read_statement
+from engine_mount.recordings.bag.metadata import QosError, read_metadata, read_qos, read_statement
 from engine_mount.recordings.events.switching_changes import switching_times
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.metadata import OfferedQos, qos_text

@@ -9,11 +9,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from recorded_drive import PERIOD, RECORDED, START, joint_state
 
 import engine_mount
-from engine_mount.recordings.audit.answers import NO_TIMES, Control, Setpoints, Silence, judge_answers
+from engine_mount.recordings.audit.answers import Control, Setpoints, Silence, judge_answers
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
 from engine_mount.recordings.audit.report import as_json, sentences
-from engine_mount.recordings.messages.compact_times import compact
+from engine_mount.recordings.messages.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (
@@ -31,8 +31,8 @@ NO_FRAMES = 'no frames from the electronics for more than 100 ms; are they power
 
 def judged(answered, *, sent=None, samples=SAMPLES, steps=NO_TIMES, handovers=NO_TIMES, inactive=None):
     sent = answered + 300_000 if sent is None else sent
-    setpoints, control = Setpoints(compact(answered), compact(sent)), (compact(steps), compact(handovers))
-    return judge_answers(compact(samples), setpoints, Control(*control, inactive))
+    setpoints, control = Setpoints(answered, sent), (steps, handovers)
+    return judge_answers(samples, setpoints, Control(*control, inactive))
 
 
 # Answers.

@@ -7,9 +7,13 @@ from compared_drives import START, answers, text, write_answers
 from recorded_drive import joint_state
 
 import engine_mount
-from engine_mount.recordings.compare import accept as accept_module
-from engine_mount.recordings.compare.accept import ACCEPTED_NAME, AcceptError, accept
-from engine_mount.recordings.compare.reference import differences_from_reference
+from engine_mount.recordings.compare import reference as reference_module
+from engine_mount.recordings.compare.reference import (
+    ACCEPTED_NAME,
+    AcceptError,
+    accept,
+    differences_from_reference,
+)
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.force_table import to_message
 from mount_ros.topics import (
@@ -219,7 +223,7 @@ def test_answers_to_other_samples_are_refused(tmp_path, accepted, references):
 def test_references_that_grow_too_large_are_refused_and_the_old_one_stays(
     tmp_path, accepted, references, monkeypatch
 ):
-    monkeypatch.setattr(accept_module, 'LARGEST_TOTAL', 1000)
+    monkeypatch.setattr(reference_module, 'LARGEST_TOTAL', 1000)
     run = engine_mount.open(_run(tmp_path / 'later', shift=3))
     with pytest.raises(AcceptError, match='drive a shorter one'):
         accept(run, 'bench', 'x', references)

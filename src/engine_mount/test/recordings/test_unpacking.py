@@ -9,10 +9,14 @@ import pytest
 import zstandard
 
 from engine_mount.recordings.container.mcap_reading.chunks import Chunk, contents_of, left_out
-from engine_mount.recordings.container.message_compression import plain
-from engine_mount.recordings.container.stored import HEAD, stored_messages
-from engine_mount.recordings.container.unpacking import TooLargeError, unpacked_zstd, unpacking_limit
-from engine_mount.recordings.container.whole_files import FileError, mapped
+from engine_mount.recordings.container.stored import HEAD, StorageError, stored_messages
+from engine_mount.recordings.container.unpacking import (
+    TooLargeError,
+    mapped,
+    plain,
+    unpacked_zstd,
+    unpacking_limit,
+)
 
 SIZE = 200 << 20
 ZEROS = bytes(1 << 20)
@@ -90,6 +94,6 @@ def test_a_message_that_unpacks_to_more_stays_as_it_is(stream):
 def test_a_whole_file_that_unpacks_to_more_is_refused_with_the_way_out(tmp_path, stream):
     (tmp_path / 'bag.mcap.zstd').write_bytes(stream)
     with pytest.raises(
-        FileError, match=r'unpacks to more than 67108864 bytes .* unpack it by zstd or lz4 first'
+        StorageError, match=r'unpacks to more than 67108864 bytes .* unpack it by zstd or lz4 first'
     ):
         mapped(tmp_path / 'bag.mcap.zstd')

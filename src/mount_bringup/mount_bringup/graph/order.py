@@ -63,7 +63,8 @@ class LaunchOrder(NamedTuple):
 def vehicle_order(given: Texts) -> LaunchOrder:
     """Return the graph in the car; a `ValueError` says what cannot be."""
     order = launch_order(VEHICLE, VEHICLE_ARGUMENTS, given, 'car')
-    return order._replace(duration=number_of('duration', given['duration'] or 'inf', float('inf')))
+    duration = given['duration']
+    return order._replace(duration=number_of('duration', duration, 1e9)) if duration else order
 
 
 def launch_order(

@@ -26,27 +26,27 @@ from mount_ros.nodes.shutdown import end_process
 
 SUPERVISOR = 'mount_supervisor'
 
-Graph = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
+LaunchFile = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
 """The arguments of a launch file, and the function that makes an order of their texts."""
 
 
-def _vehicle() -> Graph:
+def _vehicle() -> LaunchFile:
     return VEHICLE_ARGUMENTS, vehicle_order
 
 
-def _sim() -> Graph:
+def _sim() -> LaunchFile:
     from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
 
     return SIM_ARGUMENTS, sim_order
 
 
-def _replay() -> Graph:
+def _replay() -> LaunchFile:
     from mount_bringup.graph.replay import REPLAY_ARGUMENTS, replay_order
 
     return REPLAY_ARGUMENTS, replay_order
 
 
-GRAPHS: dict[str, Callable[[], Graph]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
+GRAPHS: dict[str, Callable[[], LaunchFile]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
 """The graphs by the name of their launch file; each loads no more than it needs."""
 
 
@@ -62,6 +62,11 @@ def main() -> None:
 def run(command: Sequence[str]) -> int:
     """Run the graph of a command line and return the exit code."""
     logger = get_logger(SUPERVISOR)
+    if '--help' in command:
+        print(
+            f'usage: {SUPERVISOR} {"|".join(GRAPHS)} [ARGUMENT:=TEXT ...]; arguments as of the launch files'
+        )
+        return 0
     try:
         order = ordered(command)
         mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))

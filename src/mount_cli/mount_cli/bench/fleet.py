@@ -76,7 +76,7 @@ def _stages(found: Sequence[Place]) -> tuple[float, ...]:
 def _stages_of_one(path: Path) -> tuple[float, ...]:
     times = [time.process_time()]
     recording = open_recording(path)
-    recording_hash(path, recording.files)
+    recording_hash(path)
     times.append(time.process_time())
     recorded = recorded_in(recording)
     times.append(time.process_time())

@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from mount_bringup.chosen import chosen_control
 from mount_cli.bench.comparison import Comparison, in_turn
 from mount_control.controller import ControlLaw, Controller
-from mount_control.force_to_current import resample
+from mount_control.force_maker import resample
 from mount_driver.can_library import cantools
 from mount_driver.protocol import DATABASE_FILE, Measurement, MountCodec
 from mount_models.sampling import SAMPLE_TIME

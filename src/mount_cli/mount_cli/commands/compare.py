@@ -57,8 +57,8 @@ def _told(
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount.recordings.compare.compare import compare as compare_recordings
+    from engine_mount.recordings.compare.signals import signal_table
     from engine_mount.recordings.compare.tolerances import Tolerances
-    from engine_mount.recordings.compare.words import as_json, as_table, sentences
     from engine_mount.recordings.run.place import open_run
     from mount_cli.screen import TerminalScreen
     from mount_report.json_file import write_json
@@ -67,10 +67,10 @@ def _told(
     recordings = open_run(local(a, console)), open_run(local(b, console))
     comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
     console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
-    for sentence in sentences(comparison):
+    for sentence in comparison.sentences():
         console.print(f'- {sentence}', soft_wrap=True)
     if comparison.differing:
-        TerminalScreen(console).table(as_table(comparison))
+        TerminalScreen(console).table(signal_table(comparison.signals))
     console.print(
         f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
         soft_wrap=True,
@@ -79,7 +79,7 @@ def _told(
         for warning in recording.warnings:
             note(console, f'{named(recording.path)}: {warning}')
     if json_file is not None:
-        write_json(as_json(comparison), json_file)
+        write_json(comparison.figures(), json_file)
     if figure is not None:
         from mount_report.compare_picture import draw_comparison
 

@@ -148,8 +148,7 @@ def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: P
 
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
-    from engine_mount.recordings.run.told import duration_of, started_of
-    from engine_mount.recordings.run.versions import versions_sentence
+    from engine_mount.recordings.run.session import duration_of, started_of, versions_sentence
     from mount_cli.screen import TerminalScreen
     from mount_recorder.versions import versions
 

@@ -48,10 +48,7 @@ def view(
         str, typer.Option(help='address to listen at; other than this machine: by a token')
     ] = '127.0.0.1',
     port: Annotated[int, typer.Option(help='of the page')] = 8137,
-    foxglove_port: Annotated[
-        int | None,
-        typer.Option(help='of the Foxglove server, 0: none; default: 8765, or none with --host'),
-    ] = None,
+    foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
     beside: Annotated[
         bool, typer.Option('--beside/--no-beside', help='simulate other mounts and policies beside')
     ] = True,
@@ -60,11 +57,9 @@ def view(
 ) -> None:
     """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
     from mount_bringup.graph.domain import chosen_domain
-    from mount_view.view import FOXGLOVE_PORT, ViewOrder, serve_view
+    from mount_view.view import ViewOrder, serve_view
 
     console = terminal()
-    if foxglove_port is None:
-        foxglove_port = FOXGLOVE_PORT if host == ViewOrder().host else 0  # it asks for no token
     place = None if recording is None else local(recording, console)
     order = ViewOrder(place, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside)
     serve_view(order, lambda text: console.print(text, soft_wrap=True))

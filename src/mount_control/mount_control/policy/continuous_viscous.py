@@ -17,7 +17,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_control import band_pass, idle_line
-from mount_control.delay import LOOP_DELAY, delay_at
+from mount_control.delay import LOOP_DELAY, check_lead, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1, log, sine_and_cosine
@@ -42,7 +42,7 @@ class Parameters(NamedTuple):
         ),
     ] = 8.0
     quality: Annotated[
-        float, Quantity('1', 'quality of the band-pass; small: other engines too', 0.3, 5.0, 'chosen')
+        float, Quantity('1', 'quality of the band-pass; small: other engines too', 0.3, 5.0)
     ] = 0.5
     lead_time: Annotated[
         float,
@@ -56,29 +56,27 @@ class Parameters(NamedTuple):
     ] = LOOP_DELAY
     position_gain: Annotated[
         float,
-        Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95, 'chosen'),
+        Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95),
     ] = 0.7
     damping_coefficient: Annotated[
-        float, Quantity('N s/m', 'c: force over velocity, opened fully', 1.0, 1e4, 'chosen')
+        float, Quantity('N s/m', 'c: force over velocity, opened fully', 1.0, 1e4)
     ] = 2600.0
     rounding_velocity: Annotated[
         float,
-        Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1, 'chosen'),
+        Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
     ] = 0.0008
-    force_limit: Annotated[float, Quantity('N', 'largest force asked for', 1.0, 1e4, 'chosen')] = 300.0
+    force_limit: Annotated[float, Quantity('N', 'largest force asked for', 1.0, 1e4)] = 300.0
     lowest_amplitude: Annotated[
-        float, Quantity('m', 'amplitude in the band up to which there is no damping', 0.0, 0.01, 'chosen')
+        float, Quantity('m', 'amplitude in the band up to which there is no damping', 0.0, 0.01)
     ] = 0.00012
     full_amplitude: Annotated[
-        float, Quantity('m', 'amplitude in the band from which damping is full', 1e-6, 0.01, 'chosen')
+        float, Quantity('m', 'amplitude in the band from which damping is full', 1e-6, 0.01)
     ] = 0.0004
-    opening_time: Annotated[float, Quantity('s', 'time constant of the opening', 0.001, 1.0, 'chosen')] = (
-        0.008
-    )
-    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0, 'chosen')] = 0.4
+    opening_time: Annotated[float, Quantity('s', 'time constant of the opening', 0.001, 1.0)] = 0.008
+    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0)] = 0.4
     idle_weight: Annotated[
         float,
-        Quantity('1', 'how much an idle line closes; 0: as if the engine never idled', 0.0, 100.0, 'chosen'),
+        Quantity('1', 'how much an idle line closes; 0: as if the engine never idled', 0.0, 100.0),
     ] = 5.0
 
 
@@ -160,12 +158,7 @@ def _check(parameters: Parameters) -> None:
             f'lowest_amplitude ({1e3 * parameters.lowest_amplitude:g} mm) must lie below full_amplitude '
             f'({1e3 * parameters.full_amplitude:g} mm)'
         )
-    if parameters.eigenfrequency * parameters.lead_time > 0.125:
-        raise ParameterError(
-            f'lead_time ({1e3 * parameters.lead_time:g} ms) must stay below an eighth of a period '
-            f'({125.0 / parameters.eigenfrequency:.3g} ms at {parameters.eigenfrequency:g} Hz); '
-            'a longer delay cannot be predicted'
-        )
+    check_lead(parameters.lead_time, parameters.eigenfrequency)
 
 
 def _alpha(position_gain: float, sample_time: float) -> float:
@@ -204,12 +197,10 @@ def _band_share(
 
 @compiled
 def start(law, state, window, displacement):
-    """Set the memory to a mount at rest at `displacement` (m), damping off."""
+    """Set a memory of zeros to a mount at rest at `displacement` (m), damping off."""
     band_pass.settle(law.band, state.band, displacement)
     idle_line.rest(law.line, state.line, displacement)
     state.position = displacement
-    state.velocity = 0.0
-    state.opening = 0.0
 
 
 @compiled

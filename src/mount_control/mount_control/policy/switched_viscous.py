@@ -4,14 +4,13 @@ The magnitude of the band-passed displacement switches; the force is that of the
 velocity in the band, turned ahead by the delay of the loop.
 """
 
-import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_control import band_pass, switching
-from mount_control.delay import LOOP_DELAY, delay_at
+from mount_control.delay import LOOP_DELAY, check_lead, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
@@ -44,7 +43,7 @@ class Parameters(NamedTuple):
     ] = 8.0
     quality: Annotated[
         float,
-        Quantity('1', 'quality of the band-pass; small: less phase error off the centre', 0.3, 5.0, 'chosen'),
+        Quantity('1', 'quality of the band-pass; small: less phase error off the centre', 0.3, 5.0),
     ] = 1.0
     lead_time: Annotated[
         float,
@@ -140,20 +139,13 @@ def _check(parameters: Parameters) -> None:
             f'switch_off_level ({1e3 * parameters.switch_off_level:g} mm) must lie below switch_on_level '
             f'({1e3 * parameters.switch_on_level:g} mm), else damping switches on and off at every period'
         )
-    lead_phase = 2.0 * math.pi * parameters.eigenfrequency * parameters.lead_time
-    if lead_phase > 0.25 * math.pi:
-        raise ParameterError(
-            f'lead_time ({1e3 * parameters.lead_time:g} ms) must stay below an eighth of a period '
-            f'({125.0 / parameters.eigenfrequency:.3g} ms at {parameters.eigenfrequency:g} Hz); '
-            'a longer delay cannot be predicted'
-        )
+    check_lead(parameters.lead_time, parameters.eigenfrequency)
 
 
 @compiled
 def start(law, state, window, displacement):
-    """Set the memory to a mount at rest at `displacement` (m), damping off."""
+    """Set a memory of zeros to a mount at rest at `displacement` (m), damping off."""
     band_pass.settle(law.band, state.band, displacement)
-    switching.rest(state.switching, window)
 
 
 @compiled

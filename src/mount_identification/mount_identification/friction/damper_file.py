@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.json_file import read_json
-from engine_mount.recordings.signals.table import Table
+from engine_mount.recordings.signals.table import Table, read_json
 from mount_identification.friction.channels import DESIRED, NEEDED, Said, columns_in_si
 from mount_identification.friction.recording import (
     COEFFICIENT_RANGE,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
 from engine_mount.recordings.bag.recording import Recording
-from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_replay.given.input import has
 from mount_replay.given.ramps import MeasuredGap, Ramp

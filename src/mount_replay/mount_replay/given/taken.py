@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_control.parameters import ControlParameters
-from mount_control.settings import policy_parameters
+from mount_control.settings import ControlParameters, policy_parameters
 from mount_models.sampling import sample_time_ns
 from mount_replay.given.ramps import MeasuredGap, Ramp
 

@@ -81,5 +81,5 @@ def run_car_into(
         beyond_range=BeyondRange(
             sum(each.samples for each in beyond), min((each.first for each in beyond), default=math.nan)
         ),
-        control_faults=sum(line.chain.answering.faults for line in lines),
+        control_faults=sum(line.chain.loop.faults for line in lines),
     )

@@ -5,9 +5,8 @@ controller from the next sample on.
 """
 
 from mount_bringup.chosen import Parameters, chosen_control, chosen_specimen
-from mount_control.answering import Answer, Answering
+from mount_control.control_loop import OFF, ControlLoop
 from mount_control.policy.contract import Policy
-from mount_control.sample_watch import Judgement
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
 from mount_init.parameters import InitParameters
@@ -25,7 +24,7 @@ class CoreChain:
             chosen_specimen(parameters), init_parameters, self._temperatures
         )
         self._control = chosen_control(parameters)
-        self.answering = Answering()
+        self.loop = ControlLoop()
         self.result: InitialisationResult | None = None
         self.controlled = False  # whether the controller answered the last sample, if only with 0 A
 
@@ -43,17 +42,17 @@ class CoreChain:
         """Take a coil temperature (degC) of time `stamp` (ns) as it came over the bus."""
         self._temperatures.take(stamp, celsius)
 
-    def answer(self, stamp: int, reading: Reading) -> Answer:
-        """Return the answer to a sample of time `stamp` (ns) as it came over the bus."""
-        answer = self.answering.answer(stamp, reading.displacement)
-        self.controlled = answer.reason is not Judgement.INACTIVE
+    def answer(self, stamp: int, reading: Reading) -> float:
+        """Return the setpoint (A) for a sample of time `stamp` (ns) as it came over the bus."""
+        self.controlled = self.loop.controller is not None
+        current = self.loop.step(stamp, reading.displacement)
         if self.controlled:
-            return answer
+            return OFF if current is None else current
         setpoint = self._initialisation.step(
             stamp, reading.coil_current, reading.current_rate, reading.flux_rate
         )
         if self._initialisation.finished:
             self.result = self._initialisation.result()
             table = self._control.table(*self.result.table, self.result.offset_current)
-            self.answering.begin(self._control, table, stamp)
-        return answer._replace(current=setpoint)
+            self.loop.begin(self._control, table, stamp)
+        return setpoint

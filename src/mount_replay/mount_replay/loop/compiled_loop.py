@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from mount_control.compiled_steps import compiled_with
+from mount_control.controller import compiled_with
 from mount_control.plausibility import doubt_of
 from mount_control.policy.contract import Policy
 from mount_driver.quantisation import (

@@ -89,7 +89,7 @@ def run_core_into(
         if not samples.room:
             messages.write_samples(samples)
             progress(mount.sample / mount.run.samples)
-        if pending is not None and mount.faults.none_told and chain.answering.expects(stamp_of(mount)):
+        if pending is not None and mount.faults.none_told and chain.loop.expects(stamp_of(mount)):
             taken, pending = _take_many(mount, chain, samples, pending)
             if taken:
                 continue
@@ -110,7 +110,7 @@ def run_core_into(
         wall_time=time.monotonic() - begin,
         result=chain.result,
         beyond_range=mount.beyond_range,
-        control_faults=chain.answering.faults,
+        control_faults=chain.loop.faults,
     )
 
 
@@ -132,15 +132,15 @@ def take_one(mount: SimulatedMount, chain: CoreChain, samples: Samples, pending:
     """Take one sample and return the setpoint (A) as it arrives for the next."""
     place, stamp = samples.count, stamp_of(mount)
     reading = Reading(*loop.over_the_bus(*mount.measure()))
-    answer = chain.answer(stamp, reading)
-    setpoint = OFF if answer.current is None else answer.current
+    setpoint = chain.answer(stamp, reading)
+    trace = chain.loop.trace
     samples.stamps[place] = stamp
     samples.readings[place] = reading
     samples.setpoints[place] = setpoint
     samples.truths[place] = np.frombuffer(mount.truth_bytes, np.uint8)
-    samples.traced[place] = answer.trace is not None
-    if answer.trace is not None:
-        samples.traces[place] = np.frombuffer(answer.trace, np.uint8)
+    samples.traced[place] = trace is not None
+    if trace is not None:
+        samples.traces[place] = trace
     samples.count += 1
     mount.advance(pending)
     return quantised_setpoint_current(setpoint)
@@ -150,9 +150,9 @@ def _take_many(
     mount: SimulatedMount, chain: CoreChain, samples: Samples, pending: float
 ) -> tuple[int, float]:
     """Take samples while all of them are plausible; return how many, and the setpoint (A) for the next."""
-    controller = chain.answering.controller
+    controller = chain.loop.controller
     assert controller is not None
-    plausibility, ahead = chain.answering.watch.plausibility, mount.ahead(samples.room)
+    plausibility, ahead = chain.loop.plausibility, mount.ahead(samples.room)
     part = slice(samples.count, samples.count + len(ahead.values))
     taken, arrived, last = loop.run_with(chain.policy)(
         ahead,
@@ -171,6 +171,6 @@ def _take_many(
         samples.stamps[part] = stamps
         samples.traced[part] = True
         samples.count += taken
-        chain.answering.watch.follow(int(stamps[-1]), taken)
+        chain.loop.follow(int(stamps[-1]), taken)
         mount.skip(taken, last)
     return taken, arrived

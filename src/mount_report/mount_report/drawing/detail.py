@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.chart import Array, Chart, Curve, Dots, Panel
 from mount_report.drawing.style import SPAN_COLOUR
 
@@ -93,7 +92,6 @@ def _numbers(curve: Curve, budget: int) -> dict[str, Any]:
     if len(x) <= _LONG or not rising or not np.isfinite(y).any():
         return {'rising': rising, 'points': _points(x, y)}
     even = even_numbers(x, y, budget)
-    put_away()
     return {'even': even}
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.container.scratch import kept
-from engine_mount.recordings.messages.compact_times import Times, each_once, is_in
+from engine_mount.recordings.messages.times import Times, each_once, is_in
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
@@ -92,7 +91,7 @@ def load_drive(recording: Recording, excitation_start: float | None = None) -> D
         recording=recording.path,
         zero=zero,
         seen=_seen(recording, zero),
-        truth=Truth(kept((stamps - zero) * 1e-9), *(truth[name][order] for name in _TRUE)),
+        truth=Truth(((stamps - zero) * 1e-9), *(truth[name][order] for name in _TRUE)),
         sample_time=1.0 / recorded_sample_rate(recording),
     )
 
@@ -114,9 +113,9 @@ def _seen(recording: Recording, zero: int) -> Seen:
         values = np.full(len(stamps), np.nan)
         if name in trace.columns or name != _OF_SOME:
             values[places] = trace[name][of_known][of_trace]
-        traced[name] = kept(values)
+        traced[name] = values
     return Seen(
-        time=kept((stamps - zero) / _SECOND),
+        time=((stamps - zero) / _SECOND),
         displacement=displacement['mount'][order],
         damping_active=traced['damping_active'] > 0.0,
         current=np.nan_to_num(traced['current'], copy=False),

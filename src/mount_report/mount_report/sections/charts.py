@@ -9,7 +9,6 @@ from itertools import cycle
 
 import numpy as np
 
-from engine_mount.recordings.container.scratch import kept
 from mount_report.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Dots, Level, Panel, Span
 from mount_report.drawing.style import COLOUR_OF, COLOURS, DIFFERENCE_COLOUR, UNDAMPED_COLOUR
 
@@ -76,7 +75,7 @@ def _difference(series: Sequence[Named], label: str, factor: float = 1.0) -> lis
         return []
     first, other = series[0], series[-1]
     y = other.y - np.interp(other.x, first.x, first.y, np.nan, np.nan)
-    return [Panel(label, [Curve('B - A', other.x, kept(factor * y), DIFFERENCE_COLOUR)], share=0.7)]
+    return [Panel(label, [Curve('B - A', other.x, (factor * y), DIFFERENCE_COLOUR)], share=0.7)]
 
 
 def hysteresis_loops(
@@ -187,7 +186,7 @@ def tracking(
         for place, series in enumerate(wanted)
     ]
     errors = [
-        _curve(Named(one.name, other.x, kept(other.y - np.interp(other.x, one.x, one.y))), place, 'error')
+        _curve(Named(one.name, other.x, (other.y - np.interp(other.x, one.x, one.y))), place, 'error')
         for place, (one, other) in enumerate(zip(wanted, actual, strict=True))
     ]
     panels = [Panel('friction force (N)', forces, share=1.6), Panel('true minus wanted (N)', errors)]
@@ -223,7 +222,7 @@ def _curve(
 
 
 def _scaled(factor: float, values: Array) -> Array:
-    return values if factor == 1.0 else kept(factor * values)
+    return values if factor == 1.0 else (factor * values)
 
 
 def _of(series: Named) -> str:

@@ -7,9 +7,7 @@ import numpy as np
 
 from engine_mount.recordings.audit.report import sentences as audit_sentences
 from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
-from engine_mount.recordings.compare.words import by_importance
-from engine_mount.recordings.compare.words import sentences as comparison_sentences
-from engine_mount.recordings.container.scratch import put_away
+from engine_mount.recordings.compare.signals import by_importance
 from engine_mount.recordings.run.session import session_values
 from mount_report.sections import charts
 from mount_report.sections.charts import Named
@@ -42,7 +40,6 @@ def coil(subjects: Sequence[Subject]) -> Section:
         for stretch, inside in _stretches(subject, current):
             load = _load(subject, current, inside, setpoint)
             rows.append((f'{prefix}{stretch}', *_load_cells(load)))
-            put_away()
     head = (
         '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)', 'at the limit (%)',
     )  # fmt: skip
@@ -113,7 +110,7 @@ def differences(subjects: Sequence[Subject]) -> Section | None:
         return None
     words = [
         f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
-        *(f'- {sentence}' for sentence in comparison_sentences(comparison)),
+        *(f'- {sentence}' for sentence in comparison.sentences()),
     ]
     ordered = by_importance(comparison.signals)
     rows = [

@@ -7,7 +7,6 @@ from itertools import chain
 import numpy as np
 
 from engine_mount.recordings.compare.quantity_text import quantity_text
-from engine_mount.recordings.container.scratch import put_away
 from mount_report.drawing.chart import Array
 from mount_report.sections import charts, periodic
 from mount_report.sections.charts import Levels, Named
@@ -181,7 +180,6 @@ def spectra(subjects: Sequence[Subject]) -> Section:
         for subject in subjects:
             signal = of(subject)
             density = None if signal is None else _density(subject, signal)
-            put_away()
             if density is None:
                 continue
             frequency, values, made_up = density

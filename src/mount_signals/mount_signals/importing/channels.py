@@ -8,7 +8,7 @@ from engine_mount.recordings.signals.even_grid import evenly_spaced
 from engine_mount.recordings.signals.plausibility import check_size
 from engine_mount.recordings.signals.resampling import has_step, resampled
 from engine_mount.recordings.signals.signal import SECOND, FloatArray, Signal, SignalError
-from mount_control.parameters import ControlParameters
+from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_signals.importing.one_grid import (
     CHASSIS,

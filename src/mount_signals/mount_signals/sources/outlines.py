@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
+from engine_mount.recordings.container.mcap_reading.chunks import gaps
 from engine_mount.recordings.container.mcap_reading.summary import Proof, Summary, read_summary
 from mount_recorder.metadata import METADATA_NAME
 from mount_signals.sources.fetching import write_whole
@@ -129,10 +130,13 @@ def _needed(summary: Summary) -> Stretches:
     sessions = {
         number for number, channel in summary.channels.items() if channel.topic.split('/')[-1] == _SESSION
     }
-    begins, ends = summary.chunks.gaps(0, summary.begin)
-    held = summary.chunks.holding(sessions)
-    needed = [*zip(begins, ends, strict=True), *zip(ends[held], begins[held + 1], strict=True)]
-    return [(int(begin), int(end)) for begin, end in needed]
+    needed = gaps(summary.chunks, 0, summary.begin)
+    begins = [begin for begin, _ in needed[1:]]  # behind each chunk and its message indexes
+    return needed + [
+        (chunk.position, behind)
+        for chunk, behind in zip(summary.chunks, begins, strict=True)
+        if chunk.holds(sessions)
+    ]
 
 
 def _joined(stretches: Stretches) -> Stretches:

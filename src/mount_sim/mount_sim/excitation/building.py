@@ -12,8 +12,12 @@ from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import ParameterError, checked
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
-from mount_sim.excitation.measured_road import height_at, measured_height
-from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
+from mount_sim.excitation.recorded import (
+    acceleration_at,
+    height_at,
+    measured_height,
+    recorded_acceleration,
+)
 from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
 from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario, TipIn
 from mount_sim.parameters import SimParameters
@@ -119,39 +123,39 @@ def _over_time(
 
 
 def _recorded(sim: SimParameters) -> Excitation:
-    timeline, recorded = sim.timeline, sim.recorded
+    recorded = sim.recorded
     if not recorded.file:
         raise ParameterError(
             'scenario recorded needs a file: CSV, NPY, JSON or MCAP (recorded.file, or --file)'
         )
     signal = recorded_signal(recorded)
     values = acceleration_at(signal, recorded.scale, STEP_TIME)
-    values = _cut(values, timeline.duration, f'the recording {signal.name}')
-    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
-    return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, timeline.start, notes=notes)
+    return _measured(sim, Seat.ACCELERATED_CHASSIS, signal, values, 'recording')
 
 
 def _road(sim: SimParameters) -> Excitation:
-    timeline, file = sim.timeline, sim.road.file
+    file = sim.road.file
     if not file:
         raise ParameterError(
             'scenario road needs a measured road: engine-mount drive --road PROFILE --speed 60/3.6, or '
             'road.file'
         )
     signal = measured_height(file)
-    values = _cut(height_at(signal, STEP_TIME), timeline.duration, f'the road {signal.name}')
-    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
-    return Excitation(Seat.VEHICLE, values, STEP_TIME, timeline.start, notes=notes)
+    return _measured(sim, Seat.VEHICLE, signal, height_at(signal, STEP_TIME), 'road')
 
 
-def _cut(values: StreamedSeries, duration: float, what: str) -> StreamedSeries:
-    """Return the first `duration` (s) of `values`, all of them for 0; raises where there are not so many."""
-    available = len(values) * STEP_TIME
+def _measured(
+    sim: SimParameters, seat: Seat, signal: EvenSignal, values: StreamedSeries, what: str
+) -> Excitation:
+    duration, available = sim.timeline.duration, len(values) * STEP_TIME
     if duration > available + 0.001:
         raise ParameterError(
-            f'duration ({duration:g} s) is longer than {what} ({available:.3f} s); ask for at most that'
+            f'duration ({duration:g} s) is longer than the {what} {signal.name} ({available:.3f} s); ask for '
+            'at most that'
         )
-    return values.cut(round(duration / STEP_TIME)) if duration else values
+    cut = values.cut(round(duration / STEP_TIME)) if duration else values
+    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
+    return Excitation(seat, cut, STEP_TIME, sim.timeline.start, notes=notes)
 
 
 _SCENARIOS = {

@@ -60,6 +60,9 @@ class RackRecording:
     normal_force: FloatArray
 
 
+_CONTACT, _COEFFICIENTS, _NOISE = FrictionContact(), FrictionCoefficients(), RackNoise()
+
+
 def move(
     contact: FrictionContact,
     coefs: FrictionCoefficients,
@@ -115,9 +118,9 @@ def sawtooth_corners(stroke: float, speeds: npt.ArrayLike) -> tuple[FloatArray, 
 
 
 def ramp_and_hold(
-    contact: FrictionContact | None = None,
-    coefs: FrictionCoefficients | None = None,
-    noise: RackNoise | None = None,
+    contact: FrictionContact = _CONTACT,
+    coefs: FrictionCoefficients = _COEFFICIENTS,
+    noise: RackNoise = _NOISE,
     *,
     normal_force: float = 100.0,
     height: float = 6e-6,
@@ -127,8 +130,6 @@ def ramp_and_hold(
     rate: float = SAMPLE_RATE,
 ) -> RackRecording:
     """Return a ramp of the desired displacement to `height` (m), held; nothing slides at this height."""
-    contact = contact or FrictionContact()
-    coefs = coefs or FrictionCoefficients()
     rack = move(
         contact,
         coefs,
@@ -138,7 +139,6 @@ def ramp_and_hold(
         machine_stiffness=machine_stiffness,
         rate=rate,
     )
-    noise = noise or RackNoise()
     random = np.random.default_rng(noise.seed)
     return RackRecording(
         rack.time,
@@ -150,9 +150,9 @@ def ramp_and_hold(
 
 
 def sawtooth(
-    contact: FrictionContact | None = None,
-    coefs: FrictionCoefficients | None = None,
-    noise: RackNoise | None = None,
+    contact: FrictionContact = _CONTACT,
+    coefs: FrictionCoefficients = _COEFFICIENTS,
+    noise: RackNoise = _NOISE,
     *,
     normal_force: float = 100.0,
     speeds: tuple[float, ...] = SAWTOOTH_SPEEDS,
@@ -160,10 +160,7 @@ def sawtooth(
     rate: float = SAMPLE_RATE,
 ) -> RackRecording:
     """Return strokes between -+ `stroke` (m), two at each of `speeds` (m/s), after a first half stroke."""
-    contact = contact or FrictionContact()
-    coefs = coefs or FrictionCoefficients()
     rack = move(contact, coefs, *sawtooth_corners(stroke, speeds), normal_force, rate=rate)
-    noise = noise or RackNoise()
     random = np.random.default_rng(noise.seed)
     return RackRecording(
         rack.time,
@@ -181,10 +178,9 @@ def drawn_friction(seed: int) -> tuple[FrictionContact, FrictionCoefficients]:
     def drawn(value: float, spread: float) -> float:
         return float(value * (1.0 + spread * random.uniform(-1.0, 1.0)))
 
-    contact, coefs = FrictionContact(), FrictionCoefficients()
     return (
-        FrictionContact(*(drawn(value, 0.3) for value in contact)),
-        coefs._replace(**{name: drawn(getattr(coefs, name), 0.1) for name in _DRAWN}),
+        FrictionContact(*(drawn(value, 0.3) for value in _CONTACT)),
+        _COEFFICIENTS._replace(**{name: drawn(getattr(_COEFFICIENTS, name), 0.1) for name in _DRAWN}),
     )
 
 

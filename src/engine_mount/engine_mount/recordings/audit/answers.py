@@ -1,34 +1,25 @@
-"""Which samples the control had to answer, which have no setpoint, and when none came in time."""
+"""Which samples the control had to answer, which have no setpoint, and how long the answers took."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.audit.latency import on_one_clock
-from engine_mount.recordings.messages.compact_times import (
-    CompactTimes,
-    Times,
-    compact,
-    is_in,
-    together,
-    within,
-)
+from engine_mount.recordings.messages.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT
 
 _PAUSE = 500_000_000  # ns, chosen: a control that says nothing for so long may have been deactivated
 _HALF_SAMPLE = 500_000  # ns
 _LATE = round(1e9 * SETPOINT_TIMEOUT)  # ns
-NO_TIMES: Times = np.empty(0, np.int64)
 
 
 class Setpoints(NamedTuple):
     """Setpoints of one mount: the stamps of the samples that they answer, and when they were sent, in ns."""
 
-    stamps: CompactTimes
-    sent: CompactTimes
+    stamps: Times
+    sent: Times
 
 
 class Control(NamedTuple):
@@ -38,8 +29,8 @@ class Control(NamedTuple):
     times at which its diagnostics said so, None where they were not recorded.
     """
 
-    steps: CompactTimes
-    handovers: CompactTimes
+    steps: Times
+    handovers: Times
     inactive: Times | None = None
 
 
@@ -71,7 +62,7 @@ class Answers:
     spans: tuple[tuple[int, int], ...] = ()
 
 
-def judge_answers(samples: CompactTimes, setpoints: Setpoints, control: Control) -> Answers:
+def judge_answers(samples: Times, setpoints: Setpoints, control: Control) -> Answers:
     """Return how `setpoints` answer `samples` (stamps in ns).
 
     Control is active from its first answer to its last. The ramp of an initialisation is not control, nor is
@@ -80,27 +71,16 @@ def judge_answers(samples: CompactTimes, setpoints: Setpoints, control: Control)
     """
     if not len(samples) or not len(setpoints.stamps):
         return Answers()
+    samples, answers = distinct(samples), distinct(setpoints.stamps)
+    spans = _spans(answers, int(samples[-1]), control)
+    asked = samples[spanned(samples, spans) >= 0]
     late = _late(setpoints) if on_one_clock(*setpoints) else None
-    stamps, answers = samples.ordered(), setpoints.stamps.ordered()
-    spans = _spans(answers, stamps.highest, control)
-    late_stamps = NO_TIMES if late is None else late
-    asked = unanswered = 0
-    silences = [_Silences(begin) for begin, _ in spans]
-    for taken, answered in together([stamps, answers]):
-        inside = taken[spanned(taken, spans) >= 0]
-        asked += len(inside)
-        unanswered += int(np.count_nonzero(~is_in(inside, answered)))
-        in_time = answered[~is_in(answered, late_stamps)]
-        owners = spanned(in_time, spans)
-        for place in np.unique(owners[owners >= 0]).tolist():
-            silences[place].add(in_time[owners == place])
-    for each, (_, end) in zip(silences, spans, strict=True):
-        each.add(np.array([end]))
+    in_time = answers if late is None else answers[~is_in(answers, late)]
     return Answers(
-        asked,
-        unanswered,
+        len(asked),
+        int(np.count_nonzero(~is_in(asked, answers))),
         None if late is None else int(np.count_nonzero(spanned(late, spans) >= 0)),
-        tuple(silence for each in silences for silence in each.found),
+        tuple(silence for span in spans for silence in _silences(in_time, *span)),
         tuple(spans),
     )
 
@@ -114,36 +94,21 @@ def spanned(stamps: Times, spans: Sequence[tuple[int, int]]) -> NDArray[np.intp]
     return np.where(stamps <= ends[places], places, -1)
 
 
-class _Silences:
-    """The silences of one span, from `begin` on; the answers come in the order of time."""
-
-    def __init__(self, begin: int):
-        self.found: list[Silence] = []
-        self._last = begin
-
-    def add(self, in_time: Times) -> None:
-        ticks = np.append(self._last, in_time)
-        long = np.flatnonzero(np.diff(ticks) > _LATE + _HALF_SAMPLE)
-        self.found += [Silence(int(ticks[place]), int(ticks[place + 1])) for place in long]
-        self._last = int(ticks[-1])
+def _silences(in_time: Times, begin: int, end: int) -> list[Silence]:
+    """Return the silences of one span; the answers rise."""
+    inside = in_time[(in_time >= begin) & (in_time <= end)]
+    ticks = np.concatenate([[begin], inside, [end]])
+    long = np.flatnonzero(np.diff(ticks) > _LATE + _HALF_SAMPLE)
+    return [Silence(int(ticks[place]), int(ticks[place + 1])) for place in long]
 
 
 def _late(setpoints: Setpoints) -> Times:
     """Return which samples (stamps, rising) were answered too late by the first of their setpoints."""
-    stamps, sent = setpoints
-    if not stamps.rising:
-        all_stamps = stamps.whole()
-        order = np.argsort(all_stamps, kind='stable')
-        stamps, sent = compact(all_stamps[order]), compact(sent.whole()[order])
-    late, last = NO_TIMES, stamps.least - 1
-    for answered, told in zip(stamps.blocks(), sent.blocks(), strict=True):
-        first = np.diff(answered, prepend=last) > 0
-        late = np.append(late, answered[first & (told - answered > _LATE)])
-        last = int(answered[-1])
-    return late
+    stamps, first = np.unique(setpoints.stamps, return_index=True)
+    return stamps[setpoints.sent[first] - stamps > _LATE]
 
 
-def _spans(answers: CompactTimes, last_sample: int, control: Control) -> list[tuple[int, int]]:
+def _spans(answers: Times, last_sample: int, control: Control) -> list[tuple[int, int]]:
     """Return from which to which stamp control was active; the answers rise."""
     found: list[tuple[int, int]] = []
     handed_over = True  # at the beginning, and behind a ramp, silence says nothing
@@ -162,26 +127,64 @@ def _spans(answers: CompactTimes, last_sample: int, control: Control) -> list[tu
     return found
 
 
-def _stretches(answers: CompactTimes, control: Control) -> Iterator[tuple[int, int]]:
-    """Yield from which to which answer there is neither a pause nor the end of an initialisation."""
-    handovers = np.sort(control.handovers.whole())
-    begin = last = answers.least
-    for block in answers.blocks():
-        before = np.append(last, block[:-1])
-        breaks = (block - before > _PAUSE) | (is_in(before, handovers) & (block > before))
-        for place in np.flatnonzero(breaks).tolist():
-            yield begin, int(before[place])
-            begin = int(block[place])
-        last = int(block[-1])
-    yield begin, last
+def _stretches(answers: Times, control: Control) -> list[tuple[int, int]]:
+    """Return from which to which answer there is neither a pause nor the end of an initialisation."""
+    breaks = (np.diff(answers) > _PAUSE) | is_in(answers[:-1], np.sort(control.handovers))
+    parts = np.split(answers, np.flatnonzero(breaks) + 1)
+    return [(int(part[0]), int(part[-1])) for part in parts]
 
 
 def _is_control(begin: int, end: int, control: Control) -> bool:
     if len(control.steps):
-        return control.steps.has_any(begin, end)
-    return end not in control.handovers.whole()
+        return _has_any(control.steps, begin, end)
+    return end not in control.handovers
 
 
 def _stayed_active(begin: int, end: int, control: Control) -> bool:
     """Whether the diagnostics of control were there to say that it was deactivated, and did not."""
-    return control.inactive is not None and not within(control.inactive, begin, end + _PAUSE).size
+    return control.inactive is not None and not _has_any(control.inactive, begin, end + _PAUSE)
+
+
+def _has_any(times: Times, begin: int, end: int) -> bool:
+    return bool(((times >= begin) & (times <= end)).any())
+
+
+EDGES = (0.0, 0.25e-3, 0.5e-3, 0.75e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 5e-3, 10e-3, 20e-3)  # s, chosen
+_SAME_PACE = 0.02  # chosen: two clocks that differ by more are not the same
+_SAME_CLOCK = 60 * 1_000_000_000  # ns, chosen: a setpoint that comes later is no answer
+_ANY_CLOCK = 1 << 62  # ns, 146 years: differences beyond it do not fit into 64 bits
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Latencies in s; `counts` has one number below `EDGES`, one for each step of it, and one above."""
+
+    counts: tuple[int, ...]
+    median: float
+    p99: float
+    worst: float
+
+
+def setpoint_latency(stamps: Times, receive_times: Times) -> Latency | None:
+    """Return the latencies of setpoints, None where their stamps are not of the clock of reception.
+
+    In lock-step the stamps count the time of the simulation. All times are in ns.
+    """
+    if not on_one_clock(stamps, receive_times):
+        return None
+    ages = (receive_times - stamps) * 1e-9
+    counts = np.bincount(np.searchsorted(EDGES, ages, side='right'), minlength=len(EDGES) + 1)
+    return Latency(
+        tuple(counts.tolist()), float(np.median(ages)), float(np.quantile(ages, 0.99)), float(ages.max())
+    )
+
+
+def on_one_clock(stamps: Times, times: Times) -> bool:
+    """Return whether the stamps of setpoints are on the clock of `times`, when they were sent or came."""
+    if len(stamps) < 2:
+        return False
+    ages = times - stamps
+    if int(ages.max()) - int(ages.min()) > _ANY_CLOCK or abs(float(np.median(ages))) > _SAME_CLOCK:
+        return False
+    stamped, timed = int(np.ptp(stamps)), int(np.ptp(times))
+    return not (stamped > 1_000_000_000 and abs(timed / stamped - 1.0) > _SAME_PACE)

@@ -6,24 +6,24 @@ are held against the samples, not against their own stamps.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from engine_mount.recordings.audit.answers import (
-    NO_TIMES,
     Answers,
     Control,
+    Latency,
     Setpoints,
     judge_answers,
+    setpoint_latency,
     spanned,
 )
-from engine_mount.recordings.audit.latency import Latency, setpoint_latency
 from engine_mount.recordings.audit.node_reports import NodeReport, node_reports
-from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.bag.metadata import read_statement
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.bag.statement import read_statement
-from engine_mount.recordings.messages.compact_times import CompactTimes, Times, compact, is_in, together
+from engine_mount.recordings.messages.columns import TopicTimes
+from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.messages.stamps import (
     misdated,
     missing_samples,
@@ -33,7 +33,7 @@ from engine_mount.recordings.messages.stamps import (
     stamp_statistics,
 )
 from engine_mount.recordings.messages.time_axis import TimeAxis
-from engine_mount.recordings.messages.topic_times import TopicTimes
+from engine_mount.recordings.messages.times import NO_TIMES, Times, distinct, is_in
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.losses import RECORDER_RECORD
@@ -94,12 +94,14 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     Lost is what the stamps show, or what the recorder, the file's proven summary or `metadata.yaml` counted
     and is not there, whichever is more.
     """
-    times, told = recording.times(), _told_by_recorder(recording)
+    times, recorded = recording.times(), _recorder_counts(recording)
     rates = {name: _rate(recording, found) for name, found in times.items()}
     plausible = {name: _redated(found, rates[name]) for name, found in times.items()}
     audits = {
-        name: _with_told(
-            _audit_topic(plausible, times[name], rates[name]), recording.missing.get(name, 0), told.get(name)
+        name: _with_counts(
+            _audit_topic(plausible, times[name], rates[name]),
+            recording.missing.get(name, 0),
+            recorded.get(name),
         )
         for name in recording
     }
@@ -109,38 +111,27 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
         for namespace in (name.removesuffix(DISPLACEMENT.name) for name in mounts):
             answers = _answers(plausible, namespace, _inactive(reports, namespace, axis))
             lost = _lost_samples(plausible, audits, namespace, rates[namespace + DISPLACEMENT.name])
-            _add_samples(audits, namespace, lost, answers)
-            _add_lost_steps(audits, namespace, _lost_steps(recording, plausible, namespace, answers))
+            sampled, traced = namespace + DISPLACEMENT.name, namespace + CONTROL_TRACE.name
+            audits[sampled] = replace(audits[sampled], lost_samples=lost, answers=answers)
+            if steps := _lost_steps(recording, plausible, namespace, answers):
+                audits[traced] = _with_counts(audits[traced], steps, None)
     return audits
 
 
-def _add_samples(
-    audits: dict[str, TopicAudit], namespace: str, lost_samples: int, answers: Answers | None
-) -> None:
-    name = namespace + DISPLACEMENT.name
-    audits[name] = replace(audits[name], lost_samples=lost_samples, answers=answers)
-
-
-def _add_lost_steps(audits: dict[str, TopicAudit], namespace: str, lost: int) -> None:
-    name = namespace + CONTROL_TRACE.name
-    if lost:
-        audits[name] = _with_told(audits[name], lost, None)
-
-
-def _told_by_recorder(recording: Recording) -> dict[str, int]:
+def _recorder_counts(recording: Recording) -> dict[str, int]:
     """Return how many messages of each topic the recorder says there ought to be."""
-    told: dict[str, int] = {}
+    recorded: dict[str, int] = {}
     for file in recording.files:
         for name, row in read_statement(file.metadata.get(RECORDER_RECORD, {})).items():
-            told[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
-    return told
+            recorded[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
+    return recorded
 
 
-def _with_told(entry: TopicAudit, missing: int, told: int | None) -> TopicAudit:
+def _with_counts(entry: TopicAudit, missing: int, recorded: int | None) -> TopicAudit:
     """Return the audit with what others counted taken into account."""
-    absent = max(missing, (told or 0) - entry.present)
+    absent = max(missing, (recorded or 0) - entry.present)
     if absent <= 0:
-        counted = told is not None and entry.expected is None
+        counted = recorded is not None and entry.expected is None
         return replace(entry, expected=entry.present, lost=0) if counted else entry
     lost = max(absent, entry.lost or 0)
     return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
@@ -155,14 +146,13 @@ def _rate(recording: Recording, found: TopicTimes) -> float:
 
 
 def _redated(found: TopicTimes, rate: float) -> TopicTimes:
-    if found.stamps is None or not rate or found.stamps.longest_step <= FARTHEST:
+    if found.stamps is None or not rate:
         return found
-    stamps = found.stamps.whole()
-    return replace(found, stamps=compact(redated(stamps, misdated(stamps), rate)))
+    return replace(found, stamps=redated(found.stamps, misdated(found.stamps), rate))
 
 
-def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> TopicAudit:
-    name = as_told.topic
+def _audit_topic(times: AllTimes, as_recorded: TopicTimes, own_rate: float) -> TopicAudit:
+    name = as_recorded.topic
     found = times[name]
     present = len(found)
     if not present:
@@ -176,8 +166,9 @@ def _audit_topic(times: AllTimes, as_told: TopicTimes, own_rate: float) -> Topic
     rate = own_rate if topic is not None else regular_rate(found.stamps)
     if rate is None:
         return TopicAudit(None, present, None, remark='stamps without a regular rate: only counted')
-    entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_told.stamps)
-    if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and _has_samples(times, name.removesuffix(topic.name)):
+    entry = _with_misdated(_from_stamps(found.stamps, topic, rate), as_recorded.stamps)
+    sampled = name.removesuffix(topic.name if topic else '') + DISPLACEMENT.name
+    if topic in (CURRENT_SETPOINT, CONTROL_TRACE) and len(_stamps_of(times, sampled)):
         entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
     if topic is CURRENT_SETPOINT and found.receive_times is not None:
         return replace(entry, latency=setpoint_latency(found.stamps, found.receive_times))
@@ -192,28 +183,19 @@ def _own_topic(found: TopicTimes) -> Topic | None:
     return topic if not found.names or set(topic.names) <= set(found.names) else None
 
 
-def _from_stamps(stamps: CompactTimes, topic: Topic | None, rate: float) -> TopicAudit:
-    statistics, jitter = stamp_statistics(stamps, rate), stamp_jitter(stamps, rate)
+def _from_stamps(stamps: Times, topic: Topic | None, rate: float) -> TopicAudit:
+    jitter, worst = stamp_jitter(stamps, rate)
     return TopicAudit(
-        expected=statistics.expected,
-        present=statistics.present,
-        lost=statistics.lost,
-        duplicated=statistics.duplicated,
-        out_of_order=statistics.out_of_order,
-        longest_gap_s=statistics.longest_gap,
+        **asdict(stamp_statistics(stamps, rate)),
         rate_hz=rate,
-        jitter_s=jitter.rms,
-        worst_jitter_s=jitter.worst,
+        jitter_s=jitter,
+        worst_jitter_s=worst,
         remark='' if topic is not None else f'rate of {rate:.4g} Hz taken from the stamps',
     )
 
 
-def _with_misdated(entry: TopicAudit, told: CompactTimes | None) -> TopicAudit:
-    if told is None or told.longest_step <= FARTHEST:
-        return entry
-    stamps = told.whole()
-    wrong = misdated(stamps)
-    if not wrong.any():
+def _with_misdated(entry: TopicAudit, stamps: Times | None) -> TopicAudit:
+    if stamps is None or not (wrong := misdated(stamps)).any():
         return entry
     first = int(np.flatnonzero(wrong)[0])
     most = (
@@ -225,10 +207,6 @@ def _with_misdated(entry: TopicAudit, told: CompactTimes | None) -> TopicAudit:
         f'up to {most:.6g} s off (limit {FARTHEST / 1e9:g} s); who else publishes there?'
     )
     return replace(entry, misdated=int(np.count_nonzero(wrong)), remark=remark)
-
-
-def _has_samples(times: AllTimes, namespace: str) -> bool:
-    return len(_stamps_of(times, namespace + DISPLACEMENT.name)) > 0
 
 
 def _lost_samples(
@@ -262,20 +240,15 @@ def _lost_steps(recording: Recording, times: AllTimes, namespace: str, answers: 
         return 0
     name = namespace + CURRENT_SETPOINT.name
     setpoints = _stamps_of(times, name)
-    untraced = NO_TIMES
-    for answered, steps in together([setpoints.ordered(), traced.ordered()]):
-        alone = answered[~is_in(answered, steps)]
-        untraced = np.append(untraced, alone[spanned(alone, answers.spans) >= 0])
-    if not untraced.size:
+    untraced = ~is_in(setpoints, np.sort(traced)) & (spanned(setpoints, answers.spans) >= 0)
+    if not untraced.any():
         return 0
-    places = setpoints.places_of(untraced)
-    stamps, lost, begin = setpoints.at(places), set(), 0
-    for part in column_parts(recording, {name: (_CURRENT,)}):
-        here = (places >= begin) & (places < begin + len(part))
-        above = part.column(_CURRENT)[places[here] - begin] > 0.0
-        lost.update(stamps[here][above].tolist())
-        begin += len(part)
-    return len(lost)
+    recording.load_columns({name: (_CURRENT,)})
+    try:
+        above = recording[name][_CURRENT] > 0.0
+    except SeriesError:
+        return 0  # no setpoints of ours
+    return len(distinct(setpoints[untraced & above]))
 
 
 def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> Times | None:
@@ -291,7 +264,7 @@ def _inactive(reports: Sequence[NodeReport], namespace: str, axis: TimeAxis) -> 
     return axis.stamps_at(logged)
 
 
-def _stamps_of(times: AllTimes, name: str) -> CompactTimes:
+def _stamps_of(times: AllTimes, name: str) -> Times:
     """Return the stamps (ns) of a topic by its full name, none if it is missing or has none."""
     stamps = times[name].stamps if name in times else None
-    return compact(NO_TIMES) if stamps is None else stamps
+    return NO_TIMES if stamps is None else stamps

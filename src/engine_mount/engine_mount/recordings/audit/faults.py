@@ -98,19 +98,19 @@ def _errors(recording: Recording, reports: Sequence[NodeReport], axis: TimeAxis)
 
 def _marks(recording: Recording, known: Sequence[Fault], axis: TimeAxis) -> list[Fault]:
     """Return the marks of faults that no report tells of already."""
-    told = [
+    dated = [
         (axis.of_mark(mark.time, logged), mark)
         for marks in recorded_marks(recording).values()
         for logged, mark in marks
     ]
     return [
         Fault(time, '', mark.text)
-        for time, mark in told
-        if mark.kind == MarkKind.FAULT.value and not _is_told(time, mark.text, known)
+        for time, mark in dated
+        if mark.kind == MarkKind.FAULT.value and not _is_repeated(time, mark.text, known)
     ]
 
 
-def _is_told(time: float, text: str, known: Sequence[Fault]) -> bool:
+def _is_repeated(time: float, text: str, known: Sequence[Fault]) -> bool:
     return any(
         abs(time - fault.time) < _SAME and fault.sentence in text and fault.node in text for fault in known
     )

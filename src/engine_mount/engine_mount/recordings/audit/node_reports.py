@@ -37,18 +37,18 @@ def node_reports(recording: Recording) -> list[NodeReport]:
         if recording.topics[recording.resolve(DIAGNOSTICS.name)].type != DIAGNOSTICS.type:
             return []
         reports = [
-            _report(time, told)
+            _report(time, verdict)
             for series in recording.parts([DIAGNOSTICS.name], _AT_ONCE)
             for time, message in zip(series.receive_times.tolist(), series.messages(), strict=True)
-            for told in verdicts_in(message)
+            for verdict in verdicts_in(message)
         ]
     except (ReadingError, SeriesError):
         return []
     return sorted(reports, key=lambda report: report.log_time)
 
 
-def _report(log_time: int, told: NodeVerdict) -> NodeReport:
-    namespace, _, node = told.node.rpartition('/')
-    texts = (namespace.strip('/'), node, told.sentence, told.figures.get('state', ''))
+def _report(log_time: int, verdict: NodeVerdict) -> NodeReport:
+    namespace, _, node = verdict.node.rpartition('/')
+    texts = (namespace.strip('/'), node, verdict.sentence, verdict.figures.get('state', ''))
     namespace, node, sentence, state = map(sys.intern, texts)  # very many are alike
-    return NodeReport(log_time, namespace, node, told.level, sentence, state)
+    return NodeReport(log_time, namespace, node, verdict.level, sentence, state)

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from engine_mount.recordings.audit.answers import EDGES, Latency
 from engine_mount.recordings.audit.audit import TopicAudit
-from engine_mount.recordings.audit.latency import EDGES, Latency
 from engine_mount.recordings.audit.losses import Losses
 from engine_mount.recordings.run.screen import Table
 
@@ -95,12 +95,12 @@ def _verdict(audits: Mapping[str, TopicAudit], found: Losses) -> str:
         return 'The recording is not whole: what the notes say is missing, its stamps cannot show.'
     if not any(entry.present for entry in audits.values()):
         return 'The recording is empty: no message came, so none could be lost.'
-    told = sum(entry.expected is not None for entry in audits.values() if entry.present)
-    untold = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
-    if not told:
+    judged = sum(entry.expected is not None for entry in audits.values() if entry.present)
+    unjudged = sum(entry.expected is None and entry.present > 0 for entry in audits.values())
+    if not judged:
         return 'Whether anything was lost cannot be told: no topic has stamps with a rate, none was counted.'
-    rest = f'; of {untold} others it cannot be told' if untold else ''
-    return f'Nothing is known to be lost: {told} topics are complete{rest}.'
+    rest = f'; of {unjudged} others it cannot be told' if unjudged else ''
+    return f'Nothing is known to be lost: {judged} topics are complete{rest}.'
 
 
 def _bars(latency: Latency) -> list[str]:

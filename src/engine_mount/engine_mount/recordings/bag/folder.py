@@ -8,7 +8,7 @@ from engine_mount.recordings.bag.metadata import BagInformation, MetadataError, 
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
 from engine_mount.recordings.container.sqlite_file import SqliteFile
 from engine_mount.recordings.container.stored import StoredFile
-from engine_mount.recordings.container.whole_files import COMPRESSED_SUFFIXES
+from engine_mount.recordings.container.unpacking import COMPRESSED_SUFFIXES
 from mount_models.plain_yaml import YamlError, text_of_file
 from mount_recorder.metadata import METADATA_NAME
 

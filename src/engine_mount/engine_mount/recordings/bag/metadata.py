@@ -1,12 +1,12 @@
-"""The description of a recording, read from `metadata.yaml` or from the MCAP file; all versions are read."""
+"""What a recording says of itself: its description, quality of service, losses of its recorder."""
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from engine_mount.recordings.bag.offered_qos import QosError, read_qos
 from mount_models.plain_yaml import plain_yaml
-from mount_recorder.metadata import NO_TIME, ROOT, VERSION, OfferedQos
+from mount_recorder.metadata import NANOSECONDS, NO_TIME, ROOT, VERSION, OfferedQos
 
 
 class MetadataError(ValueError):
@@ -122,3 +122,75 @@ def _count(value: Any) -> int:
     if _whole(value) < 0:
         raise ValueError(f'a count must be 0 or more; instead received {value}')
     return int(value)
+
+
+# The position of a word is its number in rmw/types.h.
+_HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')
+_RELIABILITY = ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available')
+_DURABILITY = ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available')
+_LIVELINESS = (
+    'system_default',
+    'automatic',
+    'manual_by_node',
+    'manual_by_topic',
+    'unknown',
+    'best_available',
+)
+
+
+class QosError(ValueError):
+    """The quality of service in a bag is not understood."""
+
+
+def read_qos(source: Any) -> tuple[OfferedQos, ...]:
+    """Return the offers in `source`: YAML text or the list that it holds; raises `QosError`."""
+    try:
+        return _offers_in(source) if isinstance(source, str) else _offers(source)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise QosError(f'offered quality of service not understood: {reason}') from None
+
+
+# The topics of a recording, and of many recordings, have the same few texts.
+@functools.lru_cache(maxsize=64)
+def _offers_in(text: str) -> tuple[OfferedQos, ...]:
+    return _offers(plain_yaml(text))
+
+
+def _offers(documents: Any) -> tuple[OfferedQos, ...]:
+    return tuple(_offer(document) for document in documents or ())
+
+
+def _offer(document: Any) -> OfferedQos:
+    return OfferedQos(
+        history=_word(document['history'], _HISTORY),
+        depth=int(document['depth']),
+        reliability=_word(document['reliability'], _RELIABILITY),
+        durability=_word(document['durability'], _DURABILITY),
+        deadline=_nanoseconds(document['deadline']),
+        lifespan=_nanoseconds(document['lifespan']),
+        liveliness=_word(document['liveliness'], _LIVELINESS),
+        liveliness_lease_duration=_nanoseconds(document['liveliness_lease_duration']),
+        avoid_ros_namespace_conventions=bool(document['avoid_ros_namespace_conventions']),
+    )
+
+
+def _word(value: Any, words: tuple[str, ...]) -> str:
+    if isinstance(value, int):
+        if not 0 <= value < len(words):
+            raise ValueError(f'policy {value} is none of {", ".join(words)}')
+        return words[value]
+    return str(value)
+
+
+def _nanoseconds(document: Any) -> int:
+    return int(document['sec']) * NANOSECONDS + int(document['nsec'])
+
+
+def read_statement(record: Mapping[str, str]) -> dict[str, dict[str, int]]:
+    """Return {topic: {`received`, `kept`, `lost`, `missing`}} of the record; {} if it is not understood."""
+    try:
+        topics = plain_yaml(record['topics'])
+        return {str(name): {key: int(count) for key, count in row.items()} for name, row in topics.items()}
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        return {}

@@ -6,8 +6,7 @@ What the files say counts more: there it is under checksums.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from engine_mount.recordings.bag.metadata import BagInformation, TopicInformation
-from engine_mount.recordings.bag.offered_qos import QosError, read_qos
+from engine_mount.recordings.bag.metadata import BagInformation, QosError, TopicInformation, read_qos
 from engine_mount.recordings.bag.told_units import units_in
 from engine_mount.recordings.container.stored import StoredFile, StoredTopic
 from engine_mount.recordings.messages.definitions import (

@@ -3,13 +3,13 @@
 import copy
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.bag.file_blocks import Blocks, are_vouched, blocks_of, vouched_blocks
 from engine_mount.recordings.bag.folder import BagFolderError, find_pieces, open_piece
 from engine_mount.recordings.bag.metadata import (
     BagInformation,
@@ -25,12 +25,11 @@ from engine_mount.recordings.bag.piece_topics import (
     repeated_topics,
 )
 from engine_mount.recordings.container.stored import HEAD, StorageError, StoredFile, StoredMessages
-from engine_mount.recordings.messages.columns import ColumnCollector
-from engine_mount.recordings.messages.compact_times import Times
+from engine_mount.recordings.messages.columns import ColumnCollector, TimesCollector, TopicTimes
 from engine_mount.recordings.messages.definitions import Definition
 from engine_mount.recordings.messages.series import Column, Heads, Payloads, Series, heads_of
 from engine_mount.recordings.messages.time_axis import Arrivals, TimeAxis, anchors, axis_of
-from engine_mount.recordings.messages.topic_times import TimesCollector, TopicTimes
+from engine_mount.recordings.messages.times import Times
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
@@ -117,6 +116,11 @@ class Recording:
         return self._complete and all(file.proven for file in self.files)
 
     @property
+    def lost_beside(self) -> list[str]:
+        """The names of attachments and metadata that are known to be lost."""
+        return [name for file in self.files for name in file.lost_beside]
+
+    @property
     def time_range(self) -> tuple[int, int] | None:
         """The first and the last receive time in ns, None without messages."""
         ranges = [found for found in (file.time_range() for file in self.files) if found is not None]
@@ -153,36 +157,27 @@ class Recording:
         wanted = dict.fromkeys(self.resolve(name) for name in names)
         self._series |= self._load([name for name in wanted if not self._is_loaded(name)])
 
-    def load_alone(self, names: Iterable[str]) -> None:
-        """Read topics, for later use, without reading the files through where their own chunks prove them.
-
-        Raises `ReadingError`.
-        """
-        wanted = list(dict.fromkeys(self.resolve(name) for name in names))
-        numbers = [[each for name in wanted for each in self.numbers_in(file, name)] for file in self.files]
-        vouched = all(map(are_vouched, self.files, numbers))
-        self._series |= self._load(wanted, vouched_blocks if vouched else blocks_of)
-
     def load_columns(self, columns: Mapping[str, Iterable[str]]) -> None:
         """Read columns of topics and their stamps in one pass, for later use; raises `ReadingError`.
 
-        In memory are at no time more messages than a block. What else is asked of these topics later, such
-        as a message or a column that is not in each of them, is read then.
+        What else is wanted of these topics later, such as a message or a column that is not in each of them,
+        is read then.
         """
         wanted = {self.resolve(topic): self._unread(self.resolve(topic), columns[topic]) for topic in columns}
         collectors = {
-            name: ColumnCollector(partial(self._made, name), names, self.topics[name].message_count)
+            name: ColumnCollector(partial(self._series_in, name), names, self.topics[name].message_count)
             for name, names in wanted.items()
             if names
         }
         for name, block in self._blocks(list(collectors)) if collectors else ():
             collectors[name].add(block)
-        all_stamps: list[Times] = []
-        for name in list(collectors):
+        all_stamps: list[Times | None] = []
+        for name in wanted:
+            if name not in collectors:
+                continue
             heads, found, stamps = collectors.pop(name).finish()
-            if stamps is not None:  # topics of the same samples share them
-                stamps = next((known for known in all_stamps if np.array_equal(known, stamps)), stamps)
-                all_stamps.append(stamps)
+            stamps = _shared(stamps, all_stamps)
+            all_stamps.append(stamps)
             self._note_damage(name, len(heads.received))
             known = self._series[name].columns if name in self._series else {}
             self._series[name] = self._made(
@@ -193,35 +188,23 @@ class Recording:
         """Forget what was read of the topics: it is read again where it is asked for."""
         self._series = {}
 
-    def beginning(self, name: str) -> Series:
-        """Return the first block of messages of a topic, which tells its columns; raises `ReadingError`."""
-        full_name = self.resolve(name)
-        first = next(self._blocks([full_name]), None)
-        payloads = Payloads([] if first is None else [first[1].payloads()])
-        heads = np.empty(0, HEAD) if first is None else first[1].heads
-        return self._made(full_name, payloads, heads_of(heads))
-
     def parts(self, names: Iterable[str], size: int) -> Iterator[Series]:
         """Yield the messages of topics in the order of the files; at most their ends have fewer than `size`.
 
         In memory are no more than that of each topic. Raises `ReadingError`.
         """
-        waiting = {self.resolve(name): _Gathered() for name in names}
+        waiting: dict[str, list[_Copied]] = {self.resolve(name): [] for name in names}
         counts = dict.fromkeys(waiting, 0)
         for name, block in self._blocks(list(waiting)):
-            waiting[name].add(block)
+            waiting[name].append(_copied(block))
             counts[name] += len(block)
-            if len(waiting[name]) >= size:
+            if sum(len(heads) for heads, _ in waiting[name]) >= size:
                 yield self._series_of(name, waiting[name])
-                waiting[name] = _Gathered()
-        for name, gathered in waiting.items():
+                waiting[name] = []
+        for name, copied in waiting.items():
             self._note_damage(name, counts[name])
-            if len(gathered):
-                yield self._series_of(name, gathered)
-
-    def numbers_in(self, file: StoredFile, name: str) -> list[int]:
-        """Return by which numbers a file knows the topic with this full name."""
-        return [int(number) for number in self._declared[name].numbers_in(file)]
+            if copied:
+                yield self._series_of(name, copied)
 
     def axis_from(self, topic: str, first: Arrivals) -> TimeAxis:
         """Return the time axis by the first messages of its topic alone."""
@@ -337,21 +320,22 @@ class Recording:
     def _times_of(self, names: Iterable[str], received: Collection[str]) -> dict[str, TopicTimes]:
         types = {name: self.topics[name].type for name in names}
         setpoints = {name for name, kind in types.items() if registered_topic(name, kind) is CURRENT_SETPOINT}
-        collectors = {
-            name: TimesCollector(
-                name,
-                kind,
-                *self._definitions[name],
-                received=name in setpoints or name in received,
-                sent=name in setpoints,
+        collectors = {}
+        for name in types:
+            of_setpoint = {'publish_time', 'log_time'} if name in setpoints else set()
+            wanted = of_setpoint | ({'log_time'} if name in received else set())
+            series_in = partial(self._series_in, name)
+            collectors[name] = TimesCollector(
+                series_in, *self._definitions[name], wanted, self.topics[name].message_count
             )
-            for name, kind in types.items()
-        }
         for name, block in self._blocks(list(types)):
             collectors[name].add(block)
-        for name, collector in collectors.items():
-            self._note_damage(name, len(collector))
-        return {name: collectors.pop(name).times() for name in types}
+        found: dict[str, TopicTimes] = {}
+        for name, kind in types.items():
+            one = collectors.pop(name).finish(name, kind)
+            self._note_damage(name, one.count)
+            found[name] = replace(one, stamps=_shared(one.stamps, [each.stamps for each in found.values()]))
+        return found
 
     @property
     def _types(self) -> dict[str, str]:
@@ -371,23 +355,25 @@ class Recording:
         first = self.time_range[0] if self.time_range else 0
         return axis_of(self._types, arrivals, [zero for zero in steps if isinstance(zero, int)], first)
 
-    def _load(self, names: Sequence[str], blocks: Blocks = blocks_of) -> dict[str, Series]:
-        found = {name: _Gathered() for name in names}
-        for name, block in self._blocks(names, blocks) if names else ():
-            found[name].add(block)
-        for name, gathered in found.items():
-            self._note_damage(name, len(gathered))
+    def _load(self, names: Sequence[str]) -> dict[str, Series]:
+        found: dict[str, list[_Copied]] = {name: [] for name in names}
+        for name, block in self._blocks(names) if names else ():
+            found[name].append(_copied(block))
+        for name, copied in found.items():
+            self._note_damage(name, sum(len(heads) for heads, _ in copied))
         return {name: self._series_of(name, found.pop(name)) for name in names}
 
-    def series_of(self, name: str, messages: StoredMessages) -> Series:
+    def _series_of(self, name: str, messages: Sequence['_Copied']) -> Series:
         """Return messages of the topic with this full name as a series."""
-        gathered = _Gathered()
-        gathered.add(messages)
-        return self._series_of(name, gathered)
+        heads = heads_of(np.concatenate([np.empty(0, HEAD), *(heads for heads, _ in messages)]))
+        return self._made(name, Payloads([payloads for _, payloads in messages]), heads)
 
-    def _series_of(self, name: str, gathered: '_Gathered') -> Series:
-        heads = heads_of(np.concatenate([np.empty(0, HEAD), *gathered.heads]))
-        return self._made(name, Payloads(gathered.payloads), heads)
+    def _series_in(self, name: str, block: StoredMessages) -> Series:
+        return self._series_of(name, [_copied(block)])
+
+    def _numbers(self, file: StoredFile, name: str) -> list[int]:
+        """Return by which numbers a file knows the topic with this full name."""
+        return self._declared[name].numbers_in(file)
 
     def _is_loaded(self, name: str) -> bool:
         return name in self._series and self._series[name].loaded
@@ -431,23 +417,23 @@ class Recording:
             self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
             self.missing[name] = expected - present
 
-    def _blocks(
-        self, names: Sequence[str], blocks: Blocks = blocks_of
-    ) -> Iterator[tuple[str, StoredMessages]]:
+    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
         """Yield the messages of topics, without those that a piece repeats from the one before."""
         last: dict[str, tuple[bytes, int]] = {}
-        watched = frozenset().union(*repeated_topics(self.files))
-        for file, repeated in zip(self.files, repeated_topics(self.files), strict=True):
-            topics = {name: np.array(self._declared[name].numbers_in(file), np.int64) for name in names}
+        repetitions = repeated_topics(self.files)
+        watched = frozenset().union(*repetitions)
+        for file, repeated in zip(self.files, repetitions, strict=True):
+            topics = {name: np.array(self._numbers(file, name), np.int64) for name in names}
             topics = {name: numbers for name, numbers in topics.items() if numbers.size}
             heads = set(repeated)
-            for block in blocks(file, [int(number) for numbers in topics.values() for number in numbers]):
+            wanted = [int(number) for numbers in topics.values() for number in numbers]
+            for block in file.blocks(wanted):
                 for name, numbers in topics.items():
                     found = block.of(numbers) if len(topics) > 1 else block
                     if not len(found):
                         continue
                     if name in heads and found.message(0) == last.get(name):
-                        found = found.behind_first()
+                        found = found.at(slice(1, None))
                     heads.discard(name)
                     if len(found):
                         if name in watched:
@@ -455,18 +441,16 @@ class Recording:
                         yield name, found
 
 
-class _Gathered:
-    """Messages of a topic, without those of others that came with them in the blocks of the files."""
+_Copied = tuple[np.ndarray, np.ndarray | list[bytes]]
+"""Heads and bytes of messages, without those of others that were unpacked with them."""
 
-    def __init__(self) -> None:
-        self.heads: list[np.ndarray] = []
-        self.payloads: list[np.ndarray | list[bytes]] = []
-        self._count = 0
 
-    def __len__(self) -> int:
-        return self._count
+def _shared(stamps: Times | None, known: Iterable[Times | None]) -> Times | None:
+    """Return the same array for the topics of the same samples."""
+    if stamps is None:
+        return None
+    return next((each for each in known if each is not None and np.array_equal(each, stamps)), stamps)
 
-    def add(self, block: StoredMessages) -> None:
-        self.heads.append(block.heads)
-        self.payloads.append(block.payloads())
-        self._count += len(block)
+
+def _copied(block: StoredMessages) -> _Copied:
+    return block.heads, block.payloads()

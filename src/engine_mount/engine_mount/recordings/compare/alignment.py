@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.compact_times import is_in
 from engine_mount.recordings.messages.series import Series, SeriesError, Times
 from engine_mount.recordings.messages.time_axis import TimeAxis
+from engine_mount.recordings.messages.times import distinct, is_in
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.topic_groups import registered_topic
@@ -33,7 +33,7 @@ class Counter:
 
     def __init__(self, anchor: Series, sample_rate: float = SAMPLE_RATE):
         """`sample_rate` (Hz) is that of the recording."""
-        self.stamps = np.unique(anchor.stamps)
+        self.stamps = distinct(anchor.stamps)
         self.sample_rate = sample_rate
         self.period = _period(anchor, self.stamps, sample_rate)
         self._numbers = _steps(self.stamps, self.period)
@@ -172,7 +172,7 @@ def share_stamps(a: Recording, b: Recording) -> bool:
 
     As `align` finds it; raises `ComparisonError`.
     """
-    stamps = [np.unique(series.stamps) for series in next(iter(_anchors(a, b).values()))]
+    stamps = [distinct(series.stamps) for series in next(iter(_anchors(a, b).values()))]
     return _share(*stamps) >= _SAME_CLOCK
 
 

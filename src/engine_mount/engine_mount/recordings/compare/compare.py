@@ -1,10 +1,9 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Any
 
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.compare.alignment import (
@@ -16,47 +15,21 @@ from engine_mount.recordings.compare.alignment import (
     paired_topics,
     registered_in,
 )
-from engine_mount.recordings.compare.matched_topic import MatchedTopic
-from engine_mount.recordings.compare.signal_difference import SignalDifference, signal_difference
+from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
+from engine_mount.recordings.compare.signals import SHOWN, SignalDifference, few, signal_sentences
 from engine_mount.recordings.compare.tolerances import Tolerances
+from engine_mount.recordings.compare.topics import SWITCH, MatchedTopic, TopicComparison
 from engine_mount.recordings.events.recorded_events import recorded_marks
 from engine_mount.recordings.events.switching_changes import (
     SwitchingChange,
     paired_switchings,
     switching_times,
 )
-from engine_mount.recordings.run.session import recorded_sessions
-from engine_mount.recordings.run.session_differences import session_differences
-from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, EVENT, SESSION, Topic
+from engine_mount.recordings.run.session import recorded_sessions, session_differences
+from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT, EVENT, SESSION, Topic
 
 _TOLD_OTHERWISE = (SESSION, EVENT)  # in words of their own
 _OF_THE_MOMENT = (DIAGNOSTICS,)  # clock time, load: never equal
-_ACTIVE = 'damping_active'
-
-
-@dataclass(frozen=True)
-class TopicComparison:
-    """One topic of both: its signals, and how many samples are in one recording alone.
-
-    `only_a` and `only_b` are samples within the time that both recordings cover with this topic,
-    `outside_a` and `outside_b` those before and behind it.
-    """
-
-    mount: str  # what stands before the topic where it is of a namespace: `mount_left/`
-    topic: str
-    samples: int
-    signals: tuple[SignalDifference, ...]
-    only_a: int
-    only_b: int
-    outside_a: int
-    outside_b: int
-    differing_messages: int  # in what no signal shows
-    remark: str
-
-    @property
-    def name(self) -> str:
-        """Mount and topic."""
-        return f'{self.mount}{self.topic}'
 
 
 @dataclass(frozen=True)
@@ -115,6 +88,107 @@ class Comparison:
         """Whether nothing differs beyond the tolerances; topics of one recording alone do not count."""
         return not (self.incomplete or self.switching_changes or self.differing)
 
+    def sentences(self) -> list[str]:
+        """Return what differs, most important first; the last sentence says what is equal."""
+        return [
+            *self.difference_sentences(),
+            *self._reasons(),
+            *self._sample_sentences(),
+            *(f'{topic.name}: {topic.remark}' for topic in self.topics if topic.remark),
+            *(
+                f'{what} only in {where}: {few(names, ", ")}'
+                for what, where, names in (
+                    ('topics', 'A', self.only_a),
+                    ('topics', 'B', self.only_b),
+                    ('marks', 'A', self.marks_a),
+                    ('marks', 'B', self.marks_b),
+                )
+                if names
+            ),
+            self._rest(),
+        ]
+
+    def difference_sentences(self) -> list[str]:
+        """Return the sentences about switching and signals that differ beyond the tolerances."""
+        changes = self.switching_changes
+        more = [f'{len(changes) - SHOWN} more switchings differ'] if len(changes) > SHOWN else []
+        return [*map(switching_sentence, changes[:SHOWN]), *more, *signal_sentences(self.differing)]
+
+    def figures(self) -> dict[str, Any]:
+        """Return everything as JSON knows it: unknown is null, times in s on the time axis of A."""
+        alignment = self.alignment
+        return {
+            'a': self.name_a,
+            'b': self.name_b,
+            'equal': self.equal,
+            'sentences': self.sentences(),
+            'alignment': {
+                'same_stamps': alignment.same_stamps,
+                'shift_s': alignment.shift / 1e9,
+                'sentence': self.alignments.sentence,
+            },
+            'session': list(self.sessions),
+            'only_in_a': list(self.only_a),
+            'only_in_b': list(self.only_b),
+            'marks_only_in_a': list(self.marks_a),
+            'marks_only_in_b': list(self.marks_b),
+            'switching': None if self.switching is None else list(map(_switching_figures, self.switching)),
+            'topics': {topic.name: topic.figures() for topic in self.topics},
+        }
+
+    def _reasons(self) -> list[str]:
+        if self.sessions:
+            return [f'the sessions differ: {few(self.sessions, "; ")}']
+        if self.equal or not self.both_have_session:
+            return []
+        differing = {signal.topic for signal in self.differing}
+        inputs = next((topic for topic in self.topics if topic.topic == DISPLACEMENT.name), None)
+        if inputs is None or not inputs.samples or not differing:
+            return []
+        if DISPLACEMENT.name in differing:
+            return ['the sessions are equal, but the displacements differ, so all else may']
+        return [
+            'displacement and session are equal: the programs differ, or one of them began in another state'
+        ]
+
+    def _sample_sentences(self) -> list[str]:
+        kinds = {'samples missing in B': 'only_a', 'samples missing in A': 'only_b'}
+        if not self.common_only:
+            kinds |= {'samples of A before or behind those of B': 'outside_a'}
+            kinds |= {'samples of B before or behind those of A': 'outside_b'}
+        sentences = []
+        for what, field in {**kinds, 'messages that differ': 'differing_messages'}.items():
+            counts = [(getattr(topic, field), topic.name) for topic in self.incomplete]
+            told = [f'{count} of {name}' for count, name in counts if count]
+            sentences += [f'{what}: {few(told, ", ")}'] if told else []
+        return sentences
+
+    def _rest(self) -> str:
+        alike = [signal for signal in self.signals if signal.samples and not signal.differing]
+        exact = all(signal.exact for signal in alike)
+        how = 'equal to the bit' if exact else 'equal within the tolerances'
+        switching = '' if self.switching is None or self.switching_changes else ' and the switching'
+        if not self.differing and not self.switching_changes:
+            where = 'everything that both have' if self.incomplete else 'everything'
+            topics = len({(signal.mount, signal.topic) for signal in alike})
+            return f'{where} is {how} ({len(alike)} signals of {topics} topics)'
+        if not alike:
+            return 'no signal is equal'
+        return f'everything else is {how} ({len(alike)} of {len(self.signals)} signals{switching})'
+
+
+def switching_sentence(change: SwitchingChange, a: str = 'A', b: str = 'B') -> str:
+    """Return the sentence about a switching; `a` and `b` is what the recordings are called."""
+    word = 'on' if change.on else 'off'
+    mount = change.mount.replace('/', ': ')
+    if change.time_b is None:
+        return f'{mount}damping is not switched {word} in {b}, in {a} it is at {time_text(change.time)}'
+    if change.time_a is None:
+        return f'{mount}damping is switched {word} at {time_text(change.time_b)} in {b}, in {a} it is not'
+    direction = 'later' if change.moved > 0.0 else 'earlier'
+    by = quantity_text(abs(change.moved), 's')
+    return f'{mount}switched {word} {by} {direction} in {b}, at {time_text(change.time_b)}'
+
 
 def compare(
     a: Recording,
@@ -136,21 +210,22 @@ def compare(
     tolerances.check({(topic.mount, topic.topic, signal) for topic in matched for signal in topic.signals})
     if not any(topic.samples for topic in matched):
         raise ComparisonError(f'no sample is in both {a.path} and {b.path}; {alignments.sentence}')
-    switching = _switching(matched)
+    switching = [change for topic in matched if topic.tells_switching for change in _switching(topic)]
+    told = any(topic.tells_switching for topic in matched)
     marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
     sessions = _sessions(a, b, pairs)
     return Comparison(
         name_a=a.short_name,
         name_b=b.short_name,
         alignments=alignments,
-        topics=tuple(_compared(topic, tolerances, switching) for topic in matched),
+        topics=tuple(topic.compared(tolerances) for topic in matched),
         only_a=_unpaired_topics(a, pairs, topics),
         only_b=_unpaired_topics(b, pairs.values(), topics),
         sessions=tuple(sessions or ()),
         both_have_session=sessions is not None,
         marks_a=tuple((marks_a - marks_b).elements()),
         marks_b=tuple((marks_b - marks_a).elements()),
-        switching=_in_time(switching.values()) if switching else None,
+        switching=tuple(sorted(switching, key=lambda change: change.time)) if told else None,
         switching_tolerance=tolerances.switching,
         common_only=common_only,
     )
@@ -171,75 +246,20 @@ def _wanted(registered: Topic | None, topics: Collection[Topic] | None) -> bool:
     return registered not in (*_TOLD_OTHERWISE, *_OF_THE_MOMENT) and (topics is None or registered in topics)
 
 
-def _compared(
-    topic: MatchedTopic, tolerances: Tolerances, switching: Mapping[str, list[SwitchingChange]]
-) -> TopicComparison:
-    (only_a, outside_a), (only_b, outside_b) = topic.unmatched_samples()
-    signals = {
-        name: unit
-        for name, unit in topic.signals.items()
-        if not (topic.mount in switching and _is_switch(topic, name) and _only_on_or_off(topic))
+def _switching(topic: MatchedTopic) -> list[SwitchingChange]:
+    column = topic.column(SWITCH)
+    times = (switching_times(column.time, active) for active in (column.a, column.b))
+    return paired_switchings(*times, topic.period, topic.mount)
+
+
+def _switching_figures(change: SwitchingChange) -> dict[str, Any]:
+    return {
+        'mount': change.mount.rstrip('/'),
+        'kind': 'on' if change.on else 'off',
+        'time_a_s': change.time_a,
+        'time_b_s': change.time_b,
+        'moved_ms': None if change.alone else round(1e3 * change.moved, 6),
     }
-    hidden = 0
-    if topic.different_messages().any():
-        hidden = int(np.count_nonzero(topic.hidden_differences()))
-        grid = topic.grid()
-        found = tuple(
-            signal_difference(
-                topic.column(name), tolerances.of(topic.mount, topic.topic, name), grid, topic.period
-            )
-            for name in signals
-        )
-    else:
-        found = tuple(
-            SignalDifference(topic.mount, topic.topic, name, unit, topic.samples)
-            for name, unit in signals.items()
-        )
-    return TopicComparison(
-        mount=topic.mount,
-        topic=topic.topic,
-        samples=topic.samples,
-        signals=found,
-        only_a=only_a,
-        only_b=only_b,
-        outside_a=outside_a,
-        outside_b=outside_b,
-        differing_messages=hidden,
-        remark=_remark(topic),
-    )
-
-
-def _remark(topic: MatchedTopic) -> str:
-    if topic.a.type != topic.b.type:
-        return f'in A it is {topic.a.type}, in B {topic.b.type}'
-    unmatched = topic.unmatched_signals
-    return f'only one of both has {", ".join(unmatched)}' if unmatched else ''
-
-
-def _is_switch(topic: MatchedTopic, signal: str) -> bool:
-    return topic.topic == CONTROL_TRACE.name and signal == _ACTIVE
-
-
-def _switching(matched: Collection[MatchedTopic]) -> dict[str, list[SwitchingChange]]:
-    """Return the switchings of each mount that tells of them in both recordings."""
-    found = {}
-    for topic in matched:
-        if topic.samples and any(_is_switch(topic, signal) for signal in topic.signals):
-            column = topic.column(_ACTIVE)
-            both = np.concatenate([column.a, column.b])
-            if ((both >= 0.0) & (both <= 1.0)).all():
-                times = (switching_times(column.time, active) for active in (column.a, column.b))
-                found[topic.mount] = paired_switchings(*times, topic.period, topic.mount)
-    return found  # what is no switch is compared as any other signal, an opening as both
-
-
-def _only_on_or_off(topic: MatchedTopic) -> bool:
-    column = topic.column(_ACTIVE)
-    return bool(np.isin(np.concatenate([column.a, column.b]), (0.0, 1.0)).all())
-
-
-def _in_time(switchings: Iterable[list[SwitchingChange]]) -> tuple[SwitchingChange, ...]:
-    return tuple(sorted((change for each in switchings for change in each), key=lambda change: change.time))
 
 
 def _unpaired_topics(

@@ -13,17 +13,16 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
-from mcap.records import Attachment
 
-from engine_mount.recordings.container.message_compression import plain
 from engine_mount.recordings.container.stored import (
     HEAD,
     StorageError,
+    StoredFile,
     StoredMessages,
     StoredTopic,
     stored_messages,
 )
-from engine_mount.recordings.container.whole_files import COMPRESSED_SUFFIXES, unpack
+from engine_mount.recordings.container.unpacking import COMPRESSED_SUFFIXES, plain, unpack
 
 _AT_ONCE = 1000  # rows
 # A column may hold any type, whatever was declared; a name or a text that is no UTF-8 is a `ValueError`.
@@ -31,20 +30,14 @@ _UNREADABLE = (sqlite3.Error, ValueError, TypeError, KeyError, OverflowError)
 _LOGS = ('-wal', '-journal')  # behind the name of the database
 
 
-class SqliteFile:
+class SqliteFile(StoredFile):
     """Topics and messages of a `.db3` file; storage without checksums."""
 
     def __init__(self, path: Path):
-        self.path = path
-        self.topics: dict[int, StoredTopic] = {}
-        self.metadata: dict[str, dict[str, str]] = {}
-        self.records: list[tuple[str, dict[str, str]]] = []
-        self.warnings: list[str] = []
-        self.lost_beside: list[str] = []
+        super().__init__(path)
         self.damaged = False
-        self._counts: dict[int, int] = {}
-        self._times: tuple[int, int] | None = None
-        self._logs = [log for log in _logs_of(path) if log.is_file() and log.stat().st_size]
+        logs = (path.with_name(path.name + suffix) for suffix in _LOGS)
+        self._logs = [log for log in logs if log.is_file() and log.stat().st_size]
         if not path.is_file():
             raise StorageError(f'{path} cannot be read: no such file')
         try:
@@ -52,6 +45,7 @@ class SqliteFile:
             self._read_topics()
         except _UNREADABLE as error:
             raise StorageError(f'{path} is no readable sqlite3 bag: {error}') from None
+        self.proven = not self._logs  # a closed database has its own checks
         if self._logs:
             names = ', '.join(log.name for log in self._logs)
             self.warnings.append(f'{path.name} was not closed by its writer; read with {names}')
@@ -59,23 +53,9 @@ class SqliteFile:
     @property
     def whole(self) -> bool:
         """Whether nothing of it is known to be missing: it was closed, and is readable."""
-        return not self.damaged and not self._logs
-
-    @property
-    def proven(self) -> bool:
-        """Whether what it says of itself can be relied upon: a closed database has its own checks."""
-        return not self._logs
-
-    def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by topic."""
-        return dict(self._counts)
-
-    def time_range(self) -> tuple[int, int] | None:
-        """Return the earliest and the latest receive time (ns), None for a file without messages."""
-        return self._times
+        return self.proven and not self.damaged
 
     def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
-        """Yield the messages of `topics` in the order of their times."""
         marks = ','.join(map(str, sorted(topics)))
         wanted = f'topic_id IN ({marks}) ORDER BY timestamp, id'
         query = f'SELECT topic_id, timestamp, data FROM messages WHERE {wanted}'
@@ -87,43 +67,29 @@ class SqliteFile:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
 
-    def attachments(self) -> Iterator[Attachment]:
-        """Yield nothing: this storage has none."""
-        return iter(())
-
     def _connected(self) -> sqlite3.Connection:
-        if self.path.suffix in COMPRESSED_SUFFIXES:
-            return self._unpacked()
-        if not self._logs:
+        packed = self.path.suffix in COMPRESSED_SUFFIXES
+        if not packed and not self._logs:
             return sqlite3.connect(f'{self.path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
-        try:
-            folder = self._scratch()
-            for file in (self.path, *self._logs):
-                shutil.copyfile(file, folder / file.name)
-        except OSError as error:
-            raise StorageError(
-                f'{self.path} was not closed and cannot be copied to be read with its log: '
-                f'{error.strerror}; make room in {tempfile.gettempdir()}'
-            ) from None
-        return sqlite3.connect(folder / self.path.name)
-
-    def _unpacked(self) -> sqlite3.Connection:
-        """Return the database of a file that is packed as a whole; it needs the space of the unpacked one."""
-        try:
-            copy = self._scratch() / self.path.stem
-            with self.path.open('rb') as packed, copy.open('wb') as target:
-                unpack(packed, target, self.path.suffix)
-        except OSError as error:
-            raise StorageError(
-                f'{self.path} cannot be unpacked: {error.strerror}; make room in {tempfile.gettempdir()}'
-            ) from None
-        return sqlite3.connect(copy)
-
-    def _scratch(self) -> Path:
-        """Return a folder that is removed with this object."""
         folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        return folder
+        copy = folder / (self.path.stem if packed else self.path.name)
+        try:
+            if packed:
+                with self.path.open('rb') as source, copy.open('wb') as target:
+                    unpack(source, target, self.path.suffix)
+            for file in () if packed else (self.path, *self._logs):
+                shutil.copyfile(file, folder / file.name)
+        except OSError as error:
+            what = (
+                'cannot be unpacked'
+                if packed
+                else 'was not closed and cannot be copied to be read with its log'
+            )
+            raise StorageError(
+                f'{self.path} {what}: {error.strerror}; make room in {tempfile.gettempdir()}'
+            ) from None
+        return sqlite3.connect(copy)
 
     def _read_topics(self) -> None:
         cursor = self._base.execute('SELECT * FROM topics')
@@ -158,10 +124,6 @@ class SqliteFile:
             return {str(kind): (str(encoding), str(text)) for kind, encoding, text in rows}
         except _UNREADABLE:
             return {}
-
-
-def _logs_of(path: Path) -> list[Path]:
-    return [path.with_name(path.name + suffix) for suffix in _LOGS]
 
 
 def _messages(rows: list[tuple[int, int, bytes]]) -> StoredMessages:

@@ -1,9 +1,9 @@
 """What a file of a recording is, whatever its format: topics, and messages as bytes with their times."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from mcap.records import Attachment
@@ -55,13 +55,11 @@ class StoredMessages:
         """Return the messages of these topics alone."""
         number = self.heads['topic']
         wanted = number == topics[0] if len(topics) == 1 else np.isin(number, topics)
-        if wanted.all():
-            return self
-        return StoredMessages(self.heads[wanted], self.data, self.begins[wanted], self.ends[wanted])
+        return self if wanted.all() else self.at(np.flatnonzero(wanted))
 
-    def behind_first(self) -> 'StoredMessages':
-        """Return all messages but the first."""
-        return StoredMessages(self.heads[1:], self.data, self.begins[1:], self.ends[1:])
+    def at(self, places: NDArray[np.int64] | slice) -> 'StoredMessages':
+        """Return the messages at these places."""
+        return StoredMessages(self.heads[places], self.data, self.begins[places], self.ends[places])
 
     def message(self, place: int) -> tuple[bytes, int]:
         """Return bytes and publish time (ns) of one message."""
@@ -72,6 +70,11 @@ class StoredMessages:
         """Return the number of messages by topic."""
         topics, counts = np.unique(self.heads['topic'], return_counts=True)
         return dict(zip(topics.tolist(), counts.tolist(), strict=True))
+
+    def time_range(self) -> tuple[int, int]:
+        """Return the first and the last log time (ns) of messages, of which there is one at least."""
+        times = self.heads['log_time']
+        return int(times.min()), int(times.max())
 
     def beginnings(self, size: int) -> NDArray[np.uint8] | None:
         """Return the first `size` bytes of each message as rows, None if one of them is shorter."""
@@ -89,37 +92,43 @@ class StoredMessages:
         return [bytes(buffer[begin:end]) for begin, end in pairs]
 
 
-class StoredFile(Protocol):
+class StoredFile(ABC):
     """One file of a recording; topics are told apart by numbers of its own.
 
     It is `whole` if nothing is known to be missing, `damaged` if messages are known to be lost inside of it,
     and `proven` if what it says of itself can be relied upon.
     """
 
-    path: Path
-    topics: dict[int, StoredTopic]
-    metadata: dict[str, dict[str, str]]  # the last record of each name
-    records: list[tuple[str, dict[str, str]]]  # all of them
-    warnings: list[str]
-    lost_beside: list[str]  # names of metadata and attachments that are known to be lost
+    whole: bool
+    damaged: bool
+    proven: bool
+    _times: tuple[int, int] | None
 
-    @property
-    def whole(self) -> bool: ...
-    @property
-    def damaged(self) -> bool: ...
-    @property
-    def proven(self) -> bool: ...
+    def __init__(self, path: Path):
+        self.path = path
+        self.topics: dict[int, StoredTopic] = {}
+        self.metadata: dict[str, dict[str, str]] = {}  # the last record of each name
+        self.records: list[tuple[str, dict[str, str]]] = []  # all of them
+        self.warnings: list[str] = []
+        self.lost_beside: list[str] = []  # names of metadata and attachments that are known to be lost
+        self._counts: dict[int, int] = {}
+        self._times = None
+
     def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by topic."""
+        """Return the number of messages by topic: as written where that is proven, else as readable."""
+        return dict(self._counts)
 
     def time_range(self) -> tuple[int, int] | None:
         """Return the earliest and the latest log time (ns), None for a file without messages."""
+        return self._times
 
+    @abstractmethod
     def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
-        """Yield the messages of `topics`, unpacked where each is packed."""
+        """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield what is attached, without what is damaged."""
+        return iter(())
 
 
 def stored_messages(heads: np.ndarray, raws: list[bytes]) -> StoredMessages:
@@ -127,6 +136,11 @@ def stored_messages(heads: np.ndarray, raws: list[bytes]) -> StoredMessages:
     ends = np.cumsum([len(raw) for raw in raws], dtype=np.int64)
     begins = ends - np.array([len(raw) for raw in raws], np.int64)
     return StoredMessages(heads, np.frombuffer(b''.join(raws), np.uint8), begins, ends)
+
+
+def united(one: tuple[int, int] | None, other: tuple[int, int]) -> tuple[int, int]:
+    """Return the range of time that holds two others."""
+    return other if one is None else (min(one[0], other[0]), max(one[1], other[1]))
 
 
 def rows_at(data: NDArray[np.uint8], begins: NDArray[np.int64], width: int) -> NDArray[np.uint8]:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from engine_mount.recordings.bag.metadata import TopicInformation
 from engine_mount.recordings.bag.origin import ZERO_KEY, with_step
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.edit.beside_messages import lost_beside_messages
 from engine_mount.recordings.edit.inherited_statement import sources_of
 from engine_mount.recordings.edit.messages import Messages, read_messages, write_messages
 from engine_mount.recordings.messages.time_axis import TimeAxis
@@ -72,7 +71,7 @@ def cut(
     distro = recording.information.ros_distro if recording.information else ''
     custom = with_step([recording.information], _step(recording, span, reason, made or time_text()))
     write_messages(out, parts, [recording], sources_of(recording, read), custom, distro)
-    losses += [f'{name} is lost by damage' for name in lost_beside_messages([recording])]
+    losses += [f'{name} is lost by damage' for name in recording.lost_beside]
     return Cut(Path(out), span.begin, span.end, count, carried, tuple(losses))
 
 

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 
 import yaml
 
+from engine_mount.recordings.bag.metadata import read_statement
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.bag.statement import read_statement
 from mount_models.plain_yaml import plain_yaml
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 
@@ -53,8 +53,11 @@ def inherited_statement(sources: Sources, kept: Mapping[str, int]) -> dict[str, 
         identity: {name: [entry.received, entry.overflowed, entry.missing] for name, entry in topics.items()}
         for identity, topics in sources.items()
     }
-    told = {name: kept.get(name, 0) for name in total}
-    return {**loss_statement(total, told, excerpt=True), SOURCES: yaml.safe_dump(rows, sort_keys=False)}
+    kept_here = {name: kept.get(name, 0) for name in total}
+    return {
+        **loss_statement(total, kept_here, excerpt=True),
+        SOURCES: yaml.safe_dump(rows, sort_keys=False),
+    }
 
 
 def _record(recording: Recording) -> Mapping[str, str]:

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.recordings.bag.metadata import TopicInformation
 from engine_mount.recordings.bag.origin import with_step
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.edit.beside_messages import lost_beside_messages
 from engine_mount.recordings.edit.inherited_statement import sources_of, united
-from engine_mount.recordings.edit.messages import Messages, joined_payloads, read_messages, write_messages
+from engine_mount.recordings.edit.messages import Messages, joined, read_messages, write_messages
 from engine_mount.recordings.messages.series import Times
-from engine_mount.recordings.run.session_differences import session_differences
+from engine_mount.recordings.run.session import session_differences
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import SESSION, Delivery
@@ -76,7 +74,7 @@ def merge(
     sources = united(map(sources_of, recordings, read))
     custom = with_step([recording.information for recording in recordings], step)
     kept = write_messages(out, parts, recordings, sources, custom, next(iter(distros), ''))
-    losses += [f'{name} is lost by damage' for name in lost_beside_messages(recordings)]
+    losses += [f'{name} is lost by damage' for recording in recordings for name in recording.lost_beside]
     return Merge(Path(out), kept, repeated, tuple(_holes(recordings)), tuple(losses))
 
 
@@ -126,48 +124,25 @@ def _sessions(recording: Recording) -> dict[bytes, str]:
 
 
 def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
-    united = Messages(
-        topic,
-        next((part.declared for part in parts if part.declared), None),
-        np.concatenate([part.log_times for part in parts]),
-        np.concatenate([part.publish_times for part in parts]),
-        joined_payloads([part.payloads for part in parts]),
-        np.concatenate([part.sequences for part in parts]),
-    )
-    order = np.argsort(united.log_times, kind='stable')
-    repeated = _repeated(united, parts, order)
-    return united.chosen(order[~np.isin(order, repeated)])
-
-
-def _repeated(united: Messages, parts: Sequence[Messages], order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the places of messages that an earlier part has as well.
+    """Return the messages of all parts without those that an earlier part has as well.
 
     Each part may repeat what the others have as often as the one that has it most often.
     """
-    part_of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    shared = _shared_times(parts)
-    suspects = order[np.isin(united.log_times[order], shared)]
-    most: Counter[tuple[int, int, bytes]] = Counter()
-    repeated = []
-    of_part: Counter[tuple[int, int, bytes]] = Counter()
-    part = -1
-    for place in suspects[np.argsort(part_of[suspects], kind='stable')].tolist():
-        if part_of[place] != part:
-            part = part_of[place]
-            of_part.clear()
-        key = (int(united.log_times[place]), int(united.publish_times[place]), united.payloads[place])
-        of_part[key] += 1
-        if of_part[key] <= most[key]:
-            repeated.append(place)
-        else:
-            most[key] = of_part[key]
-    return np.array(repeated, np.int64)
+    shared, most, kept = _shared_times(parts), Counter[tuple[int, int, bytes]](), []
+    for part in parts:
+        own = Counter[tuple[int, int, bytes]]()
+        is_new = np.ones(len(part), bool)
+        for place in np.flatnonzero(np.isin(part.log_times, shared)).tolist():
+            key = int(part.log_times[place]), int(part.publish_times[place]), part.payloads[place]
+            own[key] += 1
+            is_new[place] = own[key] > most[key]
+        most |= own
+        kept.append(part.chosen(np.flatnonzero(is_new)))
+    return joined(topic, kept)
 
 
 def _shared_times(parts: Sequence[Messages]) -> Times:
     """Return the log times that more than one part has."""
-    if not parts:
-        return np.empty(0, np.int64)
     times, counts = np.unique(
         np.concatenate([np.unique(part.log_times) for part in parts]), return_counts=True
     )

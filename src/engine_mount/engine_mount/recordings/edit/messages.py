@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from engine_mount.recordings.bag.metadata import TopicInformation
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.container.stored import StoredTopic
-from engine_mount.recordings.edit.beside_messages import copy_beside_messages
 from engine_mount.recordings.edit.inherited_statement import Sources, inherited_statement
 from engine_mount.recordings.edit.verbatim import VerbatimBag
-from engine_mount.recordings.messages.series import Payloads, Series, Times
+from engine_mount.recordings.messages.series import Payloads, Times
 from mount_recorder.losses import RECORDER_RECORD
 
 _LARGE = 500_000  # messages, chosen: about 100 MB
@@ -30,22 +29,37 @@ class Messages:
     declared: StoredTopic | None
     log_times: Times
     publish_times: Times
-    payloads: Payloads
     sequences: NDArray[np.uint32]
+    payloads: Payloads
 
     def __len__(self) -> int:
         return len(self.log_times)
 
     def chosen(self, places: NDArray[np.int64]) -> 'Messages':
         """Return the messages at `places`."""
-        return Messages(
-            self.topic,
-            self.declared,
-            self.log_times[places],
-            self.publish_times[places],
-            _at(self.payloads, places),
-            self.sequences[places],
+        return replace(
+            self,
+            log_times=self.log_times[places],
+            publish_times=self.publish_times[places],
+            sequences=self.sequences[places],
+            payloads=self.payloads.chosen(places),
         )
+
+    def ordered(self) -> 'Messages':
+        """Return the messages in the order of their log times."""
+        return self.chosen(np.argsort(self.log_times, kind='stable'))
+
+
+def joined(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
+    """Return the messages of several parts, of which there is one at least, in the order of log times."""
+    return Messages(
+        topic,
+        next((part.declared for part in parts if part.declared), None),
+        np.concatenate([part.log_times for part in parts]),
+        np.concatenate([part.publish_times for part in parts]),
+        np.concatenate([part.sequences for part in parts]),
+        Payloads([part.payloads.messages for part in parts if len(part)]),
+    ).ordered()
 
 
 def read_messages(recording: Recording, name: str) -> tuple[Messages, list[str]]:
@@ -56,7 +70,11 @@ def read_messages(recording: Recording, name: str) -> tuple[Messages, list[str]]
     """
     known = list(recording.warnings)
     source = open_recording(recording.path) if recording.message_count > _LARGE else recording
-    messages = _in_order(recording.topics[name], _declaration(recording, name), source[name])
+    topics = (topic for file in recording.files for topic in file.topics.values())
+    declared = next((topic for topic in topics if topic.name == name), None)
+    series = source[name]
+    columns = series.receive_times, series.publish_times, series.sequences
+    messages = Messages(recording.topics[name], declared, *columns, series.payloads).ordered()
     return messages, [warning for warning in source.warnings if warning not in known]
 
 
@@ -82,7 +100,7 @@ def write_messages(
             times = int(part.log_times[place]), int(part.publish_times[place])
             bag.write(channels[number], part.payloads[place], *times, int(part.sequences[place]))
         bag.flush()
-        copy_beside_messages(recordings, bag)
+        bag.copy_beside_messages(recordings)
         if sources:
             bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
         bag.close(custom_data, ros_distro)
@@ -101,32 +119,3 @@ def in_log_order(parts: Sequence[Messages]) -> Iterable[tuple[int, int]]:
     places = np.concatenate([np.arange(len(each)) for each in times])
     order = np.argsort(np.concatenate(times), kind='stable')
     return zip(numbers[order].tolist(), places[order].tolist(), strict=True)
-
-
-def joined_payloads(payloads: Iterable[Payloads]) -> Payloads:
-    """Return all `payloads` one behind the other."""
-    return Payloads([_pieces(each) for each in payloads if len(each)])
-
-
-def _declaration(recording: Recording, name: str) -> StoredTopic | None:
-    topics = (topic for file in recording.files for topic in file.topics.values())
-    return next((topic for topic in topics if topic.name == name), None)
-
-
-def _in_order(topic: TopicInformation, declared: StoredTopic | None, series: Series) -> Messages:
-    messages = Messages(
-        topic, declared, series.receive_times, series.publish_times, series.payloads, series.sequences
-    )
-    if (np.diff(messages.log_times) >= 0).all():
-        return messages
-    return messages.chosen(np.argsort(messages.log_times, kind='stable'))
-
-
-def _at(payloads: Payloads, places: NDArray[np.int64]) -> Payloads:
-    if payloads.rows is not None:
-        return Payloads([payloads.rows[places]])
-    return Payloads([[payloads[place] for place in places.tolist()]])
-
-
-def _pieces(payloads: Payloads) -> NDArray[np.uint8] | list[bytes]:
-    return payloads.rows if payloads.rows is not None else [payloads[i] for i in range(len(payloads))]

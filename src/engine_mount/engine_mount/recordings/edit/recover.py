@@ -8,17 +8,15 @@ of up to 128 KiB, nothing can be unpacked.
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from engine_mount.recordings.bag.metadata import read_statement
 from engine_mount.recordings.bag.piece_topics import repeated_topics
 from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.bag.statement import read_statement
 from engine_mount.recordings.container.mcap_reading.chunks import Chunk
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
-from engine_mount.recordings.container.stored import StoredMessages
-from engine_mount.recordings.edit.beside_messages import copy_beside_messages, lost_beside_messages
 from engine_mount.recordings.edit.inherited_statement import inherited_statement, sources_of
 from engine_mount.recordings.edit.verbatim import VerbatimBag
 from mount_recorder.losses import RECORDER_RECORD
@@ -98,7 +96,7 @@ def recover(
             raise RecoveryError(f'{path} holds no message that can be recovered: {_reasons(recording)}')
         custom = dict(recording.information.custom_data) if recording.information else {}
         custom['recovered_from'] = f'{recording.path.name}: {stored} messages'
-        copy_beside_messages([recording], bag)
+        bag.copy_beside_messages([recording])
         sources = sources_of(recording, bag.kept_by_topic)
         if sources:
             bag.add_record(RECORDER_RECORD, inherited_statement(sources, bag.kept_by_topic))
@@ -118,8 +116,9 @@ def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> int:
         targets = {number: bag.topic(topic) for number, topic in file.topics.items()}
         pending = set(repeated)
         for block in file.blocks(file.topics.keys()):
-            for number, raw, log_time, publish_time, sequence in _messages(block):
-                stored += 1
+            stored += len(block)
+            rows = zip(block.heads.tolist(), map(bytes, block.payloads()), strict=True)
+            for (number, sequence, log_time, publish_time), raw in rows:
                 name = file.topics[number].name
                 if name in watched:
                     is_first, same = name in pending, last.get(name) == (raw, publish_time)
@@ -130,13 +129,6 @@ def _copy(recording: Recording, bag: VerbatimBag, progress: Progress) -> int:
                 bag.write(targets[number], raw, log_time, publish_time, sequence)
             progress(bag.kept + bag.pending, expected)
     return stored
-
-
-def _messages(block: StoredMessages) -> Iterator[tuple[int, bytes, int, int, int]]:
-    raws = map(bytes, block.payloads())
-    columns = (block.heads[name].tolist() for name in ('topic', 'log_time', 'publish_time', 'sequence'))
-    for number, log_time, publish_time, sequence, raw in zip(*columns, raws, strict=True):
-        yield number, raw, log_time, publish_time, sequence
 
 
 # What is kept and what is lost.
@@ -161,7 +153,7 @@ def _balance(recording: Recording, bag: VerbatimBag, stored: int) -> Recovery:
         kept_bytes=size - lost_bytes,
         lost_bytes=lost_bytes,
         all_messages=complete,
-        lost_beside=tuple(lost_beside_messages([recording])),
+        lost_beside=tuple(recording.lost_beside),
         lost_before=_lost_before(recording),
         notes=tuple(recording.warnings),
     )
@@ -169,18 +161,14 @@ def _balance(recording: Recording, bag: VerbatimBag, stored: int) -> Recovery:
 
 def _estimate(files: Sequence[McapFile], kept: int) -> int | None:
     """Return about how many messages the damaged and cut-off chunks had, None if there is none such."""
-    whole = [chunk for file in files for chunk in file.chunks if not file.is_damaged(chunk)]
-    unpacked = sum(chunk.size for chunk in whole)
-    packed = sum(chunk.end - chunk.position for chunk in whole)
-    lost = sum(chunk.size for file in files for chunk in file.chunks if file.is_damaged(chunk)) / max(
-        1, unpacked
-    )
-    for file in files:
-        lost += (file.tail.size if file.tail else 0) / max(1, unpacked)
-        lost += sum(part.end - part.begin for part in file.unexplained if part.end < file.size) / max(
-            1, packed
-        )
-    return round(lost * kept) or None
+    chunks = [(chunk, file.is_damaged(chunk)) for file in files for chunk in file.chunks]
+    whole = [chunk for chunk, is_damaged in chunks if not is_damaged]
+    unpacked = sum(chunk.size for chunk, is_damaged in chunks if is_damaged)
+    unpacked += sum(file.tail.size for file in files if file.tail)
+    packed = sum(part.end - part.begin for file in files for part in file.unexplained if part.end < file.size)
+    share = unpacked / max(1, sum(chunk.size for chunk in whole))
+    share += packed / max(1, sum(chunk.end - chunk.position for chunk in whole))
+    return round(share * kept) or None
 
 
 def _expected(recording: Recording) -> int | None:
@@ -205,34 +193,30 @@ def _lost_inside(file: McapFile) -> int:
     """Return the ns between whole chunks of the same group with something lost between them."""
     losses = [chunk.position for chunk in file.chunks if file.is_damaged(chunk)]
     losses += [stretch.begin for stretch in file.unexplained]
-    whole = [chunk for chunk in file.chunks if not file.is_damaged(chunk)]
-    lost = []
-    for chunks in _by_group(file, whole):
-        for before, after in itertools.pairwise(chunks):
-            if any(before.position < position < after.position for position in losses):
-                lost.append((before.end_time, after.start_time))
-    return _covered(lost)
-
-
-def _by_group(file: McapFile, chunks: Sequence[Chunk]) -> list[Sequence[Chunk]]:
-    """Return the chunks of each group of topics, all in one where a chunk holds topics of several."""
-    group_of = {number: topic_group(topic.name, topic.type) for number, topic in file.topics.items()}
-    held = [{group_of.get(number) for number in chunk.channels or ()} for chunk in chunks]
-    if any(chunk.channels is None for chunk in chunks) or any(len(groups) > 1 for groups in held):
-        return [chunks]
-    return [
-        [chunk for chunk, groups in zip(chunks, held, strict=True) if group in groups]
-        for group in set().union(*held)
+    spans = [
+        (before.end_time, after.start_time)
+        for chunks in _by_group(file)
+        for before, after in itertools.pairwise(chunks)
+        if any(before.position < position < after.position for position in losses)
     ]
-
-
-def _covered(spans: Sequence[tuple[int, int]]) -> int:
-    """Return how much the spans (begin, end) cover, each part once."""
-    covered, reached = 0, 0
-    for begin, end in sorted(spans):
-        covered += max(0, end - max(begin, reached))
+    lost, reached = 0, 0
+    for begin, end in sorted(spans):  # each part once
+        lost += max(0, end - max(begin, reached))
         reached = max(reached, end)
-    return covered
+    return lost
+
+
+def _by_group(file: McapFile) -> Iterable[list[Chunk]]:
+    """Return the whole chunks of each group of topics, all in one where one may hold topics of several."""
+    group_of = {number: topic_group(topic.name, topic.type) for number, topic in file.topics.items()}
+    found: dict[frozenset[int | None], list[Chunk]] = {}
+    for chunk in file.chunks:
+        if not file.is_damaged(chunk):
+            held = group_of.values() if chunk.channels is None else map(group_of.get, chunk.channels)
+            found.setdefault(frozenset(held), []).append(chunk)
+    if any(len(groups) > 1 for groups in found):
+        return [sorted(itertools.chain(*found.values()), key=lambda chunk: chunk.position)]
+    return found.values()
 
 
 def _lost_at_ends(recording: Recording, kept: tuple[int, int]) -> float:

@@ -3,13 +3,14 @@
 import contextlib
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from mcap.records import Attachment
 
 from engine_mount.recordings.bag.piece_topics import offers_of
-from engine_mount.recordings.container.stored import StoredTopic
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.container.stored import ACCOUNTS, StoredTopic
 from mount_recorder.bag_writer import LIBRARY, create_folder, file_entry
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE, McapWriter
 from mount_recorder.metadata import METADATA_NAME, TopicEntry, bag_description, embedded_record, metadata_text
@@ -74,10 +75,20 @@ class VerbatimBag:
         self.flush()
         self._container.add_metadata(name, values)
 
-    def add_attachment(self, attachment: Attachment) -> None:
-        """Add an attachment behind the messages so far."""
-        self.flush()
-        self._container.add_attachment(attachment)
+    def copy_beside_messages(self, recordings: Iterable[Recording]) -> None:
+        """Copy attachments, and records that are no account of a recording; what is equal once."""
+        records: list[tuple[str, dict[str, str]]] = []
+        attached: list[Attachment] = []
+        for file in (file for recording in recordings for file in recording.files):
+            for entry in file.records:
+                if entry[0] not in ACCOUNTS and entry not in records:
+                    records.append(entry)
+                    self.add_record(*entry)
+            for attachment in file.attachments():
+                if attachment not in attached:
+                    attached.append(attachment)
+                    self.flush()
+                    self._container.add_attachment(attachment)
 
     def flush(self) -> None:
         """Complete the chunk that is being filled."""

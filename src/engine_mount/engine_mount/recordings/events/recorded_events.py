@@ -1,18 +1,20 @@
-"""What happened in a recording: its marked events, and the switching of damping where none tell of it."""
+"""What happened in a recording: its marks, and the switching of damping where no mark tells of it."""
 
 import re
 from dataclasses import dataclass
 
-from engine_mount.recordings.bag.column_parts import column_parts
+import numpy as np
+
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.events.event_marks import Mark, read_marks
-from engine_mount.recordings.events.switching_trace import ArrivedSwitching
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.events.switching_changes import switching_places
+from engine_mount.recordings.messages.series import Series, SeriesError
 from engine_mount.recordings.messages.time_axis import TimeAxis
 from mount_recorder.topic_groups import registered_topic
+from mount_ros.messages.event import Mark, read_mark
 from mount_ros.topics import CONTROL_TRACE, EVENT
 
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
+_ACTIVE = 'damping_active'
 _NUMBERED = re.compile(r'(.+?):(\d+)')
 
 
@@ -85,16 +87,21 @@ def _plain(kind: str) -> str:
 def _switching(recording: Recording) -> list[RecordedEvent]:
     if CONTROL_TRACE.name not in recording:
         return []
-    trace = ArrivedSwitching()
     try:
-        for part in column_parts(recording, {CONTROL_TRACE.name: (trace.COLUMN,)}):
-            trace.add(part)
+        recording.load_columns({CONTROL_TRACE.name: (_ACTIVE,)})
+        trace = recording[CONTROL_TRACE.name]
+        stamps, received, active = trace.stamps, trace.receive_times, trace[_ACTIVE]
     except SeriesError:
         return []  # no control trace of ours
+    if not len(stamps):
+        return []
+    order = np.argsort(received, kind='stable')
+    seconds = (stamps[order] - stamps[order[0]]) / 1e9
+    switched = switching_places(seconds, active[order])
     return [
-        RecordedEvent(log_time, stamp, kind)
-        for kind, switched in zip((SWITCH_ON, SWITCH_OFF), trace.by_arrival(), strict=True)
-        for stamp, log_time in zip(switched.stamps.tolist(), switched.receive_times.tolist(), strict=True)
+        RecordedEvent(int(received[place]), int(stamps[place]), kind)
+        for kind, places in zip((SWITCH_ON, SWITCH_OFF), switched, strict=True)
+        for place in order[places].tolist()
     ]
 
 
@@ -108,3 +115,9 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     ]
     more = f' and {len(events) - 12} more' if len(events) > 12 else ''
     return f'it has {", ".join(shown)}{more}'
+
+
+def read_marks(events: Series) -> list[Mark]:
+    """Return the marks of a recording in the order in which they were set, from `recording['event']`."""
+    messages = zip(events.messages(), events.receive_times.tolist(), strict=True)
+    return [read_mark(message.data, received) for message, received in messages]

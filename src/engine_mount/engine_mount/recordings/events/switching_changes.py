@@ -2,7 +2,6 @@
 
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,31 +56,14 @@ def switching_times(time: Signal, active: Signal) -> tuple[Signal, Signal]:
     return time[on], time[off]
 
 
-class TimeAt(Protocol):
-    """Times in s, or what tells them at places of samples."""
-
-    def __getitem__(self, places: Places, /) -> Signal: ...
-
-
-def switching_places(time: TimeAt, active: Signal | NDArray[np.bool_]) -> tuple[Places, Places]:
+def switching_places(time: Signal, active: Signal) -> tuple[Places, Places]:
     """Return at which samples damping went on and off: where it is active, an opening of any width.
 
     So it counts as on where the coil carries current. A pause shorter than `PAUSE` is none.
     """
-    changes = changed_places(active > 0.0)
-    return without_pauses(time, changes[::2], changes[1::2])
-
-
-def changed_places(is_active: NDArray[np.bool_], before: bool = False) -> Places:
-    """Return where samples are active that the one before them is not, or the other way about.
-
-    `before` is the state before the first of them.
-    """
-    return np.flatnonzero(is_active != np.append(before, is_active)[: len(is_active)])
-
-
-def without_pauses(time: TimeAt, on: Places, off: Places) -> tuple[Places, Places]:
-    """Return the samples at which damping went `on` and `off` by turns, without pauses below `PAUSE`."""
+    is_active = active > 0.0
+    changes = np.flatnonzero(is_active != np.append(False, is_active)[: len(is_active)])
+    on, off = changes[::2], changes[1::2]
     pauses = time[on[1:]] - time[off[: len(on) - 1]] >= PAUSE if len(on) else np.zeros(0, bool)
     return on[np.append(True, pauses)[: len(on)]], off[np.append(pauses, True)[: len(off)]]
 

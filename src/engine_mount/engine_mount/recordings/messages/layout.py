@@ -1,33 +1,26 @@
-"""Where the numbers of a serialised message stand, so that thousands of equal messages are read at once.
+"""What stands where in a serialised message, so that thousands of equal messages are read at once.
 
-The walk follows the CDR encoding of the middleware: each number aligned to its own
+The reader follows the CDR encoding of the middleware: each number aligned to its own
 size counted from behind the 4-byte head, strings and sequences with a length of 4 bytes in front.
 Bytes between aligned numbers are undefined and never looked at.
 """
 
 import struct
 from dataclasses import dataclass, field
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import numpy as np
 
-from engine_mount.recordings.messages.definitions import Definition, element_of
+from engine_mount.recordings.messages.definitions import NUMBERS, STRING, Definition
 
 HEAD = 4  # bytes: kind of encoding and options
 OPTIONS = slice(2, HEAD)  # bytes of the head that say nothing of the content
-NUMBERS = {
-    'boolean': '<u1',
-    'octet': '<u1',
-    'char': '<u1',
-    'float': '<f4',
-    'double': '<f8',
-    **{f'{sign}int{bits}': f'<{sign or "i"}{bits // 8}' for sign in ('', 'u') for bits in (8, 16, 32, 64)},
-}
 _ORDERS: dict[bytes, Literal['<', '>']] = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
 
 class LayoutError(ValueError):
-    """A message cannot be read in place; the general deserialiser may still read it."""
+    """A message is not as its definition says."""
 
 
 @dataclass(frozen=True)
@@ -50,93 +43,99 @@ class Layout:
 
     numbers: dict[str, Numbers] = field(default_factory=dict)
     strings: dict[str, str] = field(default_factory=dict)
-    shape: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))  # bytes that fix the layout
+    shape: list[int] = field(default_factory=lambda: list(range(OPTIONS.start)))  # bytes that fix the layout
 
     def fits(self, messages: np.ndarray) -> bool:
         """Return whether all rows of `messages` (rows x bytes) have the strings and lengths of the first."""
-        return bool((messages[:, self.shape] == messages[0, self.shape]).all())
+        mask = np.zeros(messages.shape[1], np.uint8)
+        mask[self.shape] = 255
+        different = messages ^ messages[0]
+        different &= mask
+        return int(different.max(initial=0)) == 0
 
 
 def layout_of(raw: bytes, definition: Definition) -> Layout:
     """Return the layout of one serialised message; raises `LayoutError`."""
-    walk = _Walk(raw, definition)
+    return _read(raw, definition)[1]
+
+
+def decode(raw: bytes, definition: Definition) -> SimpleNamespace:
+    """Return the message in `raw` with its fields as attributes; raises `LayoutError`.
+
+    Sequences and arrays of numbers are NumPy arrays, all others are lists.
+    """
+    return _read(raw, definition)[0]
+
+
+def _read(raw: bytes, definition: Definition) -> tuple[SimpleNamespace, Layout]:
+    reader = _Reader(raw, definition)
     try:
-        walk.message('', definition.name)
+        return reader.message('', definition.name), reader.layout
     except (struct.error, UnicodeDecodeError, RecursionError):
         raise LayoutError(f'a message of {len(raw)} bytes is no {definition.name}') from None
-    if walk.position > len(raw):
-        raise LayoutError(f'a message of {len(raw)} bytes is too short for {definition.name}')
-    walk.layout.shape = np.array(walk.shape, np.int64)
-    return walk.layout
 
 
-def byte_order(raw: bytes) -> Literal['<', '>']:
-    """Return `<` or `>` of a plain CDR message; raises `LayoutError` for every other encoding."""
-    order = _ORDERS.get(raw[:2])
-    if order is None or len(raw) < HEAD:
-        raise LayoutError(f'a message that begins with {raw[:HEAD].hex() or "nothing"} is no plain CDR')
-    return order
-
-
-class _Walk:
+class _Reader:
     def __init__(self, raw: bytes, definition: Definition):
+        order = _ORDERS.get(raw[:2])
+        if order is None or len(raw) < HEAD:
+            raise LayoutError(f'a message that begins with {raw[:HEAD].hex() or "nothing"} is no plain CDR')
         self.layout = Layout()
-        self.shape: list[int] = list(range(HEAD - 2))
-        self.position = HEAD
-        self._raw = raw
-        self._definition = definition
-        self._order = byte_order(raw)
+        self._raw, self._definition, self._order, self._position = raw, definition, order, HEAD
 
-    def message(self, path: str, name: str) -> None:
-        for field_name, field_type in self._definition.types[name].items():
-            self.field(f'{path}.{field_name}' if path else field_name, field_type)
+    def message(self, path: str, name: str) -> SimpleNamespace:
+        fields = self._definition.types[name]
+        prefix = f'{path}.' if path else ''
+        return SimpleNamespace(**{key: self._field(prefix + key, *fields[key]) for key in fields})
 
-    def field(self, path: str, field_type: str) -> None:
-        element = element_of(field_type)
-        if field_type in NUMBERS:
-            self._numbers(path, field_type, 1)
-        elif field_type.split('<')[0] == 'string':
-            self.layout.strings[path] = self._string()
-        elif element != field_type:
-            fixed = not field_type.startswith('sequence<')
-            count = int(field_type[field_type.rindex('[') + 1 : -1]) if fixed else self._length()
-            self._elements(path, element, count)
-        elif '/' in field_type:
-            self.message(path, field_type)
-        else:
-            raise LayoutError(f'field {path} of type {field_type} cannot be read in place')
-
-    def _elements(self, path: str, element: str, count: int) -> None:
-        if element in NUMBERS:
-            self._numbers(path, element, count)
-            return
+    def _field(self, path: str, kind: str, length: int | None) -> Any:
+        if length is None:
+            return self._value(path, kind)
+        count = self._length() if length < 0 else length
+        if kind in NUMBERS:
+            return self._numbers(path, kind, count)
         if count > len(self._raw):
             raise LayoutError(f'field {path} claims {count} elements')
-        for place in range(count):
-            self.field(f'{path}[{place}]', element)
+        return [self._value(f'{path}[{place}]', kind) for place in range(count)]
 
-    def _numbers(self, path: str, field_type: str, count: int) -> None:
-        dtype = np.dtype(NUMBERS[field_type]).newbyteorder(self._order)
+    def _value(self, path: str, kind: str) -> Any:
+        if kind in NUMBERS:
+            number = self._numbers(path, kind, 1)[0].item()
+            return bool(number) if kind == 'bool' else number
+        if kind == STRING:
+            return self._string(path)
+        if '/' in kind:
+            return self.message(path, kind)
+        raise LayoutError(f'field {path} of type {kind} cannot be read')
+
+    def _numbers(self, path: str, kind: str, count: int) -> np.ndarray:
+        dtype = np.dtype(self._order + NUMBERS[kind])
         if count:
             self._align(dtype.itemsize)
-        self.layout.numbers[path] = Numbers(self.position, dtype, count)
-        self.position += count * dtype.itemsize
+        begin = self._position
+        self._advance(count * dtype.itemsize)
+        self.layout.numbers[path] = Numbers(begin, dtype, count)
+        return np.frombuffer(self._raw, dtype, count, begin) if count else np.empty(0, dtype)
 
-    def _string(self) -> str:
-        length = self._length()
-        begin, end = self.position, self.position + length
-        if end > len(self._raw):
-            raise LayoutError(f'a string claims {length} bytes')
-        self.shape.extend(range(begin, end))
-        self.position = end
-        return self._raw[begin : end - 1].decode() if length else ''
+    def _string(self, path: str) -> str:
+        length, begin = self._length(), self._position
+        self._advance(length)
+        self.layout.shape.extend(range(begin, self._position))
+        self.layout.strings[path] = text = self._raw[begin : self._position - 1].decode() if length else ''
+        return text
 
     def _length(self) -> int:
         self._align(4)
-        length = struct.unpack_from(f'{self._order}I', self._raw, self.position)[0]
-        self.shape.extend(range(self.position, self.position + 4))
-        self.position += 4
-        return length
+        begin = self._position
+        self._advance(4)
+        self.layout.shape.extend(range(begin, self._position))
+        return int(struct.unpack_from(f'{self._order}I', self._raw, begin)[0])
+
+    def _advance(self, size: int) -> None:
+        self._position += size
+        if self._position > len(self._raw):
+            name = self._definition.name
+            raise LayoutError(f'a message of {len(self._raw)} bytes is too short for {name}')
 
     def _align(self, size: int) -> None:
-        self.position += -(self.position - HEAD) % size
+        self._position += -(self._position - HEAD) % size

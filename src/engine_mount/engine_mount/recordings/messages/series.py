@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.messages.compact_times import CompactTimes, Times, compact
-from engine_mount.recordings.messages.decoding import decode
 from engine_mount.recordings.messages.definitions import Definition, installed_definition
-from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, layout_of
+from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
+from engine_mount.recordings.messages.times import NO_TIMES, Times
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
@@ -23,7 +22,6 @@ STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
 """Where the stamp stands in a message: paths, and places in their runs of numbers."""
 STAMP_BYTES = 8
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
-_STEP = re.compile(r'([^.\[\]]+)|\[(\d+)\]')
 
 
 class SeriesError(ValueError):
@@ -37,34 +35,38 @@ class Payloads:
         """Take them in pieces, each an array (messages x bytes) or a list."""
         widths = {piece.shape[1] if isinstance(piece, np.ndarray) else -1 for piece in pieces}
         self.rows: NDArray[np.uint8] | None = None
-        self._parts: list[bytes] = []
         if len(widths) == 1 and -1 not in widths:
-            self.rows = np.concatenate([np.asarray(piece) for piece in pieces])
-        else:
-            self._parts = [bytes(message) for piece in pieces for message in piece]
+            self.rows = np.concatenate(pieces)
+        self.messages: Any = self.rows
+        if self.rows is None:
+            self.messages = [bytes(message) for piece in pieces for message in piece]
 
     def __len__(self) -> int:
-        return len(self._parts) if self.rows is None else len(self.rows)
+        return len(self.messages)
 
     def __getitem__(self, index: int) -> bytes:
-        return self._parts[index] if self.rows is None else self.rows[index].tobytes()
+        return bytes(self.messages[index])
+
+    def chosen(self, places: NDArray[np.int64]) -> 'Payloads':
+        """Return the messages at `places`."""
+        found = [self[place] for place in places.tolist()] if self.rows is None else self.rows[places]
+        return Payloads([found])
 
 
 class Heads(NamedTuple):
-    """What is told of messages beside their bytes: when they came and were sent (ns), and their numbers.
+    """When messages were received and sent (ns), and the numbers that their publisher gave them.
 
-    Of chosen columns alone `sent` is empty: it is read with the messages.
+    `sent` is None where only columns were read.
     """
 
-    received: CompactTimes
-    sent: CompactTimes
-    sequences: CompactTimes
+    received: Times
+    sequences: NDArray[np.uint32]
+    sent: Times | None
 
 
 def heads_of(heads: np.ndarray) -> Heads:
-    """Return heads of dtype `HEAD` (n,) in little memory."""
-    columns = (heads[name].astype(np.int64) for name in ('log_time', 'publish_time', 'sequence'))
-    return Heads(*map(compact, columns))
+    """Return heads of dtype `HEAD` (n,) as columns."""
+    return Heads(*(np.ascontiguousarray(heads[name]) for name in ('log_time', 'sequence', 'publish_time')))
 
 
 class Series:
@@ -113,22 +115,23 @@ class Series:
     def __len__(self) -> int:
         return len(self._heads.received)
 
-    @functools.cached_property
+    @property
     def receive_times(self) -> Times:
         """When the messages came in, ns."""
-        return self._heads.received.whole()
+        return self._heads.received
 
-    @functools.cached_property
+    @property
     def publish_times(self) -> Times:
         """When the messages were sent, ns."""
-        if len(self._heads.sent) < len(self):
+        if self._heads.sent is None:
             self._read()
-        return self._heads.sent.whole()
+        assert self._heads.sent is not None
+        return self._heads.sent
 
-    @functools.cached_property
+    @property
     def sequences(self) -> NDArray[np.uint32]:
         """The numbers that the publisher gave the messages."""
-        return self._heads.sequences.whole().astype(np.uint32)
+        return self._heads.sequences
 
     @property
     def payloads(self) -> Payloads:
@@ -150,13 +153,13 @@ class Series:
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        layout, rows = self.layout, self.payloads.rows
-        if layout is None or rows is None:
-            return np.array([self._stamp(message) for message in self._decoded], np.int64)
-        if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
-            raise self._without_stamp()
-        seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
-        return seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows)
+        found = [NO_TIMES]
+        for layout, rows in self._layouts:
+            if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
+                raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+            seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
+            found.append(seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows))
+        return np.concatenate(found)
 
     @functools.cached_property
     def stamp_place(self) -> int | None:
@@ -169,10 +172,11 @@ class Series:
         except SeriesError:
             return None
         kind = definition.name
-        for field in _SECONDS.split('.'):  # each the first one of its kind
-            first, kind = next(iter(definition.types[kind].items()))
-            if first != field:
+        for name in _SECONDS.split('.'):  # each the first one of its kind
+            first, field = next(iter(definition.types[kind].items()))
+            if first != name:
                 return None
+            kind = field.kind
         return HEAD
 
     @functools.cached_property
@@ -194,17 +198,14 @@ class Series:
         """The names of the columns."""
         if not len(self):
             return self.registered.names if self.registered else ()
-        layout = self.layout
         if self.type != JOINT_STATE:
-            if layout is None:
+            if self.layout is None:
                 raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
-            return tuple(path for path, numbers in layout.numbers.items() if numbers.count == 1)
-        if layout is not None:
-            return tuple(text for path, text in layout.strings.items() if path.startswith('name['))
-        try:
-            return tuple(dict.fromkeys(str(name) for message in self._decoded for name in message.name))
-        except (AttributeError, TypeError):
-            raise SeriesError(f"{self.topic}: its definition of {self.type} has no list 'name'") from None
+            return tuple(path for path, numbers in self.layout.numbers.items() if numbers.count == 1)
+        if self.layout is not None:
+            return tuple(_names_in(self.layout))
+        self._check_part('name')
+        return tuple(dict.fromkeys(name for layout, _ in self._layouts for name in _names_in(layout)))
 
     def __getitem__(self, name: str) -> Column:
         """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
@@ -233,7 +234,7 @@ class Series:
         try:
             return decode(self.payloads[index], self._definition)
         except LayoutError as error:
-            raise SeriesError(f'{self.topic}: message {index} is no {self.type} ({error})') from None
+            raise self._no_message(index, error) from None
 
     def content(self, index: int) -> bytes:
         """Return the bytes of message `index` without its stamp and without the options of its encoding."""
@@ -249,15 +250,6 @@ class Series:
     def messages(self) -> Iterator[Any]:
         """Yield all messages."""
         return (self.message(index) for index in range(len(self)))
-
-    def _stamp(self, message: Any) -> int:
-        try:
-            return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        except AttributeError:  # of another type, or of a definition that is damaged
-            raise self._without_stamp() from None
-
-    def _without_stamp(self) -> SeriesError:
-        return SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
 
     def _scalars(self) -> tuple[Scalar, ...]:
         return self.registered.scalars if self.registered else ()
@@ -285,57 +277,55 @@ class Series:
         except ValueError as error:
             raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
 
+    @functools.cached_property
+    def _layouts(self) -> list[tuple[Layout, NDArray[np.uint8]]]:
+        """The common layout with all messages as rows; where they differ, the layout and row of each."""
+        if self.layout is not None and self.payloads.rows is not None:
+            return [(self.layout, self.payloads.rows)]
+        found = []
+        for place in range(len(self)):
+            raw = self.payloads[place]
+            try:
+                found.append((layout_of(raw, self._definition), np.frombuffer(raw, np.uint8)[None]))
+            except LayoutError as error:
+                raise self._no_message(place, error) from None
+        return found
+
+    def _no_message(self, place: int, error: LayoutError) -> SeriesError:
+        return SeriesError(f'{self.topic}: message {place} is no {self.type} ({error})')
+
+    def _check_part(self, part: str) -> None:
+        if part not in self._definition.types[self._definition.name]:
+            raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
+
     def _joint_column(self, name: str, part: str) -> Column:
         if name not in self.names:
-            raise SeriesError(
-                f'{self.topic} has no {name!r}; it has {", ".join(self.names) or "no messages"}'
-            )
-        layout, rows = self.layout, self.payloads.rows
-        if not len(self):
-            return np.empty(0)
-        if layout is None or rows is None:
-            try:
-                return np.array([_joint_number(message, name, part) for message in self._decoded])
-            except (AttributeError, TypeError, ValueError):
-                raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}') from None
-        numbers = layout.numbers.get(part)
-        if numbers is None:
-            raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
-        if numbers.count != len(self.names):
-            return np.full(len(self), math.nan)
-        return numbers.column(rows, self.names.index(name))
+            known = ', '.join(self.names) or 'no messages'
+            raise SeriesError(f'{self.topic} has no {name!r}; it has {known}')
+        if len(self):
+            self._check_part(part)
+        found = [np.empty(0)]
+        for layout, rows in self._layouts:
+            names, numbers = _names_in(layout), layout.numbers.get(part)
+            if numbers is not None and name in names and numbers.count == len(names):
+                found.append(numbers.column(rows, names.index(name)))
+            else:
+                found.append(np.full(len(rows), math.nan))
+        return np.concatenate(found)
 
     def _path_column(self, path: str) -> Column:
-        layout, rows = self.layout, self.payloads.rows
-        owner, place = _split_place(path)
-        if layout is not None and rows is not None:
+        match = re.fullmatch(r'(.*)\[(\d+)\]', path)
+        owner, place = (match[1], int(match[2])) if match else (path, 0)
+        found = [np.empty(0)]
+        for layout, rows in self._layouts:
             numbers = layout.numbers.get(path) or layout.numbers.get(owner)
-            if numbers is not None and place < numbers.count:
-                return numbers.column(rows, place).astype(np.float64)
-            raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
-        try:
-            return np.array([float(_at(message, path)) for message in self._decoded])
-        except (AttributeError, IndexError, TypeError, ValueError):
-            raise SeriesError(f'{self.topic}: not every message has a number {path!r}') from None
-
-    @functools.cached_property
-    def _decoded(self) -> list[Any]:
-        return list(self.messages())
+            if numbers is None or place >= numbers.count:
+                if self.layout is None:
+                    raise SeriesError(f'{self.topic}: not every message has a number {path!r}')
+                raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
+            found.append(numbers.column(rows, place).astype(np.float64))
+        return np.concatenate(found)
 
 
-def _joint_number(message: Any, name: str, part: str) -> float:
-    numbers = getattr(message, part)
-    if name not in message.name or len(numbers) != len(message.name):
-        return math.nan
-    return float(numbers[message.name.index(name)])
-
-
-def _split_place(path: str) -> tuple[str, int]:
-    match = re.fullmatch(r'(.*)\[(\d+)\]', path)
-    return (match[1], int(match[2])) if match else (path, 0)
-
-
-def _at(message: Any, path: str) -> Any:
-    for name, place in _STEP.findall(path):
-        message = getattr(message, name) if name else message[int(place)]
-    return message
+def _names_in(layout: Layout) -> list[str]:
+    return [text for path, text in layout.strings.items() if path.startswith('name[')]

@@ -1,13 +1,11 @@
 """The recording that a person means: its own folder or file, or the run folder that holds it."""
 
 import hashlib
-from collections.abc import Iterable
 from pathlib import Path
 
 from engine_mount.recordings.bag.recording import ReadingError, Recording, open_recording
-from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
-from engine_mount.recordings.container.mcap_reading.summary import hashed
-from engine_mount.recordings.container.stored import StoredFile
+
+_AT_ONCE = 1 << 20  # bytes, chosen
 
 
 def open_run(path: Path) -> Recording:
@@ -33,19 +31,15 @@ def recording_place(path: Path) -> Path:
     return inside if inside.is_dir() else path
 
 
-def recording_hash(path: Path, opened: Iterable[StoredFile] = ()) -> str:
+def recording_hash(path: Path) -> str:
     """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names.
 
-    Of a folder without any it is that of all its files. `opened` are files of it that are open: what is to
-    be read through of them for their own checksums is read in the same pass.
+    Of a folder without any it is that of all its files.
     """
-    known = {file.path: file for file in opened if isinstance(file, McapFile)}
     digest = hashlib.sha256()
     files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
-    parts = sorted(part for part in files if part.match('*.mcap*')) or sorted(files)
-    for part in parts:
-        if part in known:
-            known[part].hashed(digest)
-        else:
-            hashed(part, digest)
+    for part in sorted(part for part in files if part.match('*.mcap*')) or sorted(files):
+        with part.open('rb') as stream:
+            while content := stream.read(_AT_ONCE):
+                digest.update(content)
     return digest.hexdigest()

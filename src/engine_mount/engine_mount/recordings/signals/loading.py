@@ -4,10 +4,9 @@ from pathlib import Path
 
 from engine_mount.recordings.bag.recording import ReadingError, open_recording
 from engine_mount.recordings.signals.bag_field import read_field
-from engine_mount.recordings.signals.csv_file import read_csv
-from engine_mount.recordings.signals.json_file import read_json
 from engine_mount.recordings.signals.npy_file import read_npy
 from engine_mount.recordings.signals.signal import Signal, SignalError
+from engine_mount.recordings.signals.table import read_csv, read_json
 
 TABLES = {'.csv': read_csv, '.txt': read_csv, '.json': read_json}
 

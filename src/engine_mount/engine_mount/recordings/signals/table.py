@@ -1,5 +1,7 @@
-"""A table as a header and columns of numbers; whatever is no number is refused with its line."""
+"""A CSV or JSON file as a table of numbers; whatever is no number is refused with its line."""
 
+import csv
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -61,3 +63,31 @@ class Table:
             except (ValueError, IndexError, TypeError):
                 return f'{self.path}, line {line}: {",".join(map(str, row))!r} is not a line of numbers'
         raise AssertionError('there is no fault')
+
+
+def read_csv(path: Path) -> Table:
+    """Return the table in `path`; lines that begin with # are comments. Raises `SignalError`."""
+    with path.open(newline='', encoding='utf-8-sig', errors='replace') as stream:
+        reader = csv.reader(stream)
+        numbered = [(reader.line_num, row) for row in reader if row and not row[0].startswith('#')]
+    if len(numbered) < 2:
+        raise SignalError(f'{path} holds {len(numbered)} lines; needed are a header and the samples')
+    header = tuple(name.strip() for name in numbered[0][1])
+    return Table(path, header, [line for line, _ in numbered[1:]], [row for _, row in numbered[1:]])
+
+
+def read_json(path: Path) -> Table:
+    """Return the rows in `path`, the columns named by their numbers from 0 on. Raises `SignalError`."""
+    try:
+        rows = json.loads(path.read_text(encoding='utf-8'))['data']
+        widths = {len(row) for row in rows}
+    except (ValueError, KeyError, TypeError) as error:
+        raise SignalError(
+            f'{path} is no table ({error!r}); expected is {{"data": [[number, ...], ...]}}'
+        ) from None
+    if len(widths) != 1:
+        raise SignalError(
+            f'{path}: its {len(rows)} rows hold {", ".join(map(str, sorted(widths))) or "no"} numbers; all '
+            'must hold the same'
+        )
+    return Table(path, tuple(map(str, range(widths.pop()))), range(1, len(rows) + 1), rows)

@@ -42,16 +42,16 @@ def _install(file):
         module.Clock.now = stepped
 
     def change_control(module):
-        answer = module.Answering.answer
+        step = module.ControlLoop.step
 
-        def hanging(answering, stamp, displacement):
+        def hanging(loop, stamp, displacement):
             if pause := hang():
                 time.sleep(1e-9 * pause)
-            return answer(answering, stamp, displacement)
+            return step(loop, stamp, displacement)
 
-        module.Answering.answer = hanging
+        module.ControlLoop.step = hanging
 
-    changes = {'rclpy.clock': change_clock, 'mount_control.answering': change_control}
+    changes = {'rclpy.clock': change_clock, 'mount_control.control_loop': change_control}
     sys.meta_path.insert(0, _Finder(changes))
 
 

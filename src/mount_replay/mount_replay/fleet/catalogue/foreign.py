@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.messages.compact_times import compact
-from engine_mount.recordings.messages.packed_column import packed
 from engine_mount.recordings.signals.signal import SECOND, Signal
 from mount_models.sampling import SAMPLE_RATE
 from mount_replay.fleet.catalogue.columns import FOREIGN
@@ -83,5 +81,5 @@ def _of(signals: Mapping[str, Signal]) -> Figures:
         return {'rms_acceleration_m_s2': float(np.std(values))}
     return {
         'samples': values.size,
-        **motion_figures(compact(channels[0].stamps), packed(values), SAMPLE_RATE),
+        **motion_figures(channels[0].stamps, values, SAMPLE_RATE),
     }

@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.container.free_memory import give_back
 from engine_mount.recordings.events.recorded_events import event_time, recorded_events
 from engine_mount.recordings.messages.series import SeriesError
-from engine_mount.recordings.run.session import session_parameters
-from engine_mount.recordings.run.told import duration_of, started_of, told_session, versions_told
+from engine_mount.recordings.run.session import (
+    duration_of,
+    session_parameters,
+    started_of,
+    told_session,
+    versions_told,
+)
 from engine_mount.settings.changes import changed_parameters
 from mount_bringup.chosen import Parameters
 from mount_replay.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
@@ -44,7 +48,6 @@ def rows_of(recording: Recording, path: Path, place: Place) -> Rows:
     """Return the rows of a recording, which lies at `path`, one for each of its mounts."""
     rows = Rows()
     for part in recording.by_mount():
-        give_back()
         reasons: list[str] = []
         row = {**place_of(place), 'mount': part.mount, 'messages': recording.message_count}
         content = told_session(part)
@@ -128,7 +131,6 @@ def _guarded(part: Recording, reasons: list[str], events: list[Row], row: Row) -
     try:
         figures, audits = lost_figures(part)
         yield figures
-        give_back()
         yield state_figures(part, audits)
         events += _events_of(part, row)
     except (ReadingError, SeriesError, ValueError, KeyError, IndexError) as error:

@@ -20,8 +20,8 @@ from engine_mount.recordings.signals.signal import signal_of
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.chosen import control_parameters
 from mount_bringup.settings import checked_settings, defaults_of_nodes
+from mount_control.control_loop import SampleCounts
 from mount_control.policy.contract import Policy, trace_dtype
-from mount_control.sample_watch import SampleCounts
 from mount_init.initialisation import InitialisationResult
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type

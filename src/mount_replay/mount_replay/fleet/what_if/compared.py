@@ -46,7 +46,7 @@ class Recorded:
 
 def recorded_in(recording: Recording) -> Recorded:
     """Read what a recording says beside its samples, not the whole of it; raises a `ValueError`."""
-    recording.load_alone(topic.name for topic in _SELDOM if topic.name in recording)
+    recording.load(topic.name for topic in _SELDOM if topic.name in recording)
     notes = Notes()
     session = session_of(recording, notes)
     return Recorded(recording, session, parameters_of(session, notes))

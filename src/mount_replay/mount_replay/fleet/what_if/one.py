@@ -98,7 +98,7 @@ def _rows(asked: Place, path: Path, changes: Changes, closed_loop: bool, said: S
         return [unread | _without_figures(error, asked, path)]
     if opened is None:
         return [_foreign_row(asked, path, changes, closed_loop, said)]
-    whole = functools.cache(lambda: recording_hash(opened.path, opened.files))  # once, and where it is needed
+    whole = functools.cache(lambda: recording_hash(opened.path))  # once, and where it is needed
     rows = []
     for recording in opened.by_mount():
         row: Row = {'mount': recording.mount}

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from mount_driver.protocol import Status
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim.electronics.electronics import Reading
 from mount_sim.electronics.faults import frames
@@ -52,19 +51,11 @@ def _drifting(fault: Fault, displacement: float) -> float:
     return displacement + fault.drift
 
 
-def _ripple_missing(fault: Fault, reading: Reading) -> Reading:
-    return reading._replace(current_rate=math.nan, flux_rate=math.nan)
-
-
 def _ripple_noisy(fault: Fault, reading: Reading) -> Reading:
     current, flux = 1.0 + _RIPPLE_NOISE * math.sqrt(0.5) * fault.random.normal(1, 2)[0]
     return reading._replace(
         current_rate=float(current) * reading.current_rate, flux_rate=float(flux) * reading.flux_rate
     )
-
-
-def _ripple_scaled(fault: Fault, reading: Reading) -> Reading:
-    return reading._replace(current_rate=_RIPPLE_SCALE * reading.current_rate)
 
 
 def _reported(meaning: str, **status: Any) -> Kind:
@@ -80,10 +71,6 @@ def _supply(meaning: str, volts: float) -> Kind:
     return Kind(meaning, status=lambda _, sound: sound._replace(supply_voltage=volts), plant=plant)
 
 
-def _current(meaning: str, current: Callable[[Fault, float], float]) -> Kind:
-    return Kind(meaning, current=current)
-
-
 def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
     """Half of the resistance, a quarter of the inductance and of the force."""
     return plant._replace(
@@ -95,10 +82,6 @@ def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
 def _coil_hot(fault: Fault, plant: 'Plant') -> 'Plant':
     celsius = REFERENCE_CELSIUS + _HOTTER / (plant.temperature.copper or TemperatureCoefficients().copper)
     return plant._replace(electronics=plant.electronics._replace(coil_temperature=fault.keep(celsius)))
-
-
-def _hot_status(fault: Fault, status: Status) -> Status:
-    return status._replace(coil_temperature_celsius=fault.kept)
 
 
 def _mechanics(meaning: str, *, scale: float | None = None, **changes: float) -> Kind:
@@ -165,21 +148,29 @@ FAULTS: dict[str, Kind] = {
         'displacements have the wrong sign from the next beyond 0.6 mm on', _flipped
     ),
     'displacement_drifting': _displacement("the displacement sensor's zero moves by 1 mm/s", _drifting),
-    'ripple_missing': Kind('the ripple measurement gives nothing', reading=_ripple_missing),
+    'ripple_missing': Kind(
+        'the ripple measurement gives nothing',
+        reading=lambda _, sound: sound._replace(current_rate=math.nan, flux_rate=math.nan),
+    ),
     'ripple_noisy': Kind('the slopes of the ripple scatter by 20 %', reading=_ripple_noisy),
-    'ripple_scale': Kind('the slope of the current is read 30 % too high', reading=_ripple_scaled),
-    'coil_open': _current('the coil carries no current', lambda *_: 0.0),
+    'ripple_scale': Kind(
+        'the slope of the current is read 30 % too high',
+        reading=lambda _, sound: sound._replace(current_rate=_RIPPLE_SCALE * sound.current_rate),
+    ),
+    'coil_open': Kind('the coil carries no current', current=lambda *_: 0.0),
     'coil_shorted': Kind('half of the turns are shorted', plant=_coil_shorted),
     'coil_hot': Kind(
         'coil and core at 122.6 degC: 40 % more resistance, and reported',
-        status=_hot_status,
+        status=lambda fault, sound: sound._replace(coil_temperature_celsius=fault.kept),
         plant=_coil_hot,
         on_bus=True,
     ),
-    'coil_half': _current('the coil carries half of the wanted current', lambda _, wanted: _HALF * wanted),
-    'coil_stuck': _current('the coil carries 3 A, whatever is wanted', lambda *_: HIGHEST_CURRENT),
-    'coil_stuck_on': _current(
-        'the coil keeps the current that was wanted, also when it is switched off', Fault.keep
+    'coil_half': Kind(
+        'the coil carries half of the wanted current', current=lambda _, wanted: _HALF * wanted
+    ),
+    'coil_stuck': Kind('the coil carries 3 A, whatever is wanted', current=lambda *_: HIGHEST_CURRENT),
+    'coil_stuck_on': Kind(
+        'the coil keeps the current that was wanted, also when it is switched off', current=Fault.keep
     ),
     'supply_0': _supply('no supply, and reported', 0.0),
     'supply_5': _supply('supply of 5 V, and reported', 5.0),

@@ -5,12 +5,13 @@ byte to the last. The message indexes behind a chunk carry no checksum: they are
 begin, and taken only if the records found there leave no byte unexplained.
 """
 
+import functools
 import mmap
 import re
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import zstandard
@@ -40,6 +41,11 @@ LENGTH_BESIDES_PAYLOAD = MESSAGE_HEAD.itemsize - RECORD.size  # of a message rec
 _HEAD = struct.Struct('<QQQII')  # start, end, unpacked size, checksum, length of the compression's name
 _SIZE = struct.Struct('<Q')
 _INDEX = struct.Struct('<HI')  # channel, length of the entries
+_INDEX_HEAD = struct.Struct('<QQQQI')  # start, end, position, length of the record, length of the places
+_PLACE = struct.Struct('<HQ')  # channel, position of its message index
+_INDEX_SIZES = struct.Struct('<QI')  # length of the message indexes, of the compression's name
+_TWO_SIZES = struct.Struct('<QQ')  # packed, unpacked
+_NEVER = 0xFFFFFFFF  # chosen: of bytes that are 0 the checksum is another
 SHORTEST_CHUNK = RECORD.size + _HEAD.size + _SIZE.size
 """Bytes of a chunk record without compression and messages."""
 CRC_PLACE = RECORD.size + 3 * _SIZE.size
@@ -49,9 +55,6 @@ _PLAIN = re.compile(rb'\x06(?=.{4}\x00{4})', re.DOTALL)
 LARGEST_CHUNK = 1 << 32
 """Bytes in a chunk; more is a damaged length."""
 _MAGICS = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
-
-
-_NONE: Mapping[int, int] = {}  # one for all chunks: a long recording has very many
 
 
 @dataclass(slots=True)
@@ -67,15 +70,17 @@ class Chunk:
     start_time: int
     end_time: int
     index_length: int = 0  # bytes of the message indexes behind it, as a sound summary tells them
+    indexes: bytes = b''  # channels and positions of their message indexes, as a sound summary tells them
     channels: frozenset[int] | None = None  # those with messages, None where no reliable source tells
-    counts: Mapping[int, int] = field(default_factory=lambda: _NONE)  # messages by channel, once explored
-    declarations: tuple[tuple[int, bytes], ...] = ()  # of schemas and channels, once explored
-    explored: bool = False
 
     @property
     def end(self) -> int:
         """The end of the record in the file."""
         return self.ends[0]
+
+    def holds(self, channels: Collection[int]) -> bool:
+        """Return whether there may be messages of one of `channels`."""
+        return self.channels is None or not self.channels.isdisjoint(channels)
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,38 @@ class Contents:
     messages: StoredMessages
     declarations: tuple[tuple[int, bytes], ...] = ()
     whole: bool = True  # whether the records explain every byte
+
+
+def indexed_chunk(data: mmap.mmap, content: bytes) -> Chunk | None:
+    """Return the chunk of which the content of a chunk index tells, None if that cannot be."""
+    try:
+        start, last, position, length, size = _INDEX_HEAD.unpack_from(content)
+        at = _INDEX_HEAD.size + size
+        indexes = content[_INDEX_HEAD.size : at]
+        channels = _channels(indexes[:: _PLACE.size], indexes[1 :: _PLACE.size])
+        index_length, name_length = _INDEX_SIZES.unpack_from(content, at)
+        at += _INDEX_SIZES.size
+        name = content[at : at + name_length].decode()
+        packed, unpacked = _TWO_SIZES.unpack_from(content, at + name_length)
+    except (struct.error, UnicodeDecodeError):
+        return None
+    end = position + length
+    begin = end - packed
+    if len(indexes) % _PLACE.size or begin < position + SHORTEST_CHUNK:
+        return None
+    if end > len(data) or unpacked > LARGEST_CHUNK:
+        return None
+    crc = int.from_bytes(data[position + CRC_PLACE : position + CRC_PLACE + 4], 'little')
+    if not crc and data[position] != Opcode.CHUNK:
+        crc = _NEVER  # as in the hole of an outline
+    known = channels if index_length else None
+    return Chunk(position, begin, (end,), unpacked, crc, name, start, last, index_length, indexes, known)
+
+
+@functools.lru_cache(maxsize=256)
+def _channels(low: bytes, high: bytes) -> frozenset[int]:
+    """Return the channels with these bytes: one set for the very many chunks of a long recording."""
+    return frozenset(first | second << 8 for first, second in zip(low, high, strict=False))
 
 
 def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
@@ -111,6 +148,15 @@ def partial_chunk(data: mmap.mmap, position: int) -> Chunk | None:
         return None
     name = data[begin - _SIZE.size - name_length : begin - _SIZE.size].decode(errors='replace')
     return Chunk(position, begin, (len(data),), size, crc, name, start, last)
+
+
+def gaps(chunks: Sequence[Chunk], begin: int, end: int) -> list[tuple[int, int]]:
+    """Return the stretches from `begin` to `end` without chunks and their message indexes.
+
+    There is one before each chunk and one behind the last; bytes of the file.
+    """
+    behind = [begin, *(chunk.end + chunk.index_length for chunk in chunks)]
+    return list(zip(behind, [*(chunk.position for chunk in chunks), end], strict=True))
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
@@ -141,7 +187,7 @@ def left_out(chunk: Chunk) -> str:
 def contents_of(data: mmap.mmap, chunk: Chunk) -> Contents | None:
     """Return what is in a chunk, None if it is damaged."""
     for end in chunk.ends:
-        content = _unpacked(data[chunk.begin : end], chunk)
+        content = unpacked(data[chunk.begin : end], chunk)
         if content is not None:
             chunk.ends = (end,)
             contents = _indexed(data, chunk, content) or records_in(content)
@@ -150,20 +196,33 @@ def contents_of(data: mmap.mmap, chunk: Chunk) -> Contents | None:
     return None
 
 
-def explore(data: mmap.mmap, chunk: Chunk) -> bool:
-    """Note in a chunk what its messages say of channels, counts and times; False if it is damaged."""
-    if chunk.explored:
-        return True
-    contents = contents_of(data, chunk)
-    if contents is None:
-        return False
-    chunk.explored = True
-    chunk.counts, chunk.declarations = contents.messages.counts(), contents.declarations
-    chunk.channels = frozenset(chunk.counts)
-    if chunk.counts:
-        times = contents.messages.heads['log_time']
-        chunk.start_time, chunk.end_time = int(times.min()), int(times.max())
-    return True
+def proven_messages(
+    data: mmap.mmap, chunks: Iterable[Chunk], wanted: Collection[int]
+) -> StoredMessages | None:
+    """Return the messages of `wanted` channels in chunks of a file whose checksum vouches for all bytes.
+
+    Their message indexes are then to be believed. None where a chunk is not as its head and they tell.
+    """
+    contents, offsets, begin = [], [], 0
+    for chunk in chunks:
+        content = unpacked(data[chunk.begin : chunk.end], chunk, check=False)
+        if content is None:
+            return None
+        for channel, position in _PLACE.iter_unpack(chunk.indexes):
+            if channel in wanted:
+                offsets.append(_index_entries(data, position) + begin)
+        contents.append(content)
+        begin += len(content)
+    joined = b''.join(contents)
+    found = np.concatenate([np.empty(0, np.int64), *offsets])
+    found.sort()
+    if found.size and not 0 <= found[0] <= found[-1] <= begin - MESSAGE_HEAD.itemsize:
+        return None
+    together = np.frombuffer(joined, np.uint8)
+    records = _record_heads(together, found)
+    messages = _messages(together, found, records)
+    sound = (records['opcode'] == Opcode.MESSAGE).all() and (messages.ends <= begin).all()
+    return messages if sound and (messages.begins <= messages.ends).all() else None
 
 
 def records_in(content: bytes) -> Contents:
@@ -201,8 +260,11 @@ def _extents(chunk: Chunk) -> set[int]:
     return {end - chunk.begin for end in chunk.ends}
 
 
-def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
-    """Return the unpacked bytes if they are the ones that were written, as far as the file can prove it."""
+def unpacked(packed: bytes, chunk: Chunk, *, check: bool = True) -> bytes | None:
+    """Return the unpacked bytes if they are the ones that were written, as far as the file can prove it.
+
+    Without `check` only their length is compared.
+    """
     kind = chunk.compression
     if chunk.crc and kind not in ('', 'zstd', 'lz4'):
         kind = _MAGICS.get(packed[:4], '')  # a damaged name: the checksum decides
@@ -210,7 +272,7 @@ def _unpacked(packed: bytes, chunk: Chunk) -> bytes | None:
         content = _unpack(packed, kind, min(chunk.size, unpacking_limit(len(packed))))
     except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError):
         return None
-    sound = zlib.crc32(content) == chunk.crc if chunk.crc else len(content) == chunk.size
+    sound = zlib.crc32(content) == chunk.crc if check and chunk.crc else len(content) == chunk.size
     return content if sound else None
 
 
@@ -250,18 +312,26 @@ def _indexed(data: mmap.mmap, chunk: Chunk, content: bytes) -> Contents | None:
 
 def _index_offsets(data: mmap.mmap, position: int) -> Offsets:
     """Return the offsets in all message index records from `position` on, sorted."""
-    found = []
+    found = [np.empty(0, np.int64)]
     while position + RECORD.size + _INDEX.size <= len(data):
         opcode, length = RECORD.unpack_from(data, position)
-        begin = position + RECORD.size
-        if opcode != Opcode.MESSAGE_INDEX or begin + length > len(data) or length < _INDEX.size:
+        if opcode != Opcode.MESSAGE_INDEX or not len(entries := _index_entries(data, position)):
             break
-        size = _INDEX.unpack_from(data, begin)[1]
-        if size != length - _INDEX.size or size % 16:
-            break
-        found.append(np.frombuffer(data, '<i8', size // 8, begin + _INDEX.size)[1::2])
-        position = begin + length
-    return np.sort(np.concatenate(found)) if found else np.empty(0, np.int64)
+        found.append(entries)
+        position += RECORD.size + length
+    return np.sort(np.concatenate(found))
+
+
+def _index_entries(data: mmap.mmap, position: int) -> Offsets:
+    """Return the offsets in the message index record at `position`, none where it is no sensible one."""
+    if position + RECORD.size + _INDEX.size > len(data):
+        return np.empty(0, np.int64)
+    _, length = RECORD.unpack_from(data, position)
+    begin = position + RECORD.size + _INDEX.size
+    size = _INDEX.unpack_from(data, begin - _INDEX.size)[1]
+    if size != length - _INDEX.size or size % 16 or begin + size > len(data):
+        return np.empty(0, np.int64)
+    return np.frombuffer(data, '<i8', size // 8, begin)[1::2]
 
 
 def _record_heads(data: Bytes, offsets: Offsets) -> np.ndarray:

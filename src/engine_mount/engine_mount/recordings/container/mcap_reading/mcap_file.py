@@ -1,7 +1,7 @@
 """Reads one MCAP file as far as it is proven whole: complete, cut off by a crash, or damaged in places.
 
 Where the summary at the end is sound, it says where the chunks stand, and these are unpacked when a topic
-is asked for. Where it is not, the file is searched (`Search`).
+is read. Where it is not, the file is searched (`Salvage`).
 """
 
 import mmap
@@ -11,63 +11,60 @@ from pathlib import Path
 import numpy as np
 from mcap.records import Attachment, Statistics
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 
-from engine_mount.recordings.container.mcap_reading.chunk_index import can_be_there, take_checksums
-from engine_mount.recordings.container.mcap_reading.chunk_table import Places
 from engine_mount.recordings.container.mcap_reading.chunks import (
     RECORD,
     Chunk,
     Contents,
     contents_of,
+    gaps,
     left_out,
+    proven_messages,
     scattered_chunks,
 )
-from engine_mount.recordings.container.mcap_reading.declarations import Declarations
-from engine_mount.recordings.container.mcap_reading.passing import passing
-from engine_mount.recordings.container.mcap_reading.search import Search, Stretch
+from engine_mount.recordings.container.mcap_reading.salvage import Salvage, Stretch
 from engine_mount.recordings.container.mcap_reading.summary import (
-    Hash,
     Proof,
     Summary,
-    covered,
     data_proof,
-    hashed,
     parsed_attachment,
     read_summary,
 )
-from engine_mount.recordings.container.mcap_reading.tally import Tally
-from engine_mount.recordings.container.mcap_reading.unpacker import Unpacker
-from engine_mount.recordings.container.mcap_reading.walk import Walk
-from engine_mount.recordings.container.message_compression import plain
-from engine_mount.recordings.container.stored import ACCOUNTS, StorageError, StoredMessages
-from engine_mount.recordings.container.whole_files import COMPRESSED_SUFFIXES, FileError, mapped
+from engine_mount.recordings.container.mcap_reading.walk import Declarations, Walk
+from engine_mount.recordings.container.stored import (
+    ACCOUNTS,
+    StorageError,
+    StoredFile,
+    StoredMessages,
+    united,
+)
+from engine_mount.recordings.container.unpacking import mapped, plain, release, unpacking_limit
+
+_AT_ONCE = 1 << 20  # bytes of chunks that are unpacked together, chosen
 
 
-class McapFile:
+class McapFile(StoredFile):
     """Topics, metadata and messages of one file; what is wrong with it stands in `warnings`."""
 
+    _times: tuple[int, int] | None
+
     def __init__(self, path: Path):
-        self.path = path
-        self.warnings: list[str] = []
-        self.lost_beside: list[str] = []  # names of metadata and attachments
+        super().__init__(path)
         self.unexplained: list[Stretch] = []  # what is neither a chunk nor a record that is understood
         self.tail: Chunk | None = None  # begun at the end of the file, cut off before its own
         self._damaged: set[int] = set()  # positions of chunks
         self._undeclared = 0  # messages whose topic is not known
-        self._tally = Tally()
         self._data = _opened(path)
         self._data_proof: Proof | None = None
-        self._crc: int | None = None  # of the data section, once it was taken
         summary = read_summary(self._data)
         self._summary_proof, self._summary_begin = summary.proof, summary.begin
-        if _is_enough(summary, len(self._data)):
+        if _is_enough(summary):
             self._take_summary(summary)
         else:
             self._take_found()
-        self.topics = self._declared.topics()
         self.metadata, self.records = self._walk.metadata, self._walk.records
-        self._checksums_differ = bool(self.chunks.unprotected and self.chunks.protected)
+        self._unprotected_chunks = sum(chunk.size > 0 and not chunk.crc for chunk in self.chunks)
+        self._checksums_differ = self._unprotected_chunks > 0 and any(chunk.crc for chunk in self.chunks)
         self._note_missing_checksums()
 
     @property
@@ -90,33 +87,31 @@ class McapFile:
         """Whether messages are known to be lost or may be wrong inside of it, not only at a cut-off end."""
         return self._doubtful or bool(self._undeclared) or bool(self._damaged)
 
-    def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by topic: as written where that is proven, else as readable."""
-        return dict(self._tally.counts)
-
-    def time_range(self) -> tuple[int, int] | None:
-        """Return the earliest and the latest log time (ns), None for a file without messages."""
-        return self._tally.times
-
     def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
-        """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
-        self.data_proof()
         wanted = np.array(sorted(topics), np.int64)
-        for places in self.passing(self.chunks.holding(topics)):
-            for place in places.tolist():
-                yield from self.messages_in(place, wanted)
-        found = self._walk.loose_messages().of(wanted)
-        if len(found):
-            yield plain(found)
+        chunks = [chunk for chunk in self.chunks if chunk.holds(topics)]
+        proven = self.data_proof() is Proof.SOUND and self.proven and not self._damaged
+        for group in _groups(chunks):
+            found = None
+            if proven and all(chunk.channels is not None for chunk in group):
+                found = proven_messages(self._data, group, topics)
+            for messages in [found] if found is not None else self._messages_in(group):
+                wanted_ones = messages.of(wanted)
+                if len(wanted_ones):
+                    yield plain(wanted_ones)
+            release(self._data)
+        loose = self._walk.loose_messages().of(wanted)
+        if len(loose):
+            yield plain(loose)
 
-    def messages_in(self, place: int, wanted: NDArray[np.int64]) -> Iterator[StoredMessages]:
-        """Yield the messages of the topics `wanted` in one chunk together, if there are any."""
-        contents = self.contents(self.chunks[place])
-        if contents is not None and len(found := contents.messages.of(wanted)):
-            yield plain(found)
+    def _messages_in(self, chunks: list[Chunk]) -> Iterator[StoredMessages]:
+        """Yield the messages of chunks, each proven by itself."""
+        for chunk in chunks:
+            contents = self.contents(chunk)
+            if contents is not None:
+                yield contents.messages
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield the attachments, without those that are damaged."""
         for begin, end in self._walk.attachments:
             attachment = parsed_attachment(self._data[begin + RECORD.size : end])
             if attachment is not None:
@@ -137,49 +132,19 @@ class McapFile:
             self._warn(f'the chunk at byte {chunk.position} ends with what is no record')
         return contents
 
-    @property
-    def plain(self) -> bool:
-        """Whether a checksum vouches for all of it, and its messages are in chunks that tell their topics."""
-        if not self.proven or self._walk.loose or self.data_proof() is not Proof.SOUND:
-            return False
-        return not self._damaged and self.chunks.plain
-
-    @property
-    def has_loose_messages(self) -> bool:
-        """Whether messages stand beside the chunks."""
-        return bool(self._walk.loose)
-
     def is_damaged(self, chunk: Chunk) -> bool:
         """Return whether a chunk is known to be damaged; others are taken for sound until they are read."""
         return chunk.position in self._damaged
 
-    def unpacker(self) -> Unpacker:
-        """Return what unpacks the chunks of a `plain` file, which need no checksum of their own."""
-        return Unpacker(self._data, self.chunks)
-
-    def passing(self, places: Places) -> Iterator[Places]:
-        """Yield the numbers of chunks, near ones together; little of the file is in memory at once."""
-        return passing(self._data, self.chunks, places)
-
     def data_proof(self) -> Proof:
         """Read the whole file once and return what its checksum says; with a warning if it is wrong."""
         if self._data_proof is None:
-            self._data_proof = data_proof(self._data, self._section_end, self._crc)
+            end = self._summary_begin if self.proven else self._walk.data_end
+            self._data_proof = data_proof(self._data, end)
             if self._data_proof is Proof.WRONG:
                 values = ', and numbers in it may be wrong' if self._unprotected else ''
                 self._warn(f'the checksum of its data section is wrong: some byte is damaged{values}')
         return self._data_proof
-
-    def hashed(self, digest: Hash) -> None:
-        """Let `digest` take all bytes of the file; `data_proof` then needs no pass of its own."""
-        packed = self.path.suffix in COMPRESSED_SUFFIXES  # as a whole: its bytes are others than those read
-        end = 0 if packed else covered(self._section_end)
-        crc = hashed(self.path, digest, end)
-        self._crc = crc if end > 0 else None
-
-    @property
-    def _section_end(self) -> int:
-        return self._summary_begin if self.proven else self._walk.data_end
 
     @property
     def _doubtful(self) -> bool:
@@ -193,19 +158,23 @@ class McapFile:
     @property
     def _unprotected(self) -> bool:
         """Whether it has messages that no checksum of a chunk covers."""
-        return bool(self._walk.loose) or self.chunks.unprotected > 0
+        return bool(self._walk.loose) or self._unprotected_chunks > 0
 
     def _take_summary(self, summary: Summary) -> None:
         """Take what a summary tells that is sound and enough."""
         self.chunks = summary.chunks
-        for places in self.passing(np.arange(len(self.chunks))):
-            take_checksums(np.frombuffer(self._data, np.uint8), self.chunks.rows[places[0] : places[-1] + 1])
-        self._declared = Declarations(summary.channels, summary.schemas)
-        self._walk = Walk(self._data, self._declared, self._warn)
-        self._walk_between_chunks(summary.begin)
+        self._walk = Walk(self._data, self._warn)
+        self._walk.declared = Declarations(summary.channels, summary.schemas)
+        self.topics = self._walk.declared.topics()
+        for begin, limit in gaps(self.chunks, len(MCAP0_MAGIC), summary.begin):
+            if begin < limit:
+                self._walk.through(begin, limit)
+        # A file with chunks has its messages there; a record that says otherwise needs a proof.
+        if self._walk.loose and self.chunks and self.data_proof() is not Proof.SOUND:
+            self._walk.drop_loose()
         self._closed = True
         if (statistics := summary.statistics) is not None:
-            self._tally.counts = dict(statistics.channel_message_counts)
+            self._counts = dict(statistics.channel_message_counts)
             self._take_times(statistics)
         for index in summary.beside:
             if index.offset not in self._walk.beside_at and index.name not in ACCOUNTS:
@@ -214,33 +183,30 @@ class McapFile:
         if self._data[-len(MCAP0_MAGIC) :] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
 
-    def _walk_between_chunks(self, summary_begin: int) -> None:
-        begins, limits = self.chunks.gaps(len(MCAP0_MAGIC), summary_begin)
-        for place in np.flatnonzero(begins < limits):
-            self._walk.through(int(begins[place]), int(limits[place]))
-        # A file with chunks has its messages there; a record that says otherwise needs a proof.
-        if self._walk.loose and self.chunks and self.data_proof() is not Proof.SOUND:
-            self._walk.drop_loose()
-
     def _take_times(self, statistics: Statistics) -> None:
         """Take the times of the chunks, which are nearer to the messages than the statistics of the file."""
-        self._tally.times = self.chunks.times
+        for chunk in self.chunks:
+            # Without indexes, whether a chunk holds messages shows in its times alone.
+            if chunk.channels or (chunk.channels is None and chunk.end_time > 0):
+                self._times = united(self._times, (chunk.start_time, chunk.end_time))
         if self._walk.loose:
-            self._tally.widen(self._walk.loose_messages())
-        told = statistics.message_start_time, statistics.message_end_time
-        if self._tally.times is not None and told != self._tally.times:
+            self._times = united(self._times, self._walk.loose_messages().time_range())
+        stated = statistics.message_start_time, statistics.message_end_time
+        if self._times is not None and stated != self._times:
             self._warn('its statistics tell of other times than its chunks; believed are the chunks')
 
     def _take_found(self) -> None:
         """Take what a search finds."""
         damaged = self._summary_proof is Proof.WRONG
-        found = Search(self._data, self._warn, damaged_summary=damaged)
+        found = Salvage(self._data, self._warn, damaged_summary=damaged)
         self.chunks, self.tail, self.unexplained = found.chunks, found.tail, found.unexplained
-        self._declared, self._walk, self._tally = found.declared, found.walk, found.tally
+        self.topics, self._walk = found.declared.topics(), found.walk
+        self._counts = found.counts
+        self._times = found.times
         self._closed, self._damaged, self._undeclared = found.closed, found.damaged, found.undeclared
 
     def _note_missing_checksums(self) -> None:
-        without = self.chunks.unprotected
+        without = self._unprotected_chunks
         if without:
             what = f'{without} of its {len(self.chunks)} chunks carry no checksum'
             why = 'while others do' if self._checksums_differ else 'as their writer chose'
@@ -252,12 +218,12 @@ class McapFile:
         self.warnings.append(f'{self.path.name}: {sentence}')
 
 
-def _is_enough(summary: Summary, size: int) -> bool:
-    """Return whether the summary of a file of so many bytes is sound and tells all that is asked of it."""
+def _is_enough(summary: Summary) -> bool:
+    """Return whether a summary is sound and tells all that is needed of it."""
     statistics = summary.statistics
     if summary.proof is not Proof.SOUND or statistics is None:
         return False
-    if statistics.chunk_count != len(summary.chunks) or not can_be_there(summary.chunks, size):
+    if statistics.chunk_count != len(summary.chunks):
         return False
     if statistics.channel_count > len(summary.channels) or statistics.schema_count > len(summary.schemas):
         return False  # not repeated in the summary
@@ -265,13 +231,23 @@ def _is_enough(summary: Summary, size: int) -> bool:
 
 
 def _opened(path: Path) -> mmap.mmap:
-    try:
-        data = mapped(path)
-    except FileError as error:
-        raise StorageError(str(error)) from None
+    data = mapped(path)
     if data[: len(MCAP0_MAGIC)] == MCAP0_MAGIC:
         return data
     known = read_summary(data).proof is Proof.SOUND or next(scattered_chunks(data), None) is not None
     if not known:
         raise StorageError(f'{path} is no MCAP file: its first bytes are not those of one')
     return data
+
+
+def _groups(chunks: list[Chunk]) -> Iterator[list[Chunk]]:
+    """Yield chunks in their order, those together that unpack into some `_AT_ONCE` bytes."""
+    group, size = list[Chunk](), 0
+    for chunk in chunks:
+        group.append(chunk)
+        size += min(chunk.size, unpacking_limit(chunk.end - chunk.begin))
+        if size >= _AT_ONCE:
+            yield group
+            group, size = [], 0
+    if group:
+        yield group

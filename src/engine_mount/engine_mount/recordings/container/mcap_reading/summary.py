@@ -3,15 +3,12 @@
 import mmap
 import struct
 import zlib
-from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from io import BytesIO
-from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
@@ -27,26 +24,17 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from engine_mount.recordings.container.mcap_reading.chunk_index import indexed_chunks
-from engine_mount.recordings.container.mcap_reading.chunk_table import ChunkTable, chunk_table, joined
-from engine_mount.recordings.container.mcap_reading.chunks import RECORD
-from engine_mount.recordings.container.whole_files import forget
+from engine_mount.recordings.container.mcap_reading.chunks import RECORD, Chunk, indexed_chunk
+from engine_mount.recordings.container.unpacking import release
 
 T = TypeVar('T')
 
 _FOOTER_SIZE = 20  # bytes behind opcode and length
 _FOOTER_RECORD = RECORD.size + _FOOTER_SIZE
 _CRC_SIZE = 4  # bytes
+_AT_ONCE = 1 << 22  # bytes, chosen: little of a long file is in memory
+_CHUNKS = 256  # chosen: whose heads are in memory at once
 _DATA_END = struct.Struct('<BQI')
-_STEP = 1 << 20  # bytes of the file in memory while they are read, chosen
-_AT_ONCE = 1 << 18  # bytes, chosen: they stay in the processor's cache from one checksum to the other
-
-
-class Hash(Protocol):
-    """What takes the bytes of a file one after another, as those of `hashlib` do."""
-
-    def update(self, data: memoryview, /) -> None:
-        """Take more bytes."""
 
 
 class Proof(Enum):
@@ -66,7 +54,7 @@ class Summary:
     footer: int = 0
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: ChunkTable = field(default_factory=lambda: chunk_table(()))  # without their checksums
+    chunks: list[Chunk] = field(default_factory=list)
     statistics: Statistics | None = None
     beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
@@ -88,12 +76,9 @@ def read_summary(data: mmap.mmap) -> Summary:
     return summary if _fill(summary, data) else Summary(Proof.WRONG)
 
 
-def data_proof(data: mmap.mmap, end: int, known: int | None = None) -> Proof:
-    """Return what the checksum of the data section says of everything before `end`, where it ends.
-
-    `known` is the CRC of what stands before its last record (`covered`), where it was taken already.
-    """
-    end_at = covered(end)
+def data_proof(data: mmap.mmap, end: int) -> Proof:
+    """Return what the checksum of the data section says of everything before `end`, where it ends."""
+    end_at = end - _DATA_END.size
     if end_at < 0:
         return Proof.ABSENT
     opcode, length, crc = _DATA_END.unpack_from(data, end_at)
@@ -101,33 +86,15 @@ def data_proof(data: mmap.mmap, end: int, known: int | None = None) -> Proof:
         return Proof.WRONG
     if not crc:
         return Proof.ABSENT
-    return Proof.SOUND if crc == (checksum(data, 0, end_at) if known is None else known) else Proof.WRONG
-
-
-def covered(end: int) -> int:
-    """Return how many bytes of a data section that ends at `end` are under its checksum."""
-    return end - _DATA_END.size
-
-
-def hashed(path: Path, digest: Hash, end: int = 0) -> int:
-    """Return the CRC of the bytes before `end` of a file, of which `digest` takes all in the same pass."""
-    crc, position, block = 0, 0, memoryview(bytearray(_AT_ONCE))
-    with path.open('rb', buffering=0) as stream:
-        while count := stream.readinto(block):
-            digest.update(block[:count])
-            crc = zlib.crc32(block[: min(count, max(end - position, 0))], crc)
-            position += count
-    return crc
+    return Proof.SOUND if crc == checksum(data, 0, end_at) else Proof.WRONG
 
 
 def checksum(data: mmap.mmap, begin: int, end: int) -> int:
     """Return the CRC of a part of a file."""
     crc = 0
-    with memoryview(data) as view:
-        for position in range(begin, end, _STEP):
-            with view[position : min(position + _STEP, end)] as part:
-                crc = zlib.crc32(part, crc)
-            forget(data, position, position + _STEP)  # a long recording is larger than a worker may be
+    for position in range(begin, end, _AT_ONCE):
+        crc = zlib.crc32(data[position : min(position + _AT_ONCE, end)], crc)
+        release(data)
     return crc
 
 
@@ -153,36 +120,26 @@ def parsed_attachment(content: bytes) -> Attachment | None:
 
 
 def _fill(summary: Summary, data: mmap.mmap) -> bool:
-    tables, position = [], summary.begin
+    position = summary.begin
     while position + RECORD.size <= summary.footer:
-        begin = position
-        position, table = _take_part(summary, data, begin)
-        if table is None:
-            return False
-        tables.append(table)
-        forget(data, begin, position)
-    summary.chunks = joined(tables)
-    return True
-
-
-def _take_part(summary: Summary, data: mmap.mmap, begin: int) -> tuple[int, ChunkTable | None]:
-    """Take the records of some `_STEP` bytes; return their end and chunks, None if one is not readable."""
-    position, begins, ends = begin, array('q'), array('q')  # of what chunk indexes tell
-    while position - begin < _STEP and position + RECORD.size <= summary.footer:
         opcode, length = RECORD.unpack_from(data, position)
         content = position + RECORD.size
         position = content + length
-        if position > summary.footer:
-            return position, None
-        if opcode == Opcode.CHUNK_INDEX:
-            begins.append(content)
-            ends.append(position)
-        elif not _take(summary, opcode, data[content:position]):
-            return position, None
-    return position, indexed_chunks(np.frombuffer(data, np.uint8), np.array(begins), np.array(ends))
+        if position > summary.footer or not _take(summary, opcode, data, data[content:position]):
+            return False
+    summary.chunks.sort(key=lambda chunk: chunk.position)
+    return True
 
 
-def _take(summary: Summary, opcode: int, content: bytes) -> bool:
+def _take(summary: Summary, opcode: int, data: mmap.mmap, content: bytes) -> bool:
+    """Take a record of the summary; return False where one that is needed is not readable."""
+    if opcode == Opcode.CHUNK_INDEX:
+        chunk = indexed_chunk(data, content)
+        if chunk is not None:
+            summary.chunks.append(chunk)
+        if len(summary.chunks) % _CHUNKS == 0:
+            release(data)
+        return chunk is not None
     if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
         summary.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):

@@ -2,9 +2,11 @@
 
 import mmap
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
 
 from engine_mount.recordings.container.mcap_reading.chunks import (
     MESSAGE_HEAD,
@@ -14,21 +16,50 @@ from engine_mount.recordings.container.mcap_reading.chunks import (
     messages_at,
     partial_chunk,
 )
-from engine_mount.recordings.container.mcap_reading.declarations import Declarations
-from engine_mount.recordings.container.mcap_reading.summary import parsed_metadata
-from engine_mount.recordings.container.stored import StoredMessages
+from engine_mount.recordings.container.mcap_reading.summary import parsed, parsed_metadata
+from engine_mount.recordings.container.stored import StoredMessages, StoredTopic
 
 _LAST_OPCODE = Opcode.DATA_END
 _LENGTHS = {int(Opcode.DATA_END): 4, int(Opcode.FOOTER): 20}
 _PRIVATE_OPCODE = 0x80  # and above: of other programs, to be skipped
 
 
+@dataclass
+class Declarations:
+    """Schemas and channels of a file by their numbers; the first of a number counts."""
+
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+
+    def add(self, opcode: int, content: bytes) -> None:
+        """Take the record of a schema or a channel, if it is readable."""
+        if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
+            self.schemas.setdefault(schema.id, schema)
+        elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
+            self.channels.setdefault(channel.id, channel)
+
+    def topics(self) -> dict[int, StoredTopic]:
+        """Return the topics by the numbers of their channels."""
+        return {number: self._topic(channel) for number, channel in self.channels.items()}
+
+    def _topic(self, channel: Channel) -> StoredTopic:
+        schema = self.schemas.get(channel.schema_id)
+        return StoredTopic(
+            name=channel.topic,
+            type=schema.name if schema else '',
+            encoding=channel.message_encoding,
+            definition=schema.data if schema else b'',
+            definition_encoding=schema.encoding if schema else '',
+            details=channel.metadata,
+        )
+
+
 class Walk:
     """What the records beside the chunks tell, as far as they were walked through."""
 
-    def __init__(self, data: mmap.mmap, declared: Declarations, warn: Callable[[str], None]):
+    def __init__(self, data: mmap.mmap, warn: Callable[[str], None]):
         self._data, self._warn = data, warn
-        self.declared = declared
+        self.declared = Declarations()
         self.metadata: dict[str, dict[str, str]] = {}
         self.records: list[tuple[str, dict[str, str]]] = []
         self.attachments: list[tuple[int, int]] = []  # begin and end of their records
@@ -114,7 +145,7 @@ class Walk:
         elif opcode == Opcode.ATTACHMENT:
             self.attachments.append((position, end))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self.declared.take(opcode, self._data[position + RECORD.size : end])
+            self.declared.add(opcode, self._data[position + RECORD.size : end])
         elif opcode == Opcode.METADATA:
             self._take_metadata(position, end)
 

@@ -1,6 +1,9 @@
-"""One topic of two recordings, sample beside sample."""
+"""One topic of two recordings, sample beside sample: its signals, and what no signal shows."""
 
 import functools
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +16,61 @@ from engine_mount.recordings.compare.alignment import (
     mount_of,
     samples_of,
 )
-from engine_mount.recordings.compare.hidden_differences import Place, hidden_differences
-from engine_mount.recordings.compare.signal_difference import Column
-from engine_mount.recordings.messages.layout import OPTIONS
+from engine_mount.recordings.compare.signals import Column, Quantity, SignalDifference, signal_difference
+from engine_mount.recordings.compare.tolerances import Tolerances
+from engine_mount.recordings.messages.layout import OPTIONS, Layout, Numbers
 from engine_mount.recordings.messages.series import STAMP, STAMP_BYTES, Series, SeriesError
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
-from mount_ros.topics import CURRENT_FORCE_TABLE, JOINT_STATE
+from mount_ros.topics import CONTROL_TRACE, CURRENT_FORCE_TABLE, JOINT_STATE
 
 Places = NDArray[np.int64]
+Rows = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
+Place = tuple[str, int]
+"""A number or a text of a message: its path, and its place in a run of numbers."""
 
+SWITCH = 'damping_active'
 _LARGEST_GRID = 8  # times the samples, chosen: with more holes it is no signal of a fixed rate
 _TABLE = {'current': 'A', 'normal_force': 'N'}
+_NONE = Numbers(0, np.dtype('u1'), 0)
+
+
+@dataclass(frozen=True)
+class TopicComparison:
+    """One topic of both: its signals, and how many samples are in one recording alone.
+
+    `only_a` and `only_b` are samples within the time that both recordings cover with this topic,
+    `outside_a` and `outside_b` those before and behind it.
+    """
+
+    mount: str  # what stands before the topic where it is of a namespace: `mount_left/`
+    topic: str
+    samples: int
+    signals: tuple[SignalDifference, ...]
+    only_a: int
+    only_b: int
+    outside_a: int
+    outside_b: int
+    differing_messages: int  # in what no signal shows
+    remark: str
+
+    @property
+    def name(self) -> str:
+        """Mount and topic."""
+        return f'{self.mount}{self.topic}'
+
+    def figures(self) -> dict[str, Any]:
+        """Return the figures for JSON."""
+        return {
+            'samples': self.samples,
+            'missing_in_b': self.only_a,
+            'missing_in_a': self.only_b,
+            'outside_in_a': self.outside_a,
+            'outside_in_b': self.outside_b,
+            'differing_messages': self.differing_messages,
+            'remark': self.remark,
+            'signals': {signal.signal: signal.figures() for signal in self.signals},
+        }
 
 
 class MatchedTopic:
@@ -91,15 +137,16 @@ class MatchedTopic:
     def column(self, signal: str) -> Column:
         """Return the matched samples of one of the `signals`; raises `SeriesError`."""
         unit = self.signals[signal]
+        quantity = Quantity(self.mount, self.topic, signal, unit)
         if self._tables:
             a, b = (getattr(table, signal) for table in self._tables)
-            return Column(self.mount, self.topic, signal, unit, np.full(len(a), self.time[-1]), a, b)
+            return Column(quantity, np.full(len(a), self.time[-1]), a, b)
         if signal.startswith('d(') and signal not in self.a.names:
             name = signal.removeprefix('d(').removesuffix(')/dt')
             a, b = self.a.derivative(name), self.b.derivative(name)
         else:
             a, b = self.a[signal], self.b[signal]
-        return Column(self.mount, self.topic, signal, unit, self.time, a[self._places_a], b[self._places_b])
+        return Column(quantity, self.time, a[self._places_a], b[self._places_b])
 
     def different_messages(self) -> Mask:
         """Return which of the matched messages differ in any byte but those of their stamps."""
@@ -125,7 +172,7 @@ class MatchedTopic:
         a, b = self.a.layout, self.b.layout
         if self.a.type != self.b.type or a is None or b is None or rows_a is None or rows_b is None:
             return self.different_messages()
-        return hidden_differences(a, rows_a[self._places_a], b, rows_b[self._places_b], self._shown())
+        return _hidden_differences(a, rows_a[self._places_a], b, rows_b[self._places_b], self._shown())
 
     def _shown(self) -> set[Place]:
         """Return the places of what signals show, of one recording alone too, and of stamps and names."""
@@ -164,6 +211,51 @@ class MatchedTopic:
         numbers = np.rint((keys - keys[0]) / self.of_a.step).astype(np.int64)
         return numbers if numbers[-1] < _LARGEST_GRID * len(numbers) else None
 
+    @property
+    def tells_switching(self) -> bool:
+        """Whether it tells in both recordings how far damping was on, from 0 to 1."""
+        if self.topic != CONTROL_TRACE.name or not self.samples or SWITCH not in self.signals:
+            return False
+        return bool(((self._switch >= 0.0) & (self._switch <= 1.0)).all())
+
+    @property
+    def _switch(self) -> NDArray[np.float64]:
+        column = self.column(SWITCH)
+        return np.concatenate([column.a, column.b])
+
+    def compared(self, tolerances: Tolerances) -> TopicComparison:
+        """Return how the topic differs; damping that is only on or off shows in the switching."""
+        (only_a, outside_a), (only_b, outside_b) = self.unmatched_samples()
+        switch = SWITCH if self.tells_switching and np.isin(self._switch, (0.0, 1.0)).all() else ''
+        signals = {name: unit for name, unit in self.signals.items() if name != switch}
+        hidden, found = 0, []
+        if self.different_messages().any():
+            hidden, grid = int(np.count_nonzero(self.hidden_differences())), self.grid()
+            for name in signals:
+                tolerance = tolerances.of(self.mount, self.topic, name)
+                found.append(signal_difference(self.column(name), tolerance, grid, self.period))
+        else:
+            for name, unit in signals.items():
+                found.append(SignalDifference(self.mount, self.topic, name, unit, self.samples))
+        return TopicComparison(
+            mount=self.mount,
+            topic=self.topic,
+            samples=self.samples,
+            signals=tuple(found),
+            only_a=only_a,
+            only_b=only_b,
+            outside_a=outside_a,
+            outside_b=outside_b,
+            differing_messages=hidden,
+            remark=self._remark(),
+        )
+
+    def _remark(self) -> str:
+        if self.a.type != self.b.type:
+            return f'in A it is {self.a.type}, in B {self.b.type}'
+        unmatched = self.unmatched_signals
+        return f'only one of both has {", ".join(unmatched)}' if unmatched else ''
+
     @functools.cached_property
     def _tables(self) -> tuple[ForceTable, ForceTable] | None:
         """The last current-force tables of both, None where there are none of one shape."""
@@ -183,3 +275,34 @@ def _in_turn(series: Series) -> Samples:
 
 def _unit(unit: str) -> str:
     return '' if unit == '1' else unit
+
+
+def _hidden_differences(a: Layout, rows_a: Rows, b: Layout, rows_b: Rows, shown: Collection[Place]) -> Mask:
+    """Return which rows (messages x bytes) of A differ from those of B in what is not `shown`.
+
+    Unknown (NaN) in both is equal; bytes between the numbers do not count.
+    """
+    texts = [path for path in a.strings.keys() | b.strings.keys() if (path, 0) not in shown]
+    if any(a.strings.get(path) != b.strings.get(path) for path in texts):
+        return np.ones(len(rows_a), bool)  # the texts of a layout are those of all its messages
+    different = np.zeros(len(rows_a), bool)
+    for path in a.numbers.keys() | b.numbers.keys():
+        one, other = a.numbers.get(path, _NONE), b.numbers.get(path, _NONE)
+        hidden = [place for place in range(max(one.count, other.count)) if (path, place) not in shown]
+        if hidden and one.count != other.count:
+            return np.ones(len(rows_a), bool)
+        if hidden:
+            different |= ~_same(_run(one, rows_a), _run(other, rows_b))[:, hidden].all(axis=1)
+    return different
+
+
+def _run(numbers: Numbers, rows: Rows) -> NDArray:
+    """Return a run of numbers, messages x numbers."""
+    size = numbers.count * numbers.dtype.itemsize
+    return np.ascontiguousarray(rows[:, numbers.offset : numbers.offset + size]).view(numbers.dtype)
+
+
+def _same(a: NDArray, b: NDArray) -> Mask:
+    if a.dtype.kind == b.dtype.kind == 'f':
+        return ((a == b) & (np.signbit(a) == np.signbit(b))) | (np.isnan(a) & np.isnan(b))
+    return np.asarray(a == b)

@@ -1,0 +1,342 @@
+"""The way of a sample to its answer, one by one and many at once."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mount_control import control_loop
+from mount_control.control_loop import OFF, ControlLoop, Judgement, SampleCounts
+from mount_control.controller import ControlLaw, Controller
+
+MS, S, START = 1_000_000, 1_000_000_000, 5_000_000_000  # ns
+PERIODS = [0.999, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.001, 1.49]  # ms
+ODD = [-3.0, -0.5, 0.0, 0.2, 1.5, 2.0, 5.0, 19.9, 21.0, 30.0, 1000.001, -1500.0]
+
+
+@pytest.fixture(scope='module')
+def make_loop(make_settings, table_rows):
+    """Return a function that begins to answer at `START`."""
+
+    def make(**parameters):
+        loop, chosen = ControlLoop(), make_settings(switching='always', **parameters)
+        loop.note(START)
+        loop.begin(chosen, chosen.table(*table_rows), START)
+        return loop
+
+    return make
+
+
+def trace_of(loop):
+    """The bytes of the trace of the last sample, empty where there is none."""
+    return b'' if loop.trace is None else loop.trace.tobytes()
+
+
+@st.composite
+def samples(draw):
+    """Stamps (ns) and displacements (m): mostly in time and believable, with doubtful ones between."""
+    steps = draw(st.lists(st.sampled_from([*PERIODS * 4, *ODD]), min_size=1, max_size=60))
+    steps = [step for step in steps for _ in range(draw(st.integers(1, 6)) if step in PERIODS else 1)]
+    stamps = START + np.round(MS * np.cumsum(steps)).astype(np.int64)
+    numbers = np.random.default_rng(draw(st.integers(0, 2**32))).uniform(-0.002, 0.002, len(steps))
+    for place in draw(st.lists(st.integers(0, len(steps) - 1), max_size=8)):
+        numbers[place] = draw(st.sampled_from([math.nan, math.inf, 0.02, 0.021, -5.0]))
+    return stamps, numbers
+
+
+ANY_MOTION = {'displacement_velocity': 100.0, 'displacement_noise': 0.1}
+"""So that what the samples are drawn from is believed."""
+
+
+@settings(deadline=None, max_examples=200)
+@given(samples(), st.lists(st.integers(0, 59), max_size=3), st.sampled_from([{}, ANY_MOTION]))
+def test_many_answers_are_single_answers_to_the_bit(make_loop, make_settings, given_samples, places, limits):
+    stamps, displacements = given_samples
+    changes = {place: [make_settings('viscous_4000', quality=0.7)] for place in places if place < len(stamps)}
+    single, many = make_loop(**limits), make_loop(**limits)
+    answers = many.step_many(stamps, displacements, changes)
+    for place, (stamp, displacement) in enumerate(zip(stamps.tolist(), displacements.tolist(), strict=True)):
+        for changed in changes.get(place, ()):
+            single.change(changed)
+        current = single.step(stamp, displacement)
+        expected = math.nan if current is None else current
+        np.testing.assert_equal(answers.currents[place], expected)
+        assert answers.traced[place] == (single.trace is not None)
+        assert answers.traces[place].tobytes() == (trace_of(single) or bytes(many.trace_type.itemsize))
+    assert many.counts == single.counts
+    assert (many.first, many.last) == (single.first, single.last)
+    assert (many.refusal, many.faults) == (single.refusal, single.faults)
+    # and both go on alike
+    following = int(stamps.max()) + MS
+    assert many.expects(following) == single.expects(following)
+    assert many.step(following, 0.001) == single.step(following, 0.001)
+    assert (many.judgement, trace_of(many)) == (single.judgement, trace_of(single))
+
+
+@pytest.mark.parametrize('odd', [math.nan, 0.01])
+def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_loop, sine, odd):
+    stamps, displacements = START + MS * np.arange(1, 4001), sine(8.0, 1e-3, 4.0)
+    displacements[2000] = odd
+    single, many = make_loop(), make_loop()
+    answers = many.step_many(stamps, displacements)
+    pairs = zip(stamps, displacements, strict=True)
+    expected = [single.step(int(stamp), float(x)) for stamp, x in pairs]
+    np.testing.assert_array_equal(answers.currents, expected)
+    assert many.counts == single.counts
+    assert many.refusal == ''
+    assert max(expected[3100:]) > 0.4
+
+
+def test_two_parts_are_the_whole(make_loop, sine):
+    stamps, displacements = START + MS * np.arange(1, 601), sine(8.0, 1e-3, 0.6)
+    parts, whole = make_loop(), make_loop()
+    found = [parts.step_many(stamps[part], displacements[part]) for part in (slice(250), slice(250, 600))]
+    expected = whole.step_many(stamps, displacements)
+    assert np.concatenate([answers.traces for answers in found]).tobytes() == expected.traces.tobytes()
+    assert parts.counts == whole.counts
+    assert expected.currents.max() > 0.5
+
+
+def test_the_answer_is_the_controller_s(make_loop, make_settings, table_rows, sine):
+    loop, chosen = make_loop(), make_settings(switching='always')
+    controller = Controller(ControlLaw(chosen, chosen.table(*table_rows)))
+    for number, displacement in enumerate(sine(8.0, 1e-3, 0.3), 1):
+        current = loop.step(START + number * MS, displacement)
+        assert current == controller.step(displacement)
+        assert trace_of(loop) == controller.trace_record.tobytes()
+    assert loop.current == current > 0.4
+    assert loop.damping_active
+
+
+def test_a_change_waits_for_the_next_sample_that_can_be_used(make_loop, make_settings):
+    loop = make_loop()
+    loop.step(START + MS, 0.0)
+    loop.change(make_settings('viscous_1000'), 'weaker')
+    assert not loop.expects(START + 2 * MS)
+    made = []
+    for place, displacement in ((2, math.nan), (3, 0.0), (4, 0.0)):
+        loop.step(START + place * MS, displacement)
+        made.append(list(loop.changes_made))
+        loop.changes_made.clear()
+    assert made == [[], ['weaker'], []]
+    assert loop.expects(START + 5 * MS)
+
+
+@pytest.mark.parametrize('place', ['_refusal', '_make_changes', 'doubt_of'])
+def test_a_change_that_comes_amid_a_step_is_made_at_that_sample_or_the_next(
+    make_loop, make_settings, monkeypatch, place
+):
+    loop, stronger = make_loop(), make_settings('viscous_4000')
+    loop.step(START + MS, 0.0)
+    owner = control_loop if place == 'doubt_of' else loop
+    original, steps = getattr(owner, place), []
+
+    def amid(*arguments):
+        found = original(*arguments)
+        if not steps:
+            loop.change(stronger, 'stronger')
+        steps.append(place)
+        return found
+
+    monkeypatch.setattr(owner, place, amid)
+    for ms in (3, 4, 5):  # the first of them behind a gap
+        loop.step(START + ms * MS, 0.0)
+    assert steps
+    assert list(loop.changes_made) == ['stronger']
+
+
+def test_a_new_beginning_forgets_what_was_before(make_loop, make_settings, table_rows, sine):
+    loop = make_loop()
+    loop.step_many(START + MS * np.arange(1, 301), sine(8.0, 1e-3, 0.3))
+    loop.change(make_settings('viscous_1000'), 'weaker')
+    loop.controller.memory.window[:] = math.nan
+    loop.step(START + 301 * MS, 0.0)
+    assert (loop.faults, loop.last_fault) == (1, START + 301 * MS)
+    loop.changes_made.clear()
+    chosen = make_settings()
+    loop.begin(chosen, chosen.table(*table_rows), START + 301 * MS)
+    assert (loop.faults, loop.last_fault, loop.counts.samples) == (0, 0, 0)
+    assert loop.step(START + 302 * MS, 0.0) == OFF
+    assert (loop.judgement, list(loop.changes_made)) == (Judgement.RESTART, [])
+
+
+# What becomes of a sample, by its stamp and value.
+
+
+@pytest.fixture
+def loop(make_loop):
+    loop = make_loop()
+    assert judged(loop, 400) == [(Judgement.RESTART, 0)]  # the first one has no past
+    return loop
+
+
+def judged(loop, *milliseconds, displacement=0.0):
+    """Judgements on samples so many ms after `START`, and how many missing ones were bridged before each."""
+    found = []
+    for ms in milliseconds:
+        before = loop.counts.bridged
+        current = loop.step(START + round(ms * MS), displacement)
+        assert (current is None) == (loop.judgement in UNANSWERED)
+        assert (loop.trace is not None) == (loop.judgement in CONTROLLED)
+        assert current in (None, OFF) or loop.judgement in CONTROLLED
+        found.append((loop.judgement, loop.counts.bridged - before))
+    return found
+
+
+UNANSWERED = (Judgement.IGNORE, Judgement.EARLY, Judgement.INACTIVE)
+CONTROLLED = (Judgement.USE, Judgement.RESTART)
+
+
+def test_each_sample_has_its_judgement(make_loop):
+    loop = make_loop()
+    cases = ((0, 0.0), (1, 0.0), (2, math.nan), (3, 0.001), (3, 0.001), (1004, 0.0))
+    assert [judged(loop, ms, displacement=displacement)[0][0] for ms, displacement in cases] == [
+        Judgement.EARLY, Judgement.RESTART, Judgement.INVALID, Judgement.USE, Judgement.IGNORE,
+        Judgement.INTERRUPTED,
+    ]  # fmt: skip
+    assert loop.refusal.startswith('the measurements were interrupted for more than 1 s')
+    loop.end()
+    assert judged(loop, 1005) == [(Judgement.INACTIVE, 0)]
+    assert loop.last == START + 1005 * MS
+
+
+def test_samples_in_time_are_used(loop):
+    assert judged(loop, 401, 402, 403) == [(Judgement.USE, 0)] * 3
+    assert loop.counts == SampleCounts(samples=4, restarts=1)
+    assert loop.expects(START + 404 * MS)
+    assert not loop.expects(START + 405 * MS)
+
+
+@pytest.mark.parametrize('jitter', [-0.49, -0.1, 0.1, 0.49])
+def test_a_stamp_a_little_early_or_late_is_no_missing_sample(loop, jitter):
+    assert judged(loop, 401 + jitter) == [(Judgement.USE, 0)]
+
+
+@pytest.mark.parametrize('missing', [1, 2, 7, 19])
+def test_missing_samples_are_counted_from_the_stamps(loop, missing):
+    assert judged(loop, 401 + missing) == [(Judgement.USE, missing)]
+    assert loop.controller.trace['bridged_samples'] == missing
+
+
+def test_after_too_long_a_gap_the_past_is_forgotten(loop):
+    assert judged(loop, 420.000001, 421) == [(Judgement.RESTART, 0), (Judgement.USE, 0)]
+    assert loop.counts == SampleCounts(samples=3, restarts=2)
+
+
+@pytest.mark.parametrize('late_by', [0, 1, 300])
+def test_repeated_and_overtaken_samples_are_ignored(loop, late_by):
+    judged(loop, 401, 402)
+    assert judged(loop, 402 - late_by) == [(Judgement.IGNORE, 0)]
+    assert loop.counts.ignored == 1
+    assert judged(loop, 403) == [(Judgement.USE, 0)]
+
+
+@pytest.mark.parametrize('displacement', [math.nan, math.inf, -math.inf, 0.020001, -0.020001])
+def test_what_no_sensor_can_mean_is_invalid(loop, displacement):
+    assert judged(loop, 401, displacement=displacement) == [(Judgement.INVALID, 0)]
+    assert (loop.counts.invalid, loop.counts.samples) == (1, 1)
+
+
+@pytest.mark.parametrize('displacement', [0.020, -0.020])
+def test_the_end_of_the_range_still_counts(loop, displacement):
+    judged(loop, *range(401, 420), displacement=math.nan)  # so that it can have moved there
+    assert judged(loop, 420, displacement=displacement) == [(Judgement.USE, 19)]
+
+
+def test_invalid_samples_are_bridged_like_missing_ones(loop):
+    judged(loop, 401, 402, 403, displacement=math.nan)
+    assert judged(loop, 404) == [(Judgement.USE, 3)]
+    judged(loop, *range(405, 430), displacement=math.nan)
+    assert judged(loop, 430) == [(Judgement.RESTART, 0)]
+
+
+def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_measurements(
+    make_settings, table_rows
+):
+    chosen = make_settings()
+    for activation, expected in (
+        (S - 1, Judgement.INTERRUPTED),
+        (S, Judgement.RESTART),
+        (2 * S, Judgement.RESTART),
+        (3 * S, Judgement.EARLY),
+        (3 * S + 1, Judgement.INTERRUPTED),
+    ):
+        loop = ControlLoop()
+        for stamp in (S, 2 * S, 3 * S):
+            loop.note(stamp)
+        loop.begin(chosen, chosen.table(*table_rows), activation)
+        loop.step(3 * S, 0.0)
+        assert loop.judgement is expected
+        assert loop.interrupted == (expected is Judgement.INTERRUPTED)
+
+
+def test_an_interruption_stands_until_the_next_activation(loop, make_settings, table_rows):
+    assert judged(loop, 401, 1402, 1403) == [(Judgement.USE, 0), *[(Judgement.INTERRUPTED, 0)] * 2]
+    chosen = make_settings()
+    loop.begin(chosen, chosen.table(*table_rows), START + 1403 * MS)
+    assert judged(loop, 1404) == [(Judgement.RESTART, 0)]
+    assert loop.counts == SampleCounts(samples=1, restarts=1)
+
+
+def test_samples_at_2_khz_are_bridged_by_their_own_period(make_loop):
+    expected = [(Judgement.USE, 0), (Judgement.USE, 1), (Judgement.USE, 0)]
+    assert judged(make_loop(sample_rate=2000.0), 400.0, 400.5, 401.5, 402.0)[1:] == expected
+
+
+@pytest.mark.parametrize(
+    'stamps',
+    [
+        (1, 1.5, 2, 2.5),  # a second sender half a sample beside the first
+        (1, 1.2, 2, 2.2, 3, 3.2),
+        (1, 1, 2, 2, 3, 3),  # one that repeats the stamps of the other
+        (1, 2, 3, 1, 4, 2, 5, 3),  # one that is behind
+    ],
+)
+def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(
+    loop, make_settings, table_rows, stamps
+):
+    assert judged(loop, *(400 + ms for ms in stamps))[-1] == (Judgement.FOREIGN, 0)
+    assert loop.foreign == (
+        '3 displacement samples within 1 s were repeated, older than the one before or less than 0.75 ms '
+        'behind it: end one of the two nodes that publish displacement'
+    )
+    assert judged(loop, 500, 501) == [(Judgement.FOREIGN, 0)] * 2
+    chosen = make_settings()
+    loop.begin(chosen, chosen.table(*table_rows), START + 500 * MS)
+    assert judged(loop, 501) == [(Judgement.RESTART, 0)]
+
+
+def test_a_sender_noticed_by_its_stamps_is_told_by_its_name_as_soon_as_discovery_has_it(
+    loop, make_settings, table_rows
+):
+    judged(loop, 401, 401, 402, 402, 403, 403)
+    assert loop.nameless
+    loop.on_publisher_conflict('', '')
+    assert loop.foreign.startswith('3 displacement samples within 1 s were repeated')
+    for name in ('/evil', '/worse'):
+        loop.on_publisher_conflict(f'{name} must not publish', '')
+        assert (loop.foreign, loop.nameless) == ('/evil must not publish', False)
+    chosen = make_settings()
+    loop.begin(chosen, chosen.table(*table_rows), START)
+    assert (loop.foreign, loop.nameless) == ('', False)
+
+
+def test_repeated_samples_now_and_then_are_no_second_sender(loop):
+    for second in range(5):
+        begin = 400 + 800 * second
+        assert judged(loop, begin + 1, begin + 1)[1] == (Judgement.IGNORE, 0)
+        judged(loop, *range(begin + 2, begin + 800))
+    assert loop.foreign == ''
+
+
+def test_another_writer_is_heeded_from_the_next_usual_sample_on(loop):
+    assert judged(loop, 401, 402) == [(Judgement.USE, 0)] * 2
+    loop.on_publisher_conflict('', 'mount_driver_io is there twice')
+    assert judged(loop, 403, 404) == [(Judgement.FOREIGN, 0)] * 2
+    loop.on_publisher_conflict('', '')
+    assert judged(loop, 405, 406) == [(Judgement.USE, 2), (Judgement.USE, 0)]
+    loop.on_publisher_conflict('/evil must not publish', '')
+    loop.on_publisher_conflict('', '')
+    assert judged(loop, 407, 408) == [(Judgement.FOREIGN, 0)] * 2
