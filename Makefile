@@ -35,7 +35,7 @@ drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and 
 	@$(BIN)/engine-mount drive $(DRIVE_OPTIONS)
 
 # Tests that start the graph in real time need the machine for themselves; they come last, one by one.
-pass_tests = $(BIN)/python -m pytest -m '$(1) and not real_time' -n $(WORKERS) --dist worksteal && \
+pass_tests = $(BIN)/python -m pytest -m '$(1) and not real_time' -n $(WORKERS) --dist loadscope && \
 	$(BIN)/python -m pytest -m '$(1) and real_time' $(REAL_TIME_TESTS)
 
 test: $(VENV)/.ready-dev ## pass the tests that take 5 minutes on two cores

@@ -132,6 +132,7 @@ def _drive_with_a_control_that_stands_still(command, bus_listener) -> str:
     return ''
 
 
+@pytest.mark.slow
 def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     result = command.drive(
         '--lockstep', '--scenario', 'bench', '--duration', '5',

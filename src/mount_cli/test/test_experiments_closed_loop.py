@@ -21,6 +21,8 @@ from mount_experiments.sweep.evaluation import defined_peak
 from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError
 
+pytestmark = pytest.mark.slow
+
 PNG = b'\x89PNG'
 
 
@@ -263,7 +265,6 @@ def test_a_gap_that_does_not_reach_the_level_is_told_as_such(tmp_path):
 # Sensitivity.
 
 
-@pytest.mark.slow
 def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     told = []
     settings = {

@@ -100,6 +100,7 @@ def test_each_file_is_read_by_its_mapping_and_what_is_wrong_is_a_row(drives, sai
     assert found['car/garbage.mf4']['reason']
 
 
+@pytest.mark.slow
 def test_only_what_changed_is_read_again_or_is_said_otherwise(drives, said, tmp_path, inside):
     catalogue = tmp_path / 'catalogue'
     indexed([drives], catalogue, said)

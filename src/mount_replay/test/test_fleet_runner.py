@@ -179,7 +179,13 @@ def test_items_are_not_all_handed_over_at_once():
     results.close()
 
 
-@pytest.mark.parametrize('blow', [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    'blow',
+    [
+        signal.SIGKILL,
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGINT, signal.SIGTERM)),
+    ],
+)
 def test_no_worker_outlives_the_command(blow, tmp_path):
     with _started(tmp_path, '{}') as command:
         workers = [int(command.stdout.readline()) for _ in range(2)]

@@ -83,7 +83,7 @@ def flip(content, place, generator):
     return content[:place] + bytes([content[place] ^ generator.randrange(1, 256)]) + content[place + 1 :]
 
 
-@pytest.mark.parametrize('change', [cut, flip])
+@pytest.mark.parametrize('change', [cut, pytest.param(flip, marks=pytest.mark.slow)])
 def test_what_is_read_is_what_was_written_and_a_sentence_says_the_rest(intact, tmp_path, change):
     original = messages_of(engine_mount.open(intact))
     for copy, place in damaged_copies(intact, tmp_path, change):
@@ -107,7 +107,7 @@ def test_what_is_read_is_what_was_written_and_a_sentence_says_the_rest(intact, t
         assert sentences(entries, told), place
 
 
-@pytest.mark.parametrize('change', [cut, flip])
+@pytest.mark.parametrize('change', [cut, pytest.param(flip, marks=pytest.mark.slow)])
 def test_what_is_recovered_is_what_was_written_and_the_sentence_says_how_much(intact, tmp_path, change):
     original = messages_of(engine_mount.open(intact))
     for copy, place in damaged_copies(intact, tmp_path, change):
