@@ -229,7 +229,8 @@ def test_a_damaged_recording_is_reported_as_far_as_it_goes(bench, tmp_path):
     shutil.copytree(bench / 'recording', tmp_path / 'damaged')
     (file,) = (tmp_path / 'damaged').glob('*.mcap')
     raw = file.read_bytes()
-    file.write_bytes(raw[: len(raw) // 3] + bytes(2000) + raw[len(raw) // 3 + 2000 : 3 * len(raw) // 4])
+    damaged = slice(len(raw) // 3, len(raw) // 3 + 60_000)  # bytes: no index between two chunks is so long
+    file.write_bytes(raw[: damaged.start] + bytes(60_000) + raw[damaged.stop : 3 * len(raw) // 4])
     result = command('report', tmp_path / 'damaged')
     assert result.exit_code == 0, result.output
     text = Page(tmp_path / 'damaged_report.html').text
