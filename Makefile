@@ -41,7 +41,7 @@ pass_tests = $(BIN)/python -m pytest -m '$(1) and not real_time' -n $(WORKERS) -
 test: $(VENV)/.ready-dev ## pass the tests that take 5 minutes on two cores
 	@$(call pass_tests,not slow)
 
-test-all: test ## pass these and all others, which take half an hour more
+test-all: test ## pass these and all others, which take 10 minutes more
 	@$(call pass_tests,slow)
 
 check: $(VENV)/.ready ## drive the manoeuvre suite and judge it by its limits, before a change goes into the car
