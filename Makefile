@@ -3,7 +3,7 @@
 VENV ?= .venv
 BIN := $(VENV)/bin
 CAR := mount_models mount_ros mount_driver mount_init mount_control mount_recorder mount_sim mount_bringup
-DESK := engine_mount mount_signals mount_replay mount_identification mount_report mount_experiments mount_view mount_cli
+DESK := engine_mount
 PACKAGES := $(CAR) $(DESK)
 # The first Python that runs, is 3.11 to 3.13 (the wheels of rclpy end there) and can make environments. That of the
 # distribution comes first: it was compiled with profile-guided optimisation, which many that were compiled by

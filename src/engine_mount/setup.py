@@ -3,9 +3,16 @@ from setuptools import find_packages, setup
 setup(
     name='engine_mount',
     version='0.1.0',
-    description='The desk of the engine mount: works on recordings and simulations.',
+    description='The desk of the engine mount: recordings, drives, experiments, the engine-mount command.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test', 'test.*']),
+    package_data={
+        'engine_mount.cli': ['completion/names.json'],
+        'engine_mount.experiments': ['check/suite.yaml'],
+        'engine_mount.reports': ['drawing/browser/*'],
+        'engine_mount.view': ['page/*'],
+    },
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},
+    entry_points={'console_scripts': ['engine-mount = engine_mount.cli.start:main']},
 )

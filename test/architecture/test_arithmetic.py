@@ -14,9 +14,9 @@ import pytest
 
 ROOTS = (
     'mount_driver.node', 'mount_init.node', 'mount_control.node', 'mount_sim.node',
-    'mount_replay.loop.recording', 'mount_replay.replay', 'mount_replay.lockstep',
+    'engine_mount.drives.loop.recording', 'engine_mount.drives.replay', 'engine_mount.drives.lockstep',
 )  # fmt: skip
-JUDGES = {'mount_replay.agreement', 'mount_report.drive.evaluation'}
+JUDGES = {'engine_mount.drives.agreement', 'engine_mount.reports.drive.evaluation'}
 """Modules that judge answers when they are there; what they alone need makes no number of a run."""
 OF_LIBRARIES = {
     *('exp', 'exp2', 'expm1', 'log', 'log1p', 'log2', 'log10', 'sin', 'cos', 'tan', 'asin', 'acos', 'atan'),
@@ -55,13 +55,13 @@ ALLOWED = {
     ('engine_mount.recordings.messages.stamps', '**'): 'rates of topics, for the eye',
     ('engine_mount.recordings.messages.stamps', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
-    ('mount_signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
-    ('mount_signals.formats.trees.layouts', 'math.prod'): 'whole numbers',
+    ('engine_mount.signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
+    ('engine_mount.signals.formats.trees.layouts', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',
-    ('mount_signals.formats.trees.matlab', 'scipy'): 'reads files',
-    ('mount_signals.sources.patience', '**'): 'how long is waited for a store',
+    ('engine_mount.signals.formats.trees.matlab', 'scipy'): 'reads files',
+    ('engine_mount.signals.sources.patience', '**'): 'how long is waited for a store',
 }
 
 

@@ -40,7 +40,7 @@ def test_what_the_car_starts_loads_where_nothing_of_the_desk_is_installed(wanted
     car = files_behind(BEGIN)
     ours = {name for name, file in module_files().items() if file not in car}
     desk = ours | set(LIBRARIES) - libraries_of_the_car()
-    assert {'matplotlib', 'skfem', 'typer', 'rich', 'mount_cli.command'} <= desk
+    assert {'matplotlib', 'skfem', 'typer', 'rich', 'engine_mount.cli.command'} <= desk
     launch = {module for file in car for module in modules_of(file) if module.startswith('launch')}
     arguments = [' '.join(sorted(names)) for names in ({wanted}, launch, desk)]
     command = [sys.executable, '-c', LOAD, *arguments]

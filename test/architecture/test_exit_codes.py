@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from mount_cli.command import app
-from mount_cli.commands import compare
+from engine_mount.cli.command import app
+from engine_mount.cli.commands import compare
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'exit_codes.md'
 

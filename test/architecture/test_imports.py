@@ -17,10 +17,11 @@ FLOORS = (
     ('mount_sim',),
     ('mount_bringup',),
     ('engine_mount.settings',),
-    ('mount_signals',),
-    ('mount_replay', 'mount_identification', 'mount_report'),
-    ('mount_experiments', 'mount_view'),
-    ('mount_cli',),
+    ('engine_mount.signals',),
+    ('engine_mount.drives', 'engine_mount.faults', 'engine_mount.identification', 'engine_mount.reports'),
+    ('engine_mount.fleet',),
+    ('engine_mount.experiments', 'engine_mount.view'),
+    ('engine_mount.cli',),
 )
 """Packages, and rooms of the desk's one package, from the ground up; none imports one beside or above it."""
 CAR = {
@@ -97,7 +98,7 @@ def test_models_know_no_ros():
 
 
 def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
-    tell = 'import sys, mount_cli.command; print(*sys.modules)'
+    tell = 'import sys, engine_mount.cli.command; print(*sys.modules)'
     loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
     assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'rclpy', 'mcap'} & set(loaded.split())
 
@@ -105,7 +106,7 @@ def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
 def test_no_node_loads_what_only_files_of_others_need():
     """Where asammdf is installed, python-can loads it, and each node would start 4 s later."""
     nodes = ', '.join(f'{package}.node' for package in MAY_TOUCH_ROS)
-    tell = f'import sys, {nodes}, mount_recorder.node, mount_replay.drive.drive; print(*sys.modules)'
+    tell = f'import sys, {nodes}, mount_recorder.node, engine_mount.drives.drive; print(*sys.modules)'
     loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
     assert not {'asammdf', 'pandas', 'pyarrow', 'fsspec', 'dask'} & set(loaded.split())
 
@@ -120,7 +121,7 @@ def test_python_can_is_loaded_in_one_place():
 
 def test_the_fits_of_the_actuator_never_see_the_truth():
     """Nor do driver, initialisation and controller: their packages lie below `mount_sim`."""
-    fits = SOURCES / 'mount_identification' / 'mount_identification' / 'actuator'
+    fits = SOURCES / 'engine_mount' / 'engine_mount' / 'identification' / 'actuator'
     modules = {module for file in fits.rglob('*.py') for module in modules_of(file)}
     assert 'mount_models.actuator.law' in modules
     assert not {module for module in modules if module.startswith('mount_sim')}

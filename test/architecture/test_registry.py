@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import typer
 
+from engine_mount.cli.command import app
 from mount_bringup.graph.nodes import SIMULATED
-from mount_cli.command import app
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
 from mount_models.actuator.law import ForceLaw
@@ -45,7 +45,7 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_ros/data_path.py',
     'mount_ros/nodes/diagnostics.py',
     'mount_bringup/graph/graph.py',
-    'mount_cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
+    'engine_mount/cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
 }
 
 PARAMETER_SETS = {
@@ -101,9 +101,9 @@ def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
 def test_only_experiments_use_the_topics_of_the_rack():
     of_rack = {constant for constant, value in vars(topics).items() if value in RACK_TOPICS}
     using = {
-        file.relative_to(SOURCES).parts[0] for file in python_files() if of_rack & set(topics_used_in(file))
+        file.relative_to(SOURCES).parts[:3] for file in python_files() if of_rack & set(topics_used_in(file))
     }
-    assert using == {'mount_experiments'}
+    assert using == {('engine_mount', 'engine_mount', 'experiments')}
 
 
 @pytest.mark.parametrize('policy', POLICIES)
@@ -172,8 +172,12 @@ def test_bringup_readme_lists_every_option_of_drive():
     command = typer.main.get_command(app)
     assert isinstance(command, typer.core.TyperGroup)
     options = {parameter.opts[0] for parameter in command.commands['drive'].params}
-    assert {row['option'].split()[0] for row in table('drive', 'src/mount_cli/README.md')} == options
-    commands = {row['command'].split()[1] for row in table('Commands', 'src/mount_cli/README.md')}
+    assert {
+        row['option'].split()[0] for row in table('drive', 'src/engine_mount/engine_mount/cli/README.md')
+    } == options
+    commands = {
+        row['command'].split()[1] for row in table('Commands', 'src/engine_mount/engine_mount/cli/README.md')
+    }
     assert commands == set(command.commands)
 
 

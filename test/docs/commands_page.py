@@ -10,7 +10,7 @@ import typer
 from generated import PAGES, table, written_by
 from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 
-from mount_cli.command import app
+from engine_mount.cli.command import app
 
 PAGE = PAGES / 'commands.md'
 
@@ -18,7 +18,7 @@ HEAD = f"""# Commands
 
 What `engine-mount COMMAND --help` tells. {written_by(__file__)}
 What each command promises by its exit code: [exit codes](exit_codes.md); what else is to know of it:
-[mount_cli](../../src/mount_cli/README.md#commands).
+[engine_mount.cli](../../src/engine_mount/engine_mount/cli/README.md#commands).
 """
 WORDS = {'int': 'NUMBER', 'float': 'NUMBER', 'str': 'TEXT', 'path': 'PATH'}
 """What stands for a value where the option does not name it itself."""

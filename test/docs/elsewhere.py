@@ -5,7 +5,7 @@ _HARDWARE = 'by nobody: with a CAN FD adapter and the electronics of a mount'
 _LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
 _BAG_PLAY = 'on a ROS 2 installation; test/graph/test_bag_play.py plays to the same nodes'
 _RECORD = 'beside a running graph in test/graph/test_recording.py'
-_VIEW = 'with clients of its own in src/mount_view/test'
+_VIEW = 'with clients of its own in src/engine_mount/test/view'
 _SET = 'on a running node in test/replay/test_parameter_changes.py'
 
 ELSEWHERE = {
@@ -40,7 +40,7 @@ ELSEWHERE = {
     'engine-mount record --': _RECORD,
     'engine-mount view': _VIEW,
     'engine-mount status': _VIEW,
-    'engine-mount identify friction --train': 'it takes long; src/mount_cli/test/test_identify_friction.py',
+    'engine-mount identify friction --train': 'src/engine_mount/test/cli/test_identify_friction.py, for it takes long',
 }
 """{beginning of the commands: where they are run}."""
 

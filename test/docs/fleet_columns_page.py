@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from generated import PAGES, table, written_by
 
-from mount_replay.fleet.catalogue.columns import EVENTS, RECORDINGS
-from mount_replay.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
-from mount_replay.fleet.what_if.columns import REPLAY_COLUMNS
+from engine_mount.fleet.catalogue.columns import EVENTS, RECORDINGS
+from engine_mount.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
+from engine_mount.fleet.what_if.columns import REPLAY_COLUMNS
 
 PAGE = PAGES / 'fleet_columns.md'
 

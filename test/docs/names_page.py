@@ -8,8 +8,8 @@ from typing import Any
 
 from generated import PAGES, first_paragraph, table, written_by
 
+from engine_mount.experiments.registry import listed
 from mount_control.policy.registry import DEFAULT, POLICIES, prefix_of
-from mount_experiments.registry import listed
 from mount_models.damper import DAMPER_LAWS
 from mount_models.quantity import quantities
 from mount_sim.excitation.scenario import SCENARIO_NAMES

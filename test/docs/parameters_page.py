@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from engine_mount.cli.completion.collected import collected
+from engine_mount.cli.completion.values import FILE as NAMES
 from mount_bringup.settings import defaults_of_nodes
-from mount_cli.completion.collected import collected
-from mount_cli.completion.values import FILE as NAMES
 from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters

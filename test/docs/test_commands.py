@@ -20,7 +20,7 @@ from elsewhere import ELSEWHERE, STAND_INS
 from pages import GUIDES, PAGES, REPOSITORY, Block, blocks, name_of
 from typer.core import TyperCommand, TyperGroup
 
-from mount_cli.command import app
+from engine_mount.cli.command import app
 
 LANGUAGES = ('sh', 'console', 'python')
 LIMIT = 240.0  # s: only a hang takes so long

@@ -2,7 +2,7 @@
 
 from typer.testing import CliRunner, Result
 
-from mount_cli.command import app
+from engine_mount.cli.command import app
 
 
 def run(*words) -> Result:

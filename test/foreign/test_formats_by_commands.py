@@ -8,9 +8,9 @@ import yaml
 from command import done
 
 import engine_mount
+from engine_mount import fleet
 from engine_mount.recordings.run.session import recorded_session, session_content
-from mount_replay import fleet
-from mount_signals.testing import MAKERS
+from engine_mount.signals.testing import MAKERS
 
 TIMES = np.arange(400) / 200.0  # s: 200 Hz, as vehicles record
 TRAVEL = 0.8e-3 * np.sin(2.0 * np.pi * 8.0 * TIMES)  # m
@@ -42,7 +42,7 @@ def said(made):
 
 
 FIRST = ('csv', 'mdf', 'mcap')
-"""Formats that `make test` passes through the commands; `src/mount_signals/test` reads all of them."""
+"""Formats that `make test` passes through the commands; `src/engine_mount/test/signals` reads all of them."""
 each_format = pytest.mark.parametrize(
     'made',
     [pytest.param(name, marks=() if name in FIRST else pytest.mark.slow) for name in MAKERS],
@@ -81,7 +81,7 @@ def test_import(made, tmp_path):
     assert acceleration[::5][40:360] == pytest.approx(SHAKING[40:360] + GRAVITY, abs=2e-4)
 
 
-@pytest.mark.slow  # src/mount_replay/test/test_fleet_foreign.py indexes foreign files as well
+@pytest.mark.slow  # src/engine_mount/test/fleet/test_fleet_foreign.py indexes foreign files as well
 @each_format
 def test_fleet_index(made, tmp_path):
     files = tmp_path / 'drives'

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command import done, refused
 
-from mount_signals.testing import MAKERS, make_csv
+from engine_mount.signals.testing import MAKERS, make_csv
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.rack.friction import RackNoise, sawtooth
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import engine_mount
+from engine_mount.drives.replay import ReplayOrder, replay_without_output
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
 from engine_mount.recordings.audit.node_reports import node_reports
 from engine_mount.recordings.run.session import recorded_sample_rate
-from mount_replay.replay import ReplayOrder, replay_without_output
 
 DATA_TOPICS = (
     'displacement',

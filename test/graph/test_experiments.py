@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import engine_mount
+from engine_mount.cli.command import main
 from engine_mount.recordings.run.session import recorded_session
-from mount_cli.command import main
 
 pytestmark = pytest.mark.slow
 

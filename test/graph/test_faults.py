@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from mount_replay.faults.fault import SAFE, Reaction
-from mount_replay.faults.matrix import MATRIX
+from engine_mount.faults.fault import SAFE, Reaction
+from engine_mount.faults.matrix import MATRIX
 from mount_ros.testing import free_domain
 
 QUICK = (

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mount_cli.command import main
+from engine_mount.cli.command import main
 
 PAPER = ('--set', 'mount_control.policy=switched_viscous')
 

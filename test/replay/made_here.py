@@ -16,11 +16,11 @@ from numba.core.registry import cpu_target
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
 
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.replay import CORE, ReplayOrder, replay
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
 from mount_recorder.session import session_text
-from mount_replay.loop.recording import record_core
-from mount_replay.replay import CORE, ReplayOrder, replay
 from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 

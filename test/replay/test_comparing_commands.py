@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
 import engine_mount
+from engine_mount.cli.command import app
 from engine_mount.recordings.compare.reference import differences_from_reference
-from mount_cli.command import app
 
 DRIVE = (
     'drive',

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from engine_mount.drives.loop import chain as core_chain
+from engine_mount.drives.loop import run as core_run
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.loop.run import CoreOutcome, run_core
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.messages.series import Series
+from engine_mount.reports.drive.evaluation import switching, tracking_error
+from engine_mount.reports.drive.signals import DriveSignals, load_drive
 from mount_bringup.chosen import policy_of
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
 from mount_models.damper import damper_curve
 from mount_models.specimen import default_specimen
-from mount_replay.loop import chain as core_chain
-from mount_replay.loop import run as core_run
-from mount_replay.loop.recording import record_core
-from mount_replay.loop.run import CoreOutcome, run_core
-from mount_report.drive.evaluation import switching, tracking_error
-from mount_report.drive.signals import DriveSignals, load_drive
 from mount_ros import topics
 from mount_ros.topics import Topic
 from mount_sim.excitation.building import build_excitation

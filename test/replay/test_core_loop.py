@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from engine_mount.drives.loop.run import run_core
 from mount_control.control_loop import ControlLoop
-from mount_replay.loop.run import run_core
 from mount_ros import topics
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 import engine_mount
-from mount_cli.command import app
+from engine_mount.cli.command import app
+from engine_mount.drives import drive as driving
 from mount_recorder.bag_writer import BagWriter
-from mount_replay.drive import drive as driving
 from mount_ros.messages.cdr import serialised
 
 REPOSITORY = Path(__file__).resolve().parents[2]

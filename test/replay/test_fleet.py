@@ -9,12 +9,12 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from mount_cli.command import app
-from mount_replay import fleet
-from mount_replay.fleet.example.fleet import make_example
+from engine_mount import fleet
+from engine_mount.cli.command import app
+from engine_mount.fleet.example.fleet import make_example
 
-# The stores are those that the tests of mount_signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'test'))
+# The stores are those that the tests of engine_mount.signals fetch from.
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount.signals' / 'test'))
 
 from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_store
 

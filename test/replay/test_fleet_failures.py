@@ -13,20 +13,20 @@ from pathlib import Path
 
 import pytest
 
-from mount_replay.fleet.away import IN_A_ROW
-from mount_replay.fleet.catalogue import index as indexing
-from mount_replay.fleet.catalogue.index import indexed
-from mount_replay.fleet.columns import WritingError
-from mount_replay.fleet.runner import Done
-from mount_replay.fleet.what_if import run
-from mount_replay.fleet.what_if.run import FleetOrder, replay_fleet
-from mount_replay.replay import parsed_changes
-from mount_signals.sources import remote
-from mount_signals.sources.patience import Patience
-from mount_signals.sources.source import StoreAwayError
+from engine_mount.drives.replay import parsed_changes
+from engine_mount.fleet.away import IN_A_ROW
+from engine_mount.fleet.catalogue import index as indexing
+from engine_mount.fleet.catalogue.index import indexed
+from engine_mount.fleet.columns import WritingError
+from engine_mount.fleet.runner import Done
+from engine_mount.fleet.what_if import run
+from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
+from engine_mount.signals.sources import remote
+from engine_mount.signals.sources.patience import Patience
+from engine_mount.signals.sources.source import StoreAwayError
 
-# The stores are those that the tests of mount_signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'mount_signals' / 'test'))
+# The stores are those that the tests of engine_mount.signals fetch from.
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount.signals' / 'test'))
 
 from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
 
@@ -46,7 +46,7 @@ GIVEN_UP = (
 )
 COMMAND = """
 import os, signal, sys
-from mount_replay.fleet.what_if import run
+from engine_mount.fleet.what_if import run
 
 run._WRITTEN_AFTER = 0.0
 take, taken = run._Run._take, []
@@ -58,7 +58,7 @@ def interrupted(self, *given):
 
 if __name__ == '__main__':
     run._Run._take = interrupted
-    from mount_cli.command import main
+    from engine_mount.cli.command import main
     main(sys.argv[1:])
 """
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
+from engine_mount.drives.loop import recording as core_recording
+from engine_mount.drives.loop import run as core_run
+from engine_mount.drives.loop.chain import CoreChain
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
 from mount_bringup.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
-from mount_replay.loop import recording as core_recording
-from mount_replay.loop import run as core_run
-from mount_replay.loop.chain import CoreChain
-from mount_replay.loop.recording import record_core
-from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT

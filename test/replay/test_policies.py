@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 import engine_mount
+from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
 from engine_mount.recordings.compare.compare import compare
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
+from engine_mount.reports.drive.evaluation import tracking_error
+from engine_mount.reports.drive.signals import load_drive
+from engine_mount.reports.run_facts import run_facts
+from engine_mount.reports.signals import Signals
 from mount_bringup.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import ParameterError
 from mount_recorder.session import session_text
-from mount_replay.drive.drive import DriveOrder, record_drive
-from mount_replay.loop.recording import record_core
-from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
-from mount_report.drive.evaluation import tracking_error
-from mount_report.drive.signals import load_drive
-from mount_report.run_facts import run_facts
-from mount_report.signals import Signals
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'src' / 'mount_control' / 'test'
 SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.0}

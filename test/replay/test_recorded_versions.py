@@ -4,12 +4,12 @@ import io
 
 import pytest
 
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from engine_mount.drives.summary import print_replay, replay_figures
 from engine_mount.recordings.run.screen import Screen
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
-from mount_replay.loop.recording import record_core
-from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from mount_replay.summary import print_replay, replay_figures
 
 SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
 

@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine_mount.drives.inputs.input import Notes, recorded_parameters
+from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from engine_mount.recordings.bag.recording import open_recording
 from engine_mount.recordings.compare.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
 from engine_mount.recordings.events.switching_changes import switching_times
@@ -16,8 +18,6 @@ from engine_mount.recordings.run.session import (
     versions_sentence,
 )
 from mount_recorder.versions import versions
-from mount_replay.given.input import Notes, recorded_parameters
-from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 REFERENCES = sorted(
     folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()

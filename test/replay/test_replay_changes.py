@@ -1,6 +1,6 @@
 """The parameters of a replay: as recorded, but for what is changed."""
 
-from mount_replay.replay import with_changes
+from engine_mount.drives.replay import with_changes
 
 RECORDED = {
     'mount_init': {'peak_current': 2.5},

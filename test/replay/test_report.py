@@ -13,13 +13,13 @@ from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
 import engine_mount
+from engine_mount.cli.command import app
 from engine_mount.recordings.events.recorded_events import event_time, recorded_events
-from mount_cli.command import app
+from engine_mount.reports import report
+from engine_mount.reports.pages import default_pictures
+from engine_mount.reports.sections import overview as overview_section
+from engine_mount.reports.signals import Signals
 from mount_recorder.bag_writer import BagWriter
-from mount_report import report
-from mount_report.pages import default_pictures
-from mount_report.sections import overview as overview_section
-from mount_report.signals import Signals
 from mount_ros.messages.cdr import serialised
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
@@ -130,8 +130,8 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('mount_report.drive.picture.draw_drive', 'drive.png'),
-        ('mount_report.pages.make_report', 'report.html'),
+        ('engine_mount.reports.drive.picture.draw_drive', 'drive.png'),
+        ('engine_mount.reports.pages.make_report', 'report.html'),
     ],
 )
 def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figures(

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine_mount.drives.loop.messages import Samples
+from engine_mount.drives.loop.run import run_core_into
 from mount_driver.parameters import DriverParameters
 from mount_driver.watches.ripple_law import RippleLaw
 from mount_driver.watches.ripple_watch import RippleWatch
-from mount_replay.loop.messages import Samples
-from mount_replay.loop.run import run_core_into
 
 CONTACT = 0.4725  # A, section 3.4
 FAULT = 8.0  # s: the motorway damps before and behind

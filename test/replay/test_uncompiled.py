@@ -19,7 +19,7 @@ REPLAYS = """
 import sys, types
 from pathlib import Path
 from mount_models.arithmetic.interpolation import interpolated
-from mount_replay.replay import CORE, ReplayOrder, replay
+from engine_mount.drives.replay import CORE, ReplayOrder, replay
 
 assert isinstance(interpolated, types.FunctionType), 'compiled'
 folder, *references = map(Path, sys.argv[1:])

@@ -3,11 +3,11 @@
 import pytest
 
 import engine_mount
+from engine_mount.drives.inputs.ramps import measured_gaps
+from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from engine_mount.recordings.compare.reference import accept
 from mount_recorder.session import session_text
-from mount_replay.given.ramps import measured_gaps
-from mount_replay.loop.recording import record_core
-from mount_replay.replay import CORE, LOCKSTEP, ReplayOrder, replay
 
 SIM = {
     'scenario': 'bench',

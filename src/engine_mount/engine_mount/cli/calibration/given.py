@@ -1,0 +1,100 @@
+"""What the caller says of single files and columns, from the texts of options."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from engine_mount.signals.formats.content import Stated
+    from engine_mount.signals.units.mapping import ColumnChoice, Mapping
+
+_CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
+_MAPPED = {'air_gap': 'gap', 'temperature': 'coil_temperature'}
+
+
+def orders_of(text: str) -> tuple[int, int, int, int, int]:
+    """Return the numbers of coefficients of a1 .. a5 from `4,4,4,2,4`; raises `typer.BadParameter`."""
+    parts = text.replace(' ', '').split(',')
+    if len(parts) != 5 or not all(part.isdigit() for part in parts):
+        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
+    a, b, c, d, e = (int(part) for part in parts)
+    return a, b, c, d, e
+
+
+def columns_of(settings: list[str], mapping: 'Mapping') -> dict[str, 'ColumnChoice']:
+    """Return the column of each channel, of a mapping and of `--column`, which goes before it.
+
+    Raises `typer.BadParameter`.
+    """
+    from engine_mount.signals.units.mapping import ColumnChoice
+
+    said = {
+        _MAPPED.get(name, name): choice
+        for name, choice in (*mapping.others.items(), *mapping.columns.items())
+    }
+    chosen = {name: choice for name, choice in said.items() if name in _CHANNELS}
+    for setting in settings:
+        name, equals, header = setting.partition('=')
+        if not (equals and name and header):
+            raise typer.BadParameter(f'--column {setting}: write NAME=HEADER:UNIT, as in gap=Spalt:um')
+        if name not in _CHANNELS:
+            raise typer.BadParameter(f'--column {setting}: {name!r} is none of {", ".join(_CHANNELS)}')
+        chosen[name] = ColumnChoice(header)
+    return chosen
+
+
+def per_file(settings: list[str], files: list[Path], option: str, factor: float) -> dict[Path, float]:
+    """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
+    values = {}
+    for setting in settings:
+        named, equals, text = setting.rpartition('=')
+        meant = [file for file in files if str(file) == named or file.name == named]
+        if not equals or len(meant) != 1:
+            what = 'no file' if not meant else f'{len(meant)} files'
+            raise typer.BadParameter(
+                f'{option} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
+            )
+        values[meant[0]] = _number(text, f'{option} {setting}') * factor
+    for file, value in values.items():
+        if option == '--gap' and not 20e-6 <= value <= 5e-3:
+            guess = '; was it meant in mm?' if 20e-6 <= value * 1e3 <= 5e-3 else ''
+            raise typer.BadParameter(
+                f'--gap {file.name}={value / factor:g}: an air gap must lie within 20 .. 5000 um{guess}'
+            )
+    return values
+
+
+def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str], stated: 'Stated') -> Any:
+    """Return what the caller says of gaps (um) and temperatures (degC) as `GivenValues`."""
+    from engine_mount.identification.rack.given import GivenValues
+
+    single = [setting for setting in temperatures if '=' in setting]
+    common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
+    if len(common) > 1:
+        raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
+    celsius = per_file(single, files, '--coil-temperature', 1.0)
+    for value in (*celsius.values(), *common):
+        if not -60.0 <= value <= 250.0:
+            raise typer.BadParameter(
+                f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
+            )
+    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None, stated)
+
+
+def positive(value: float | None, option: str, unit: str) -> float | None:
+    """Return `value`, or raise `typer.BadParameter` unless it is None or above 0."""
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise typer.BadParameter(f'{option} ({value:g} {unit}) must be above 0')
+    return value
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise typer.BadParameter(f'{where}: {text!r} is no number')
+    return value

@@ -1,0 +1,56 @@
+"""`engine-mount audit`: was anything lost in a recording?"""
+
+import typer
+
+from engine_mount.cli.commands.options import JsonFile, RecordingPlace
+from engine_mount.cli.fetching import local
+from engine_mount.cli.terminal import note, terminal
+
+EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
+control left samples without a setpoint, on faults, or when nothing can be read.
+
+Examples:
+
+`engine-mount audit bags/first/recording`
+
+`engine-mount audit /data/rosbag2_2024_05_02 --json audit.json` - any rosbag2 recording
+
+`engine-mount audit s3://bucket/drives/first` - fetched first; sftp, gs, http(s) and file too
+
+A topic with a rate is judged by its stamps, every topic by what the recorder, the file or its
+metadata counted. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
+neighbouring stamps. Samples lost, samples unanswered and faults are the figures of `drive` and `report`.
+The JSON holds them, and below `topics` for each topic `expected`, `present`, `lost`, `duplicated`,
+`longest_gap_s` and more; unknown is null.
+"""
+
+
+def audit(
+    recording: RecordingPlace,
+    json_file: JsonFile = None,
+) -> None:
+    """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.recordings.audit.audit import audit as audited
+    from engine_mount.recordings.audit.losses import losses
+    from engine_mount.recordings.audit.report import as_json, as_table, latency_lines, sentences
+    from engine_mount.recordings.run.place import open_run
+    from engine_mount.reports.json_file import write_json
+
+    console = terminal()
+    place = local(recording, console)
+    with console.status('reading'):
+        opened = open_run(place)
+        audits = audited(opened)
+        found = losses(opened, audits)
+    TerminalScreen(console).table(as_table(audits))
+    for line in latency_lines(audits):
+        console.print(line, soft_wrap=True)
+    for sentence in sentences(audits, found):
+        console.print(sentence, soft_wrap=True)
+    for warning in opened.warnings:
+        note(console, warning)
+    if json_file is not None:
+        write_json(as_json(audits, found), json_file)
+    if not found.sound:
+        raise typer.Exit(1)

@@ -1,0 +1,90 @@
+"""`engine-mount check`: the manoeuvre suite that a change passes before it goes into the car."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from engine_mount.cli.commands.options import Domain, JsonFile, NewFolder, Settings
+from engine_mount.cli.terminal import terminal
+
+EPILOG = """Exit code: 0 when every manoeuvre stayed within its limits; 1 when a limit was exceeded; 2 for a
+wrong use of the command, of a suite or of a parameter, and nothing was driven.
+
+Examples:
+
+`engine-mount check` - the shipped suite, without middleware
+
+`engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
+
+`engine-mount check --only gap_20mm,rack --through lockstep` - two manoeuvres through the nodes
+
+`engine-mount check --suite ours.yaml --json check.json --out bags/check` - your own manoeuvres and limits
+"""
+
+
+def check(
+    suite: Annotated[
+        Path | None, typer.Option(metavar='FILE', help='manoeuvres and limits; default: those shipped')
+    ] = None,
+    only: Annotated[str, typer.Option(metavar='NAME,...', help='these manoeuvres only')] = '',
+    show: Annotated[bool, typer.Option('--list', help='tell which manoeuvres there are')] = False,
+    through: Annotated[
+        str, typer.Option(metavar='WORD', help='core, lockstep, or graph (in real time)')
+    ] = 'core',
+    settings: Settings = None,
+    policy: Annotated[str, typer.Option(help='of the controller: mount_control.policy')] = '',
+    mount: Annotated[str, typer.Option(help='in the seat: mount_sim.mount')] = '',
+    jobs: Annotated[int, typer.Option(min=0, help='core: manoeuvres at a time; 0: one per core')] = 0,
+    json_file: JsonFile = None,
+    out: NewFolder = None,
+    priority: Annotated[
+        int, typer.Option(min=0, max=90, help='graph: real-time priority where permitted; 0: none')
+    ] = 10,
+    domain: Domain = None,
+) -> None:
+    """Drive the manoeuvre suite and tell which limits hold, the worst first."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.experiments.check.judgement import all_verdicts, passed
+    from engine_mount.experiments.check.page import PAGE, write_page
+    from engine_mount.experiments.check.session import CheckOrder, run_trials, trials_of
+    from engine_mount.experiments.check.suite import chosen_of, shipped_suite, suite_in_file
+    from engine_mount.experiments.check.telling import Told, figures_of, table_of
+    from engine_mount.experiments.check.trial import CORE, MODES
+    from engine_mount.recordings.run.folder import make_run_folder, new_place
+    from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.options import settings_of_options
+    from mount_bringup.graph.domain import chosen_domain
+
+    console = terminal()
+    if through not in MODES:
+        raise typer.BadParameter(f'--through is {", ".join(MODES)}; instead received {through!r}')
+    try:
+        known = shipped_suite() if suite is None else suite_in_file(suite)
+        chosen = chosen_of(known, [name for name in only.split(',') if name])
+        if show:
+            for each in chosen:
+                console.print(f'{each.name:14}{each.about}', soft_wrap=True)
+            return
+        given = settings_of_options(settings or [])
+        if policy:
+            given.setdefault('mount_control', {})['policy'] = policy
+        if mount:
+            given.setdefault('mount_sim', {})['mount'] = mount
+        of_graph = chosen_domain(domain) if through != CORE else 0
+        order = CheckOrder(chosen, through, given, jobs, of_graph, priority)
+        place = out or new_place('check')
+        trials = trials_of(order, place)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    folder = make_run_folder(place, 'check').path
+    screen = TerminalScreen(console)
+    results = run_trials(trials, jobs, screen, Told(order, screen))
+    verdicts = all_verdicts(chosen, results, through)
+    screen.table(table_of(results, verdicts))
+    if json_file is not None:
+        write_json(figures_of(order, results, verdicts), json_file)
+    write_page(order, results, verdicts, folder / PAGE)
+    console.print(f'page       {folder / PAGE}', soft_wrap=True)
+    if not all(map(passed, verdicts.values())):
+        raise typer.Exit(1)

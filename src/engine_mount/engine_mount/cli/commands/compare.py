@@ -1,0 +1,88 @@
+"""`engine-mount compare`: what is different between two recordings, in words."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from engine_mount.cli.commands.options import JsonFile, recording_argument
+from engine_mount.cli.fetching import local, named
+from engine_mount.cli.terminal import note, refuse, terminal
+
+EPILOG = """Examples:
+
+`engine-mount compare bags/before bags/after` - to the bit
+
+`engine-mount compare A B --tolerance current=0.01 --tolerance switching=0.002 --tolerance 0.1%`
+
+`engine-mount compare bags/long bags/cut --common --figure difference.png`
+"""
+_NOT_COMPARED = 2
+
+
+def compare(
+    a: Annotated[str, recording_argument('A')],
+    b: Annotated[str, recording_argument('B', 'the other one')],
+    tolerances: Annotated[
+        list[str] | None,
+        typer.Option(
+            '--tolerance',
+            metavar='NAME=VALUE',
+            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
+            'also topic=, topic.signal=, mount_left/topic.signal=',
+        ),
+    ] = None,
+    common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
+    json_file: JsonFile = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar='FILE', help='draw the most important differences (PNG)')
+    ] = None,
+) -> None:
+    """Tell in words how recording B differs from recording A.
+
+    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, as where A or B is
+    no recording.
+    """
+    try:
+        equal = _told(a, b, tolerances or [], common, json_file, figure)
+    except (ValueError, OSError) as error:
+        refuse(error)
+        raise typer.Exit(_NOT_COMPARED) from None
+    if not equal:
+        raise typer.Exit(1)
+
+
+def _told(
+    a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
+) -> bool:
+    """Compare, print and write what differs; return whether all is equal."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.recordings.compare.compare import compare as compare_recordings
+    from engine_mount.recordings.compare.signals import signal_table
+    from engine_mount.recordings.compare.tolerances import Tolerances
+    from engine_mount.recordings.run.place import open_run
+    from engine_mount.reports.json_file import write_json
+
+    console = terminal()
+    recordings = open_run(local(a, console)), open_run(local(b, console))
+    comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
+    console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
+    for sentence in comparison.sentences():
+        console.print(f'- {sentence}', soft_wrap=True)
+    if comparison.differing:
+        TerminalScreen(console).table(signal_table(comparison.signals))
+    console.print(
+        f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
+        soft_wrap=True,
+    )
+    for recording in recordings:
+        for warning in recording.warnings:
+            note(console, f'{named(recording.path)}: {warning}')
+    if json_file is not None:
+        write_json(comparison.figures(), json_file)
+    if figure is not None:
+        from engine_mount.reports.compare_picture import draw_comparison
+
+        draw_comparison(comparison, *recordings, figure)
+        console.print(f'figure {figure}', soft_wrap=True)
+    return comparison.equal

@@ -1,0 +1,110 @@
+"""`engine-mount record`: the recorder alone, beside a graph or without one."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+from engine_mount.cli.completion.values import named
+from engine_mount.cli.terminal import terminal
+
+EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
+loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
+
+Examples:
+
+`engine-mount record` - all topics, until Ctrl-C; `m` or space sets a mark
+
+`engine-mount record displacement control_trace --split 500MB --split 60s --out bags/long`
+
+`engine-mount record --snapshot 30s` - only what happens around marks, with the 30 s before each
+
+In a terminal a line tells messages per second, size, lost messages and marks. The topic `event`, which
+holds the marks, is always recorded. Times are those of the wall clock.
+"""
+
+
+def record(
+    topics: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar='[TOPIC]...', help='names of the registry; default: all', autocompletion=named('topic')
+        ),
+    ] = None,
+    out: NewFolder = None,
+    split: Split = None,
+    snapshot: Snapshot = '',
+    snapshot_after: Annotated[
+        str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
+    ] = '10s',
+    duration: Annotated[
+        float | None, typer.Option(metavar='S', help='length, s; default: until Ctrl-C')
+    ] = None,
+    on_full: Annotated[
+        str,
+        typer.Option(
+            metavar='WORD',
+            help='full disk: stop, or continue without recording until the end is asked for',
+            autocompletion=named('on_full'),
+        ),
+    ] = 'stop',
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Record topics until Ctrl-C; exit code 1 if anything was lost."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.drives.record import RecordOrder
+    from engine_mount.drives.record import record as run_record
+    from engine_mount.drives.recorder_options import checked_recorder, recorder_options
+    from engine_mount.recordings.run.folder import new_place
+    from mount_bringup.graph.domain import chosen_domain
+    from mount_recorder.parameters import RecorderParameters
+
+    if duration is not None and not duration > 0.0:
+        raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
+    options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
+    order = RecordOrder(
+        out=out if out is not None else new_place('record'),
+        topics=tuple(topics or ()),
+        parameters=checked_recorder(RecorderParameters(), options),
+        domain=chosen_domain(domain),
+        namespace=namespace,
+        duration=duration,
+    )
+    console = terminal()
+    outcome = run_record(order, TerminalScreen(console))
+    if outcome.failure:
+        _print('note', outcome.failure, console)
+    sound = [_told(folder, console) for folder in outcome.folders]
+    if not sound and not outcome.failure:
+        console.print('no event came, so no snapshot was saved', soft_wrap=True)
+    if outcome.failure or outcome.lost or not all(sound):
+        raise typer.Exit(1)
+
+
+def _told(folder: Path, console: Console) -> bool:
+    """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
+    from engine_mount.recordings.audit.audit import audit
+    from engine_mount.recordings.audit.losses import losses
+    from engine_mount.recordings.audit.report import sentences
+    from engine_mount.recordings.bag.recording import open_recording
+
+    recording = open_recording(folder)
+    audits = audit(recording)
+    found = losses(recording, audits)
+    for warning in recording.warnings:
+        _print('note', warning, console)
+    came = any(entry.present for name, entry in audits.items() if name != '/diagnostics')
+    if came:
+        _print('audit', sentences(audits, found)[-1], console)
+    else:
+        nothing = 'nothing was recorded, save perhaps /diagnostics'
+        _print('note', f'{nothing}; does a graph run in this domain, namespace?', console)
+    _print('recording', folder, console)
+    return came and found.lossless
+
+
+def _print(word: str, what: Any, console: Console) -> None:
+    console.print(f'{word:<10} {what}', soft_wrap=True)

@@ -1,0 +1,108 @@
+"""Options that say which road, and how it is driven; for `drive` and `road`."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from engine_mount.drives.brought import Brought
+    from engine_mount.signals.roads.profile import RoadProfile
+
+Lateral = Annotated[
+    float, typer.Option(metavar='M', help='road: track of an OpenCRG file, m left of its reference line')
+]
+HeightColumn = Annotated[str, typer.Option('--column', metavar='NAME[:UNIT]', help='column of the height')]
+Distance = Annotated[
+    str,
+    typer.Option(
+        metavar='NAME[:UNIT]|M', help='road: column of the distance, or the distance between two heights'
+    ),
+]
+SpeedText = Annotated[
+    str, typer.Option(metavar='M/S|FILE', help='road: 60/3.6, 60km/h, or a file of the speed over time')
+]
+ContactLength = Annotated[
+    float | None,
+    typer.Option(metavar='M', min=0.0, max=0.5, help='road: on so much of it the tyre stands; default: 0.1'),
+]
+Repeat = Annotated[bool, typer.Option('--repeat', help='road: drive it forth and back until the end')]
+
+
+def road_of_options(road: str, lateral: float, column: str, distance: str) -> 'RoadProfile':
+    """Return the road that the options name."""
+    from engine_mount.signals.roads.reading import road_profile
+
+    spacing = _number(distance)
+    return road_profile(
+        road,
+        lateral=lateral,
+        column=column,
+        distance='' if math.isfinite(spacing) else distance,
+        spacing=spacing,
+    )
+
+
+def brought_road(
+    road: str,
+    speed: str,
+    *,
+    lateral: float,
+    column: str,
+    distance: str,
+    contact_length: float | None,
+    repeat: bool,
+    sim: Mapping[str, Any],
+) -> 'Brought':
+    """Return the road that the options name, driven at their speed, as the simulator takes it.
+
+    `sim` are the parameters of mount_sim, for the duration.
+    """
+    from engine_mount.drives.brought import Brought
+    from engine_mount.signals.roads.driving import wheel_height
+    from engine_mount.signals.roads.iso8608 import unevenness
+    from engine_mount.signals.roads.speed import speed_of
+
+    if not speed:
+        raise typer.BadParameter(
+            '--road needs a speed: --speed 60/3.6 (m/s), or a file of the speed over time'
+        )
+    profile = road_of_options(road, lateral, column, distance)
+    over = wheel_height(
+        profile,
+        speed_of(speed),
+        contact_length=contact_length,
+        duration=float(sim.get('timeline.duration', 0.0)),
+        repeat=repeat,
+    )
+    notes = (f'{profile.name}: {sentence}' for sentence in (*unevenness(profile).sentences(), *over.notes))
+    return Brought('road.file', over.write, over.told, tuple(notes))
+
+
+def height_column(columns: Sequence[str]) -> str:
+    """Return the one column of the height, '' where none is named."""
+    if len(columns) > 1:
+        raise typer.BadParameter('--column is given once for a road: the column of its height')
+    return columns[0] if columns else ''
+
+
+def given_without_road(**options: Any) -> None:
+    """Refuse options that say something of a road where there is none."""
+    for name, value in options.items():
+        if value not in (None, '', False, 0.0):
+            raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
+
+
+def check_scenario(scenario: str, file: str) -> None:
+    """Refuse a road together with another scenario."""
+    if scenario not in ('motorway', 'road') or file:
+        other = '--file' if file else f'--scenario {scenario}'
+        raise typer.BadParameter(f'--road is a scenario of its own; leave out {other}')
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

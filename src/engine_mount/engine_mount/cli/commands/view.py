@@ -1,0 +1,103 @@
+"""`engine-mount view` and `status`: what the graph does now, or a recording by the clock."""
+
+from typing import Annotated
+
+import typer
+
+from engine_mount.cli.commands.options import Domain, JsonFile, Namespace, recording_argument
+from engine_mount.cli.fetching import local
+from engine_mount.cli.terminal import terminal
+
+EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to look at or a port is taken, with the reason.
+
+Examples:
+
+`engine-mount view` - beside a running drive: a page at localhost, and a server for Foxglove and Lichtblick
+
+`engine-mount view bags/first --rate 0.2` - a recording, five times slower
+
+`engine-mount view --host 0.0.0.0` - from a phone in the same network: with the token that is printed
+
+The page shows beside the mount that is driven what the hydromount, the mount without damping and the other
+policies would do on the same acceleration of the chassis. It needs nothing from the internet.
+"""
+
+STATUS_EPILOG = """Exit code: 0; 1 with `--once` when no node of the graph tells anything within 3 s.
+
+Examples:
+
+`engine-mount status` - beside a running drive, until Ctrl-C
+
+`engine-mount status --once --json status.json` - once, for scripts
+"""
+
+_ONCE_LIMIT = 3.0  # s, chosen
+_REFRESHES = 4  # a second, chosen
+
+
+def view(
+    recording: Annotated[
+        str | None,
+        recording_argument(
+            instead='folder of a run or of a recording, or its URI; without: the running graph'
+        ),
+    ] = None,
+    rate: Annotated[float, typer.Option(help='recording: speed against the clock')] = 1.0,
+    begin: Annotated[float, typer.Option('--from', metavar='S', help='recording: where to begin')] = 0.0,
+    host: Annotated[
+        str, typer.Option(help='address to listen at; other than this machine: by a token')
+    ] = '127.0.0.1',
+    port: Annotated[int, typer.Option(help='of the page')] = 8137,
+    foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
+    beside: Annotated[
+        bool, typer.Option('--beside/--no-beside', help='simulate other mounts and policies beside')
+    ] = True,
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
+    from engine_mount.view.view import ViewOrder, serve_view
+    from mount_bringup.graph.domain import chosen_domain
+
+    console = terminal()
+    place = None if recording is None else local(recording, console)
+    order = ViewOrder(place, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside)
+    serve_view(order, lambda text: console.print(text, soft_wrap=True))
+
+
+def status(
+    once: Annotated[bool, typer.Option('--once', help='print the state once and end')] = False,
+    json_file: JsonFile = None,
+    domain: Domain = None,
+    namespace: Namespace = '',
+) -> None:
+    """Show the state of the running graph on one screen of the terminal."""
+    import threading
+
+    from rich.live import Live
+
+    from engine_mount.reports.json_file import write_json
+    from engine_mount.view.feed.feed import FeedError
+    from engine_mount.view.screen import status_screen
+    from engine_mount.view.view import ViewOrder, model_of, wait_for_state
+    from engine_mount.view.window.told import told_state
+    from mount_bringup.graph.domain import chosen_domain
+    from mount_bringup.graph.shutdown import ending_signals
+
+    console = terminal()
+    order = ViewOrder(domain=chosen_domain(domain), namespace=namespace, beside=not once)
+    ending = threading.Event()
+    with ending_signals(ending.set), model_of(order) as (feed, model):
+        if once or json_file is not None:
+            wait_for_state(model, _ONCE_LIMIT)
+            console.print(status_screen(model, feed.title))
+            if json_file is not None:
+                write_json(told_state(model), json_file)
+            if not model.state.nodes:
+                raise typer.Exit(1)
+            return
+        with Live(status_screen(model, feed.title), console=console, refresh_per_second=_REFRESHES) as live:
+            while not model.failure and not ending.wait(1.0 / _REFRESHES):
+                live.update(status_screen(model, feed.title))
+        if model.failure:
+            raise FeedError(model.failure)

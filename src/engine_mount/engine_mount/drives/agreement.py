@@ -1,0 +1,180 @@
+"""Whether a replay gives the recorded answers: matched by stamps, then judged as any two recordings are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
+from engine_mount.drives.inputs.input import ReplayInput, Times
+from engine_mount.recordings.compare.compare import switching_sentence
+from engine_mount.recordings.compare.signals import (
+    Column,
+    Quantity,
+    SignalDifference,
+    signal_difference,
+    signal_sentences,
+)
+from engine_mount.recordings.compare.tolerances import EXACT
+from engine_mount.recordings.events.switching_changes import Switching, paired_switchings, switching_times
+from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
+
+# Where a recording begins in the middle of control: what the controller remembered is not in it. The
+# band-pass forgets by e^-25 in 1 s, the friction deflection slowly; measured after 3 s: within 0.06 uA.
+SETTLING = 3.0  # s, chosen
+SETTLED = 1e-6  # A, chosen
+_ACTIVE = 'damping_active'
+_NAMES = ('the recording', 'the replay')
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Recorded answers (A) against replayed ones (B); times in s on the recording's time axis."""
+
+    setpoints: SignalDifference
+    intermediates: tuple[SignalDifference, ...]
+    unanswered: int  # recorded setpoints of the samples replayed for which the replay has none
+    settling_skipped: int  # setpoints not compared, because the recording begins in the middle of control
+
+    @property
+    def differing(self) -> list[SignalDifference]:
+        """What is not the same to the bit: of setpoints and intermediates."""
+        return [signal for signal in (self.setpoints, *self.intermediates) if signal.differing]
+
+    @property
+    def equal(self) -> bool:
+        """Whether every compared setpoint and every intermediate is the same to the bit."""
+        return not (self.differing or self.unanswered)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the answers are equal, or as near as a recording that begins in the middle allows."""
+        if not self.settling_skipped or self.unanswered or self.setpoints.unknown_in_one:
+            return self.equal
+        largest = self.setpoints.largest
+        return largest is None or abs(largest.difference) <= SETTLED
+
+    @property
+    def sentences(self) -> list[str]:
+        """How they differ, in words, the most important first."""
+        steps = self.intermediates[0].samples if self.intermediates else 0
+        count = self.setpoints.samples
+        if self.equal:
+            return [
+                f'equal to the recorded setpoints to the last bit ({count} setpoints, '
+                f'{steps} steps with all their intermediates)'
+            ]
+        told = signal_sentences(self.differing, _NAMES[1])
+        if self.setpoints.differing:
+            told.insert(0, f'{self.setpoints.differing} of {count} setpoints differ')
+        if self.unanswered:
+            told.append(f'{self.unanswered} recorded setpoints have no answer in the replay')
+        return told
+
+
+def agreement(given: ReplayInput, replayed: Replayed) -> Agreement | None:
+    """Compare the replay with the recorded answers; None where there are none of its samples."""
+    recorded = given.answers
+    if recorded is None:
+        return None
+    answered = list(zip(given.parts, replayed.parts, strict=True))
+    settled = [_settled(part, answers) for part, answers in answered]
+    stamps = np.concatenate([answers.stamps for _, answers in answered])
+    currents = np.concatenate([answers.setpoints for _, answers in answered])
+    places, known = _matched(recorded.stamps, stamps)
+    judged = known & np.concatenate(settled)
+    if not judged.any():
+        return None
+    time = _seconds(given, stamps[judged])
+    setpoints = _judged(
+        CURRENT_SETPOINT,
+        'coil_current',
+        time,
+        recorded.currents[places[judged]],
+        currents[judged],
+        given.sample_time,
+    )
+    samples = np.concatenate([part.stamps for part in given.parts])
+    return Agreement(
+        setpoints=setpoints,
+        intermediates=_intermediates(given, answered, settled),
+        unanswered=np.setdiff1d(np.intersect1d(recorded.stamps, samples), stamps).size,
+        settling_skipped=int(np.count_nonzero(known & ~judged)),
+    )
+
+
+def replayed_switching(given: ReplayInput, replayed: Replayed) -> Switching:
+    """Return when the replay switched damping."""
+    return _switching(
+        given, [(run.stamps[run.traced], run.traces[_ACTIVE][run.traced]) for run in replayed.runs]
+    )
+
+
+def recorded_switching(given: ReplayInput) -> Switching | None:
+    """Return when damping was switched in the recording; None where it holds no traces."""
+    answers = given.answers
+    if answers is None or not answers.trace_stamps.size or _ACTIVE not in answers.traces:
+        return None
+    inside = [
+        (answers.trace_stamps >= run.stamps[0]) & (answers.trace_stamps <= run.stamps[-1])
+        for run in given.controls
+    ]
+    return _switching(given, [(answers.trace_stamps[run], answers.traces[_ACTIVE][run]) for run in inside])
+
+
+def switching_changes(recorded: Switching, replayed: Switching, sample_time: float) -> list[str]:
+    """Return the switchings that appeared, vanished or moved, in words; `sample_time` in s."""
+    a, b = ((np.array(times.on), np.array(times.off)) for times in (recorded, replayed))
+    changes = paired_switchings(a, b, sample_time)
+    return [switching_sentence(change, *_NAMES) for change in changes if change.alone or change.moved]
+
+
+def _intermediates(
+    given: ReplayInput, answered: list, settled: list[NDArray[np.bool_]]
+) -> tuple[SignalDifference, ...]:
+    assert given.answers is not None
+    steps = [
+        (answers, answers.traced & judged)
+        for (_, answers), judged in zip(answered, settled, strict=True)
+        if isinstance(answers, ControlAnswers)
+    ]
+    stamps = np.concatenate([answers.stamps[judged] for answers, judged in steps])
+    traces = np.concatenate([answers.traces[judged] for answers, judged in steps])
+    places, known = _matched(given.answers.trace_stamps, stamps)
+    time = _seconds(given, stamps[known])
+    return tuple(
+        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known], given.sample_time)
+        for name, values in given.answers.traces.items()
+        if name in (traces.dtype.names or ())  # another policy traces something else
+    )
+
+
+def _judged(
+    topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
+) -> SignalDifference:
+    unit = topic.unit(signal)
+    column = Column(Quantity('', topic.name, signal, '' if unit == '1' else unit), time, a, b)
+    return signal_difference(column, EXACT, None, sample_time)
+
+
+def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:
+    if getattr(part, 'from_its_beginning', True):
+        return np.ones(len(answers.stamps), bool)
+    return answers.stamps - answers.stamps[0] >= round(SETTLING * 1e9)
+
+
+def _matched(known: Times, stamps: Times) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return where each of `stamps` stands in the rising `known`, and whether it does."""
+    if not len(known):
+        return np.zeros(len(stamps), np.intp), np.zeros(len(stamps), bool)
+    places = np.clip(np.searchsorted(known, stamps), 0, len(known) - 1)
+    return places, known[places] == stamps
+
+
+def _switching(given: ReplayInput, runs: list[tuple[Times, NDArray]]) -> Switching:
+    times = [switching_times(_seconds(given, stamps), active) for stamps, active in runs]
+    return Switching(*(tuple(np.concatenate(each).tolist()) for each in zip(*times, strict=True)))
+
+
+def _seconds(given: ReplayInput, stamps: Times) -> NDArray[np.float64]:
+    return (stamps - given.zero) / 1e9

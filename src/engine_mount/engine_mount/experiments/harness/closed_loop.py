@@ -1,0 +1,65 @@
+"""Controller and plant together, once through: driven, recorded, and read back."""
+
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.experiments.harness.contract import ExperimentError, Order
+from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.run.screen import Screen
+from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from mount_bringup.graph.domain import chosen_domain
+from mount_bringup.settings import defaults_of_nodes
+from mount_sim.mount_choice import with_control_of_mount
+
+PAPER = 'switched_viscous'
+"""The policy of the paper, with which its scenes are driven."""
+
+
+def mode_of(order: Order) -> str:
+    """Return how an order's runs are driven."""
+    return 'lock-step' if order.graph else 'core'
+
+
+def settings_of_run(
+    order: Order, own: Mapping[str, Mapping[str, Any]], experiment: str
+) -> dict[str, dict[str, Any]]:
+    """Return the nodes' parameters: the user's and the experiment's `own`; raises where both set the same."""
+    merged = {node: dict(values) for node, values in order.settings.items() if node in defaults_of_nodes()}
+    for node, values in own.items():
+        for name, value in values.items():
+            if name in merged.get(node, {}):
+                raise ExperimentError(
+                    f'{node}.{name} is set by the experiment {experiment} itself; '
+                    f'choose among the parameters of {experiment}, or use engine-mount drive'
+                )
+            merged.setdefault(node, {})[name] = value
+    return with_control_of_mount(merged)
+
+
+def driven(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experiment: str) -> DriveSignals:
+    """Run a scenario in `order.out / label`, by plain calls or through the real nodes, and read it back.
+
+    Time and truth begin with the excitation; what rack and chassis measure is taken from the truth.
+    `own` holds the parameters that the experiment sets, `mount_sim.scenario` among them.
+    """
+    parameters = settings_of_run(order, own, experiment)
+    drive_order = DriveOrder(
+        scenario=str(own['mount_sim']['scenario']),
+        mode=mode_of(order),
+        parameters=parameters,
+        domain=chosen_domain(None) if order.graph else 0,
+        out=order.out / label,
+    )
+    # the experiments' own bar is on the screen
+    folder, run, complaints = record_drive(drive_order, Screen(io.StringIO()))
+    recording = open_recording(folder.recording)
+    complaints += recording.warnings
+    if complaints:
+        raise ExperimentError(
+            f'run {label} in {folder.path} was not as it should be: {"; ".join(complaints)}'
+        )
+    drive = load_drive(recording, float(run['excitation_start']))
+    return replace(drive, recording=folder.recording, truth=drive.truth.since(0.0))

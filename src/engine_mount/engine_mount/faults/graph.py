@@ -1,0 +1,220 @@
+"""The graph under test: the command `engine-mount drive` as a process, and what it leaves behind."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from engine_mount.faults.observers import Observers, Told, since
+from engine_mount.faults.processes import (
+    SHARED_MEMORY,
+    Process,
+    descendants,
+    process_of,
+    shared_memory_of_others,
+)
+from mount_bringup.graph.domain import DomainError, can_port, domain_lock
+from mount_bringup.graph.nodes import CONTROL, SIM, SIMULATED
+from mount_ros.nodes.process import tied
+
+PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
+START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
+_SETTLED = 0.3  # s, chosen: of current without a break counts as damping
+_LOOK_PERIOD = 0.005  # s
+_TRACEBACK = 'Traceback (most recent call last)'
+_DRIVE = (
+    '--scenario', 'bench', '--duration', '600', '--no-report',
+    '--restarts', '90',  # each fault is one of its own
+    '--set', 'mount_sim.timeline.start=3.2',  # chosen: the initialisation takes 3 s of rest
+)  # fmt: skip
+
+
+class GraphUnderTestError(RuntimeError):
+    """The graph under test did not come to the state in which a fault can be tried; the text says which."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where graphs under test run, and how they are started: `drive` is the command with its first words."""
+
+    drive: tuple[str, ...]
+    domain: int
+    folder: Path
+    priority: int = 0
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a graph under test has ended."""
+
+    code: int
+    output: str
+    left_behind: tuple[str, ...]  # processes, files of shared memory, locks
+    tracebacks: tuple[str, ...]  # log files that hold one
+
+
+class GraphUnderTest:
+    """One graph, from its start to its end; observed from outside."""
+
+    def __init__(
+        self,
+        place: Place,
+        namespace: str,
+        options: Sequence[str],
+        environment: Mapping[str, str],
+        observed: Observers,
+        operator: Node,
+    ):
+        self.namespace = namespace
+        self.domain = place.domain
+        self.folder = place.folder / namespace
+        self.observed = observed
+        self.operator = operator
+        self.refusals: list[str] = []
+        self._clients: dict[str, Client] = {}
+        self._executor = SingleThreadedExecutor(context=operator.context)
+        self._executor.add_node(operator)
+        self._shared: set[str] = set()
+        self._of_others = set(os.listdir(SHARED_MEMORY))
+        self._processes: set[Process] = set()
+        command = [*place.drive, *_DRIVE, '--out', str(self.folder), '--namespace', namespace]
+        command += ['--domain', str(place.domain), '--priority', str(place.priority), *options]
+        self._log = place.folder / f'{namespace}.log'
+        with self._log.open('wb') as log:
+            self.process = subprocess.Popen(
+                tied(command),
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, 'COLUMNS': '400', 'NO_COLOR': '1', **environment},
+                start_new_session=True,
+            )
+
+    @property
+    def port(self) -> int:
+        """UDP port of its CAN bus."""
+        return can_port(self.domain, self.namespace)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the command has ended, and every process that it was known to have."""
+        return self.process.poll() is not None and not self._alive()
+
+    @property
+    def output(self) -> str:
+        """What the command has printed so far."""
+        return self._log.read_text(errors='replace')
+
+    def outputs(self) -> dict[str, str]:
+        """Return {who: what it has printed}; not of the simulator, which tells what it was asked for."""
+        logs = {file.stem: file for file in self.folder.glob('log/*.log') if file.stem != SIM.name}
+        said = {name: file.read_text(errors='replace') for name, file in logs.items()}
+        return {'supervisor': self.output, **said}
+
+    def nodes(self) -> dict[str, Process]:
+        """Return {node: process} of those that the command has started and that still run."""
+        processes = [each for each in descendants(self.process.pid) if each.alive]
+        return {
+            node.name: each
+            for each in processes
+            for node in SIMULATED
+            if f'from {node.package}.node' in each.command
+        }
+
+    def damping(self) -> bool:
+        """Whether control is active, and has made the coil carry current without a break for a while."""
+        if CONTROL.name not in self.observed.active:
+            return False
+        now = time.monotonic()
+        heard = since(self.observed.heard, now - _SETTLED)
+        seen = since(self.observed.seen, now - _SETTLED)
+        enough = len(heard) > 0.8 * 1e3 * _SETTLED and len(seen) > 0.8 * 1e3 * _SETTLED
+        return enough and min(each.current for each in heard) > 0.0 and seen[-1].followed > 0.0
+
+    def wait_until(self, condition: Callable[[], bool], limit: float) -> bool:
+        """Return whether `condition` came true within `limit` s; it cannot once the graph has ended."""
+        end = time.monotonic() + limit
+        while not condition():
+            if time.monotonic() > end or self.ended:
+                return False
+            time.sleep(_LOOK_PERIOD)
+        return True
+
+    def wait_for_damping(self, tells: Callable[[Told], bool], limit: float = START_PATIENCE) -> None:
+        """Return when it damps, nothing is wrong and no node tells what `tells` picks.
+
+        What an earlier fault has left in a verdict would pass for telling of the next one. Raises
+        `GraphUnderTestError` after `limit` s.
+        """
+        if not self.wait_until(lambda: self.damping() and self.observed.quiet(tells), limit):
+            what = 'has ended' if self.ended else f'does not damp without complaint within {limit:g} s'
+            raise GraphUnderTestError(f'the graph {what}: {" ".join(self.output[-300:].split())}')
+        self.note_what_it_holds()
+
+    def note_what_it_holds(self) -> None:
+        """Remember its processes and the files of shared memory that they hold."""
+        for process in [process_of(self.process.pid), *descendants(self.process.pid)]:
+            self._processes.add(process)
+            self._shared |= process.shared_memory()
+
+    def call(self, kind: Any, service: str, request: Any, limit: float = PATIENCE) -> Any:
+        """Return the answer of a service of the graph, None if there is none."""
+        client = self.client(kind, service)
+        if not self.wait_until(client.service_is_ready, limit):
+            return None
+        answer = client.call_async(request)
+        self._executor.spin_until_future_complete(answer, timeout_sec=limit)
+        return answer.result() if answer.done() else None
+
+    def client(self, kind: Any, service: str) -> Client:
+        """Return the client of a service; made once, for it takes time until the service is found."""
+        if service not in self._clients:
+            self._clients[service] = self.operator.create_client(kind, service)
+        return self._clients[service]
+
+    def end(self, limit: float = PATIENCE) -> Ending:
+        """End it as Ctrl-C does, if it has not ended by itself, and look for what it has left behind."""
+        if not self.ended:
+            self.note_what_it_holds()
+            self.process.send_signal(signal.SIGINT)
+        try:
+            code = self.process.wait(2 * limit)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        last = time.monotonic() + limit
+        while self._alive() and time.monotonic() < last:
+            time.sleep(_LOOK_PERIOD)
+        left = tuple(self._left_behind())
+        for process in self._alive():
+            os.kill(process.pid, signal.SIGKILL)  # ours, and it would disturb all that follows
+        self._executor.shutdown()
+        return Ending(code, self.output, left, tuple(self._tracebacks()))
+
+    def _alive(self) -> list[Process]:
+        return [each for each in self._processes if each.alive]
+
+    def _left_behind(self) -> list[str]:
+        left = [f'process {each.pid}: {each.command:.80}' for each in self._alive()]
+        files = {name for name in self._shared - self._of_others if (SHARED_MEMORY / name).exists()}
+        if files:  # the middleware of other graphs takes up what one has left
+            files -= shared_memory_of_others(os.getpid())
+        left += [str(SHARED_MEMORY / name) for name in sorted(files)]
+        try:
+            with domain_lock(self.domain, self.namespace):
+                pass
+        except DomainError as error:
+            left.append(str(error))
+        return left
+
+    def _tracebacks(self) -> list[str]:
+        files = [self._log, *sorted(self.folder.glob('log/*.log'))]
+        return [file.name for file in files if _TRACEBACK in file.read_text(errors='replace')]

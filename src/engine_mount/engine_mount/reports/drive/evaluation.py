@@ -1,0 +1,84 @@
+"""How well friction followed what was wanted in a drive, when damping was on, and what its ends lack."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.recordings.audit.audit import TopicAudit
+from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.events.switching_changes import Switching, switching_times
+from engine_mount.reports.drive.signals import DriveSignals, Seen
+from mount_control.delay import LOOP_DELAY, delay_at
+from mount_control.policy.contract import Policy
+
+_MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
+
+
+def acts_after(sample_time: float) -> float:
+    """Return the time (s) from a sample to the middle of the effect of its setpoint."""
+    return delay_at(LOOP_DELAY, sample_time)
+
+
+def samples_at_the_ends(recording: Recording, topics: Mapping[str, TopicAudit], taken: int) -> list[str]:
+    """Return a sentence per topic with measurements that begins too late or ends too early.
+
+    Of these the stamps show nothing (`topics`: the audit); `taken` is the electronics' own count.
+    """
+    found = []
+    for name in _MEASURED:
+        missing = taken - (topics[recording.resolve(name)].expected or 0)
+        if missing > 0:
+            found.append(
+                f'{name}: {missing} of {taken} samples that the electronics took are missing before the '
+                'first or behind the last recorded one'
+            )
+    return found
+
+
+def levels_of(policy: Policy, parameters: Any) -> dict[str, float]:
+    """Return the displacements (m) that a policy wants drawn as lines, {} where it names none."""
+    levels = getattr(policy, 'levels', None)
+    return levels(parameters) if levels else {}
+
+
+def switching(seen: Seen) -> Switching:
+    """Return the times at which damping was switched."""
+    on, off = switching_times(seen.time, seen.damping_active)
+    return Switching(tuple(on.tolist()), tuple(off.tolist()))
+
+
+def tracking_error(drive: DriveSignals, policy: Policy, parameters: Any) -> float:
+    """Return the rms error of the friction force while damping is on, as a share of the peak wanted force.
+
+    NaN if damping was never on.
+    """
+    wanted, places = wanted_force(drive, policy, parameters)
+    on = places[drive.seen.damping_active]
+    if len(on) == 0 or not wanted[on].any():
+        return math.nan
+    error = drive.truth.friction_force[on] - wanted[on]
+    return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
+
+
+def wanted_force(
+    drive: DriveSignals, policy: Policy, parameters: Any
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
+
+    Wanted is what the policy says by its `wanted_force`, for the true velocity of the mount at that very
+    moment; so an error against it holds phase and delay as well as force. Of a policy without one it is the
+    force that it asked for, at the time at which its setpoint acts, so an error holds no error of prediction.
+    """
+    if ideal := getattr(policy, 'wanted_force', None):
+        wanted = ideal(parameters, drive.truth.velocity, drive.sample_time)
+    else:
+        wanted = np.interp(
+            drive.truth.time, drive.seen.time + acts_after(drive.sample_time), drive.seen.desired_force
+        )
+    places = np.clip(
+        np.searchsorted(drive.truth.time, drive.seen.time - 0.5 * drive.sample_time), 0, len(wanted) - 1
+    )
+    return wanted, places

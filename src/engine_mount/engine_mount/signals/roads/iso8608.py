@@ -1,0 +1,164 @@
+"""Class, unevenness and waviness of a road by ISO 8608, and periodic unevenness such as paving stones.
+
+The density Gd(n) of the height over the spatial frequency n is smoothed in octaves up to 0.0312 cycles/m, in
+thirds of them up to 0.25, in twelfths above, and a line Gd(n0) (n / n0)^-w is fitted to it in logarithms from
+0.011 to 2.83 cycles/m (ISO 8608:2016, 5.3 and annex). The class is that of Gd(n0) at n0 = 0.1 cycles/m.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from engine_mount.signals.roads.profile import FloatArray, RoadProfile
+from mount_sim.excitation.road import REFERENCE_FREQUENCY
+
+CLASSES = 'ABCDEFGH'
+FIRST_LIMIT = 32e-6  # m^3: between A and B; from class to class four times as much
+FITTED = (0.011, 2.83)  # cycles/m
+_SMOOTHING = ((0.0312, 1), (0.25, 3), (math.inf, 12))  # up to cycles/m: bands to the octave
+_LONGEST_SEGMENT = 256.0  # m, chosen: four averages over a kilometre, and a band below 0.011 cycles/m
+_PARTS = 8  # chosen: so many averages make a peak of chance unlikely
+_PEAK = 5.0  # chosen: of eight averages one in 10^8 is so far above its neighbours
+_NEIGHBOURS = 0.75  # octaves to either side
+_FEWEST_BANDS = 4
+_LONG = 0.3  # cycles/m, chosen: a road's density has its maximum below
+_CLIFF = 30.0  # chosen: no road falls so far below all that it was before, but a filter does
+_FADED = 3  # bands, chosen: what a filter took before that
+_HANN_WIDTH = 1.5  # lines of the spectrum: what a sine is spread over
+_LOWEST_WAVE = 1e-4  # m, chosen: less is not felt beside the roughness of asphalt
+_MOST = 3
+_HARMONIC = 0.06  # chosen
+
+
+class Period(NamedTuple):
+    """Something that comes again: wavelength and amplitude (m), density over that of its neighbours."""
+
+    wavelength: float
+    amplitude: float
+    ratio: float
+
+
+class Unevenness(NamedTuple):
+    """Gd(n0) (m^3), waviness, class, and what they were taken from: bands (n,) in cycles/m, densities in m^3.
+
+    `lowest` and `highest` (cycles/m) bound the fit; `beyond` tells that n0 lies outside.
+    """
+
+    roughness: float
+    waviness: float
+    letter: str
+    frequency: FloatArray
+    density: FloatArray
+    lowest: float
+    highest: float
+    periods: tuple[Period, ...]
+
+    @property
+    def beyond(self) -> bool:
+        """Whether n0 is outside of the bands, so that Gd(n0) continues the line."""
+        return not self.lowest <= REFERENCE_FREQUENCY <= self.highest
+
+    def sentences(self) -> tuple[str, ...]:
+        """Return what is to be told beside a road, one sentence a line."""
+        told = [
+            f'ISO 8608 class {self.letter}: Gd(0.1 cycles/m) {1e6 * self.roughness:.3g}e-6 m^3, waviness '
+            f'{self.waviness:.2f}, from {self.lowest:.3g} to {self.highest:.3g} cycles/m'
+        ]
+        if self.beyond:
+            told.append(
+                'too short or too coarse for 0.1 cycles/m: the class continues the line and is a guess'
+            )
+        told += [
+            f'periodic unevenness (stones, slabs or joints): {1e3 * period.amplitude:.2g} mm at a wavelength '
+            f'of {period.wavelength:.3g} m, {period.ratio:.0f} times the density around it'
+            for period in self.periods
+        ]
+        return tuple(told)
+
+
+def unevenness(profile: RoadProfile) -> Unevenness:
+    """Return class, roughness, waviness and periodic content of a road."""
+    raw, density = _density(profile.height, profile.spacing, min(profile.length, _LONGEST_SEGMENT))
+    frequency, smoothed = _smoothed(raw, density)
+    lowest, highest = _held(frequency, smoothed)
+    used = (frequency >= max(FITTED[0], lowest)) & (frequency <= min(FITTED[1], highest))
+    if np.count_nonzero(used) < _FEWEST_BANDS:
+        used = np.ones(frequency.size, bool)
+    slope, level = np.polyfit(np.log(frequency[used] / REFERENCE_FREQUENCY), np.log(smoothed[used]), 1)
+    roughness = float(np.exp(level))
+    return Unevenness(
+        roughness,
+        -float(slope),
+        class_of(roughness),
+        frequency,
+        smoothed,
+        float(frequency[used][0]),
+        float(frequency[used][-1]),
+        _periods(profile, (roughness, -float(slope)), highest),
+    )
+
+
+def _held(frequency: FloatArray, density: FloatArray) -> tuple[float, float]:
+    """Return the band that a road holds: filters, and inversion, leave nothing below or above."""
+    long = max(int(np.count_nonzero(frequency <= _LONG)), 1)
+    first = int(np.argmax(density[:long]))
+    before = np.minimum.accumulate(density[first:])[:-1]
+    behind = np.maximum.accumulate(density[:first:-1])[::-1]
+    cliffs = np.flatnonzero(behind * _CLIFF < before)
+    last = first + int(cliffs[0]) - _FADED if cliffs.size else frequency.size - 1
+    return float(frequency[first]), float(frequency[max(last, first)])
+
+
+def class_of(roughness: float) -> str:
+    """Return the class of a Gd(n0) in m^3."""
+    number = math.ceil(math.log(roughness / FIRST_LIMIT, 4.0))
+    return CLASSES[min(max(number, 0), len(CLASSES) - 1)]
+
+
+def _density(height: FloatArray, spacing: float, segment: float) -> tuple[FloatArray, FloatArray]:
+    """Return spatial frequencies (cycles/m) above 0 and one-sided densities (m^3) of heights."""
+    from scipy.signal import welch
+
+    count = min(height.size, max(round(segment / spacing), 16))
+    frequency, density = welch(height, 1.0 / spacing, 'hann', count, detrend='linear')
+    return frequency[1:], np.maximum(density[1:], np.finfo(float).tiny)
+
+
+def _smoothed(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the centres of the bands and the mean densities in them; empty bands are left out."""
+    centres, means = [], []
+    lower = frequency[0]
+    while lower < frequency[-1]:
+        parts = next(parts for limit, parts in _SMOOTHING if lower < limit)
+        upper = lower * 2.0 ** (1.0 / parts)
+        inside = (frequency >= lower) & (frequency < upper)
+        if inside.any():
+            centres.append(math.sqrt(lower * upper) if np.count_nonzero(inside) > 1 else frequency[inside][0])
+            means.append(density[inside].mean())
+        lower = upper
+    return np.array(centres), np.array(means)
+
+
+def _periods(profile: RoadProfile, line: tuple[float, float], highest: float) -> tuple[Period, ...]:
+    """Return the waves that stand out of their neighbours and of the fitted line, the highest first.
+
+    At most three up to `highest` (cycles/m), and none that is a harmonic of one of them.
+    """
+    frequency, density = _density(profile.height, profile.spacing, profile.length / _PARTS)
+    fitted = line[0] * (frequency / REFERENCE_FREQUENCY) ** -line[1]
+    amplitude = np.sqrt(2.0 * density * _HANN_WIDTH * frequency[0])
+    found: list[Period] = []
+    for place in np.argsort(-amplitude):
+        inside = 2 <= place < frequency.size - 2 and frequency[place] <= highest
+        if not inside or amplitude[place] < _LOWEST_WAVE or len(found) == _MOST:
+            continue
+        near = np.abs(np.log2(frequency / frequency[place])) < _NEIGHBOURS
+        near[place - 2 : place + 3] = False
+        if density[place] < density[place - 2 : place + 3].max() or np.count_nonzero(near) < _FEWEST_BANDS:
+            continue
+        ratio = density[place] / max(np.median(density[near]), fitted[place])
+        multiple = frequency[place] * np.array([period.wavelength for period in found])
+        if ratio > _PEAK and not np.any(np.abs(multiple - np.round(multiple)) < _HARMONIC):
+            found.append(Period(float(1.0 / frequency[place]), float(amplitude[place]), float(ratio)))
+    return tuple(found)

@@ -1,0 +1,168 @@
+"""Calibrations from MCAP recordings, as a rack makes them in the topics of a drive."""
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from geometry_msgs.msg import WrenchStamped
+from std_msgs.msg import String
+
+from engine_mount.cli.command import main
+from engine_mount.identification.rack.columns import RackRecordingError
+from engine_mount.identification.rack.force_points import read_force
+from engine_mount.identification.rack.given import GivenValues
+from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.signals.units.mapping import ColumnChoice
+from mount_models.actuator.law import checked_force
+from mount_models.coil.gap import evaluate
+from mount_models.sampling import SAMPLE_RATE
+from mount_models.specimen import default_specimen, load_specimen
+from mount_recorder.bag_writer import BagWriter
+from mount_ros.messages.cdr import serialised
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
+from mount_ros.messages.sensors import temperature_layout
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
+from mount_sim.electronics.electronics import status_every
+from mount_sim.plant.reluctance import force as magnetic_force
+from mount_sim.rack.coil import drawn_rack, record_ripple
+
+RACK = drawn_rack(5)
+GAPS = np.linspace(280e-6, 540e-6, 8)
+AREA = default_specimen().turns_area
+NOTHING = GivenValues({}, {})
+
+
+def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
+    """Record one held gap; every `spoil`-th ripple has no slopes, the coil grows warmer by `warming` K/s."""
+    columns = record_ripple(RACK, gap, celsius, duration=1.5, peak_current=2.5)
+    current = columns['current_a']
+    rate, flux = columns['current_rate_a_per_s'], columns['flux_rate_t_per_s']
+    if spoil:
+        rate[::spoil] = flux[::spoil] = np.nan
+    noise = 1.0 + 0.01 * np.random.default_rng([5, round(gap * 1e9)]).standard_normal(current.size)
+    pull = noise * np.array([magnetic_force(RACK.actuator, i, gap) for i in current.tolist()])
+    writer = BagWriter(folder)
+    begin = time.time_ns()
+    try:
+        for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
+            writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
+        writer.write(f'/{SESSION.name}', serialised(String(data='scenario: rack')), begin)
+        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), temperature_layout()
+        forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        rows = zip(current.tolist(), rate.tolist(), flux.tolist(), pull.tolist(), strict=True)
+        for sample, (i, of_current, of_flux, force) in enumerate(rows):
+            stamp = sample * 1_000_000
+            at = begin + stamp
+            ripple = ripples.pack(stamp, (i, math.nan), (of_current, of_flux))
+            writer.write(f'/{COIL_RIPPLE.name}', ripple, at)
+            writer.write(f'/{SIM_CLAMP_FORCE.name}', forces.pack(stamp, force), at)
+            if sample % status_every(SAMPLE_RATE) == 0:
+                writer.write(
+                    f'/{COIL_TEMPERATURE.name}',
+                    temperatures.pack(stamp, celsius + warming * 1e-9 * stamp),
+                    at,
+                )
+    finally:
+        writer.close()
+    return folder
+
+
+@pytest.fixture(scope='module')
+def recordings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('rack')
+    return [record(folder / f'held_{gap * 1e6:.1f}um', gap, spoil=40) for gap in GAPS]
+
+
+@pytest.fixture(scope='module')
+def calibrated(recordings, tmp_path_factory):
+    """Return the specimen of both commands run on the recordings alone."""
+    specimen = tmp_path_factory.mktemp('out') / 'left.yaml'
+    area = RACK.actuator.turns * RACK.actuator.gap_area
+    for arguments in (
+        ['actuator', *recordings],
+        ['inductance', *recordings, '--turns-area', area, '--base', specimen],
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(['calibrate', *map(str, arguments), '--name', 'left', '--out', str(specimen)])
+        assert end.value.code == 0
+    return specimen
+
+
+def test_force_and_gap_curves_come_out_of_recordings(calibrated):
+    specimen = load_specimen(calibrated, 'left')
+    gaps, currents = np.linspace(300e-6, 500e-6, 5), np.linspace(0.5, 2.4, 10)
+    for gap in gaps:
+        truth = np.array([magnetic_force(RACK.actuator, i, gap) for i in currents])
+        fitted = np.array([float(checked_force(specimen.force_law, i, gap)) for i in currents])
+        assert np.sqrt(np.mean((fitted / truth - 1.0) ** 2)) < 0.01
+    curves = specimen.gap_curves
+    for gap in gaps:
+        measured = record_ripple(RACK, float(gap), duration=1.5, peak_current=2.5)
+        at_rest = np.mean(measured['flux_rate_t_per_s'][:500] / measured['current_rate_a_per_s'][:500])
+        told = evaluate(curves.gap_of_inductance, specimen.turns_area * at_rest)
+        assert float(told) == pytest.approx(gap, abs=2e-6)
+
+
+def test_the_specimen_names_its_recordings_by_their_hash(calibrated, recordings):
+    parts = yaml.safe_load(calibrated.read_text())['provenance']['parts']
+    for part in ('force_law', 'gap_curves'):
+        assert [entry['file'] for entry in parts[part]['recordings']] == [file.name for file in recordings]
+
+
+def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6, celsius=61.2)
+    (ripple,) = read_ripple([bag], {}, NOTHING, AREA)
+    columns = record_ripple(RACK, 349e-6, 61.2, duration=1.5, peak_current=2.5)
+    assert (ripple.gap, ripple.celsius) == (pytest.approx(349e-6), pytest.approx(61.2))
+    np.testing.assert_array_equal(ripple.current, columns['current_a'])
+    np.testing.assert_allclose(
+        ripple.inductance, AREA * columns['flux_rate_t_per_s'] / columns['current_rate_a_per_s'], rtol=1e-12
+    )
+    given = GivenValues({bag: 350e-6}, {bag: 20.0})
+    (ripple,) = read_ripple([bag], {}, given, AREA)
+    assert (ripple.gap, ripple.celsius) == (350e-6, 20.0)
+
+
+def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6)
+    points = read_force([bag], {}, NOTHING)
+    assert 50 < points.current.size <= 100
+    assert (np.diff(points.current) > 0.0).all()
+    assert np.ptp(points.gap) == 0.0
+    assert points.gap[0] == pytest.approx(349e-6)
+    truth = np.array([magnetic_force(RACK.actuator, i, 349e-6) for i in points.current.tolist()])
+    np.testing.assert_allclose(points.force, truth, rtol=0.02)
+
+
+def test_a_recording_without_what_is_needed_is_refused(tmp_path):
+    bag = record(tmp_path / 'held', 349e-6)
+    with pytest.raises(RackRecordingError, match='its air gap is not known; add --gap held=UM'):
+        read_ripple([bag], {}, NOTHING, AREA)
+    given = GivenValues({bag: 349e-6}, {})
+    with pytest.raises(RackRecordingError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
+        read_force([bag], {'force': ColumnChoice('sim/mount_force:wrench.force.z')}, given)
+    with pytest.raises(RackRecordingError, match='of an MCAP recording write TOPIC:FIELD'):
+        read_force([bag], {'force': ColumnChoice('kraft')}, given)
+
+
+def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6, spoil=5)
+    with pytest.raises(RackRecordingError, match='20% of the inductances are not positive, at most 10%'):
+        read_ripple([bag], {}, NOTHING, AREA)
+
+
+def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6, warming=10.0)
+    with pytest.raises(RackRecordingError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
+        read_ripple([bag], {}, NOTHING, AREA)
+
+
+def test_a_single_mcap_file_is_read_as_its_folder_is(tmp_path):
+    bag = record(tmp_path / 'held_349um', 349e-6)
+    (file,) = Path(bag).glob('*.mcap')
+    (of_file,) = read_ripple([file], {}, NOTHING, AREA)
+    (of_folder,) = read_ripple([bag], {}, NOTHING, AREA)
+    np.testing.assert_array_equal(of_file.inductance, of_folder.inductance)

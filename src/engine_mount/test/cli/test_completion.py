@@ -1,0 +1,126 @@
+"""What Tab offers in the shells, and that it is what the code knows."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from engine_mount.cli.completion.bash import joined
+from engine_mount.cli.completion.collected import collected
+from engine_mount.cli.completion.values import FILE, faults, listed, named, recordings, references, setting
+
+COMMAND = Path(sys.executable).with_name('engine-mount')
+WITHOUT_DETECTION = {'_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION': '1'}
+IN_BASH = """eval "$(engine-mount --show-completion bash)"
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1))
+_engine_mount_completion engine-mount
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+def environment(**others: str) -> dict[str, str]:
+    path = f'{COMMAND.parent}{os.pathsep}{os.environ["PATH"]}'
+    return {**os.environ, **WITHOUT_DETECTION, 'PATH': path, **others}
+
+
+def first(offered: list[tuple[str, str]]) -> list[str]:
+    return [value for value, _ in offered]
+
+
+def test_the_names_that_are_offered_are_those_of_the_code():
+    renew = 'python test/docs/parameters_page.py renews them'
+    assert FILE.read_text(encoding='utf-8') == collected(), renew
+
+
+@pytest.mark.parametrize(
+    ('complete', 'begun', 'value'),
+    [
+        (named('scenario'), '', 'recorded'),
+        (named('mount'), 'h', 'hydro'),
+        (named('experiment'), 'saw', 'sawtooth'),
+        (listed('place'), 'left,r', 'left,right'),
+        (faults, 'right/coil_o', 'right/coil_open'),
+        (faults, '', 'list'),
+        (setting(), 'mount_control.pol', 'mount_control.policy=continuous_viscous'),
+        (setting(), 'switch_on', 'switch_on_level=0.0005'),
+        (setting(), 'sawtooth.amp', 'sawtooth.amplitude=0.0016'),
+        (setting(), 'left/mount_control.policy=s', 'left/mount_control.policy=switched_viscous'),
+        (setting('mount_init'), '', 'mount_init.silence_timeout=0.05'),
+    ],
+)
+def test_values_are_offered(complete, begun, value):
+    offered = first(complete(begun))
+    if '=' in value and '=' not in begun:  # the default may change
+        value, offered = value.split('=')[0], [each.split('=')[0] for each in offered]
+    assert value in offered
+    assert all(each.startswith(begun) for each in offered)
+
+
+def test_a_name_that_is_taken_is_not_offered_again_and_others_than_the_owners_are_not():
+    assert 'left,left' not in first(listed('place')('left,'))
+    assert not first(setting('mount_init')('mount_sim.'))
+    assert not first(setting()('mount_sim.seed='))
+
+
+def test_runs_and_recordings_are_offered_the_newest_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert recordings('') == []
+    for age, name in enumerate(('new', 'old')):
+        place = tmp_path / 'bags' / name / ('recording' if age else '')
+        place.mkdir(parents=True)
+        (place / 'metadata.yaml').touch()
+        os.utime(tmp_path / 'bags' / name, (1e9 - age, 1e9 - age))
+    (tmp_path / 'bags' / 'empty').mkdir()
+    (tmp_path / 'bags' / 'reference' / 'gap').mkdir(parents=True)
+    assert first(recordings('')) == ['bags/new', 'bags/old']
+    assert first(recordings('bags/o')) == ['bags/old']
+    assert first(recordings('nowhere/')) == []
+    assert first(references('g')) == ['gap']
+
+
+@pytest.mark.parametrize(
+    ('words', 'whole'),
+    [
+        (['a', '--set', 'x.y', '=', '1'], ['a', '--set', 'x.y=1']),
+        (['a', '--set', 'x.y', '='], ['a', '--set', 'x.y=']),
+        (['a', '--set', 'x', '=', '', '--core'], ['a', '--set', 'x=', '--core']),
+        (['a', '--set', 'x'], ['a', '--set', 'x']),
+    ],
+)
+def test_words_that_bash_has_parted_are_whole_again(words, whole):
+    assert joined(words) == whole
+
+
+@pytest.mark.skipif(shutil.which('bash') is None, reason='no bash')
+@pytest.mark.parametrize(
+    ('words', 'offered'),
+    [
+        (['rep'], ['report', 'replay']),
+        (['drive', '--scenario', 'm'], ['motorway']),
+        (['drive', '--set', 'mount_control.policy', '=', 's'], ['switched_viscous']),
+        (['replay', '--set', 'policy', '=', 'c'], ['continuous_viscous']),
+        (['faults', '--only', 'coil_open,kill_d'], ['coil_open,kill_driver']),
+    ],
+)
+def test_bash_is_offered_values(words, offered):
+    bash = ['bash', '--norc', '-c', IN_BASH, 'bash', 'engine-mount', *words]
+    done = subprocess.run(bash, env=environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.split() == offered
+
+
+@pytest.mark.parametrize(
+    ('shell', 'answer'),
+    [('zsh', '"motorway"'), ('fish', 'motorway')],
+)
+def test_the_other_shells_are_answered_in_their_words(shell, answer):
+    asked = {
+        '_ENGINE_MOUNT_COMPLETE': f'complete_{shell}',
+        '_TYPER_COMPLETE_ARGS': 'engine-mount drive --scenario mo',
+        '_TYPER_COMPLETE_FISH_ACTION': 'get-args',
+    }
+    done = subprocess.run([COMMAND], env=environment(**asked), capture_output=True, text=True)
+    assert answer in done.stdout
+    assert 'bench' not in done.stdout

@@ -1,0 +1,217 @@
+"""The contract of the experiments, and each of them on a short version."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+import engine_mount
+from engine_mount.cli.command import app
+from engine_mount.experiments import page
+from engine_mount.experiments.field_penetration import experiment as field_penetration
+from engine_mount.experiments.force_characteristic import experiment as force_characteristic
+from engine_mount.experiments.harness.contract import Experiment, Holds, Order, Outcome, Statement
+from engine_mount.experiments.inductance_map import experiment as inductance_map
+from engine_mount.experiments.ramp_and_hold import experiment as ramp_and_hold
+from engine_mount.experiments.registry import NAMES, experiment_named
+from engine_mount.experiments.sawtooth import experiment as sawtooth
+from engine_mount.identification.rack.given import GivenValues
+from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.recordings.audit.audit import audit
+from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen
+
+PNG = b'\x89PNG'
+SHORT_SAWTOOTH = {
+    'amplitude': 5e-4,
+    'lowest_speed': 3e-3,
+    'highest_speed': 5e-3,
+    'speed_step': 2e-3,
+    'lowest_normal_force': 100.0,
+    'highest_normal_force': 100.0,
+}
+
+
+def run(module, folder, **settings) -> Outcome:
+    order = Order(folder, {module.NAME: settings})
+    return module.EXPERIMENT.run(order, lambda share, what: None)
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ['experiment', *arguments])
+
+
+def check(outcome):
+    json.dumps(outcome.figures, allow_nan=False)
+    assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
+    assert outcome.pictures
+    assert outcome.statements
+
+
+# Contract and command.
+
+
+def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
+    for name in NAMES:
+        experiment = experiment_named(name)
+        assert experiment.name == name
+        assert experiment.title
+        assert experiment.reference.startswith('Sec' if experiment.needs else 'Fig')
+        assert list(experiment.known_settings()) == [name]
+
+
+def test_the_list_names_every_experiment():
+    shown = command('--list')
+    assert shown.exit_code == 0
+    named = [line.split()[0] for line in shown.output.splitlines() if line[1:2].strip()]
+    assert named[2:] == list(NAMES)  # behind the head and its line
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (['sawtooh'], "'sawtooh' is no experiment; known are force_characteristic"),
+        (['sawtooth', '--graph'], 'sawtooth has no graph to run through'),
+        (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
+        (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
+        (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
+        (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
+    ],
+)
+def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path):
+    out = tmp_path / 'out'
+    refused = command(*arguments, '--out', str(out))
+    assert refused.exit_code != 0
+    assert isinstance(refused.exception, ValueError)
+    assert sentence in str(refused.exception)
+    assert not (out.exists() and any(out.iterdir()))
+
+
+def test_a_setting_without_a_value_is_a_wrong_use(tmp_path):
+    refused = command('sawtooth', '--set', 'sawtooth.amplitude', '--out', str(tmp_path / 'out'))
+    assert refused.exit_code == 2
+    assert 'NODE.NAME=VALUE' in refused.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_holds_something_is_refused(tmp_path):
+    (tmp_path / 'precious').touch()
+    refused = command('ramp_and_hold', '--out', str(tmp_path))
+    assert 'is not empty; choose another folder' in str(refused.exception)
+
+
+def test_the_command_writes_figures_page_and_pictures(tmp_path):
+    out, figures, written = tmp_path / 'out', tmp_path / 'r.json', tmp_path / 'docs' / 'e.md'
+    done = command(
+        'ramp_and_hold', '--out', str(out), '--json', str(figures), '--page', str(written),
+        '--set', 'ramp_and_hold.hold_time=2',
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert json.loads(figures.read_text())['time_constant_s'] > 0.0
+    assert '![Ramp and hold of the sticking contact](figures/ramp_and_hold.png)' in written.read_text()
+    assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
+
+
+def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_path):
+    picture = tmp_path / 'a.png'
+    picture.write_bytes(PNG)
+    told = [
+        Statement('Fig. 1', 'it is so', 'it was not', Holds.NO),
+        Statement('Fig. 2', 'so too', 'it was', Holds.YES),
+    ]
+    experiment = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), run)
+    page.write_page([(experiment, Outcome({}, [picture], [], told))], tmp_path / 'docs' / 'page.md')
+    text = (tmp_path / 'docs' / 'page.md').read_text()
+    assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
+    assert '| Fig. 1 | it is so | it was not | no |' in text
+    assert (tmp_path / 'docs' / 'figures' / 'a.png').exists()
+
+
+def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):
+    outcome = run(ramp_and_hold, tmp_path, force_noise=0.0, displacement_noise=0.0)
+    check(outcome)
+    assert outcome.figures['time_constant_s'] == pytest.approx(0.44118, abs=2e-4)
+    assert max(map(abs, outcome.figures['errors'].values())) < 5e-3
+    assert abs(outcome.figures['errors_without_ramp_correction']['tangential_stiffness']) > 0.1
+
+
+def test_sliding_pads_are_told(tmp_path):
+    outcome = run(ramp_and_hold, tmp_path, normal_force=60.0, hold_time=2.0)
+    microslip = outcome.statements[0]
+    assert 'microslip' in microslip.paper
+    assert microslip.holds is Holds.NO
+
+
+# Each experiment.
+
+
+def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(tmp_path):
+    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH)
+    check(outcome)
+    recording = engine_mount.open(outcome.recordings[0])
+    assert set(recording.topics) == {'/session', '/displacement', '/sim/mount_force', '/sim/clamp_force'}
+    lost = {name: topic.lost for name, topic in audit(recording).items() if name != '/session'}
+    assert set(lost.values()) == {0}
+    assert recording['sim/clamp_force']['wrench.force.z'].min() == 100.0
+    session = yaml.safe_load(recording.latched('session').data)
+    assert session['scenario'] == 'sawtooth'
+    assert session['parameters']['sawtooth']['amplitude'] == 5e-4
+
+
+def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
+    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH, force_noise=0.0, displacement_noise=0.0)
+    assert outcome.figures['strokes'] == 4
+    assert outcome.figures['a_rms_error'] < 3e-3
+    assert outcome.figures['b_rms_error_per_mm'] < 0.5
+    assert outcome.figures['simplified_error_macroslip'] < 0.01
+    assert outcome.figures['simplified_error_microslip'] > 0.2
+    assert outcome.figures['simplified_error_slow_macroslip'] is None  # no stroke was so slow
+
+
+def test_other_pads_change_what_holds(tmp_path):
+    light = {**SHORT_SAWTOOTH, 'lowest_normal_force': 40.0, 'highest_normal_force': 40.0, 'force_noise': 0.1}
+    law = 1
+    printed = run(sawtooth, tmp_path / 'printed', **light).statements[law]
+    negative = run(sawtooth, tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}).statements[law]
+    assert (printed.reference, printed.holds) == ('Sec. 4, Eq (12)', Holds.PARTLY)
+    assert negative.holds is Holds.YES
+
+
+def test_the_force_characteristic_meets_the_published_accuracy_of_the_fit(tmp_path):
+    outcome = run(force_characteristic, tmp_path)
+    check(outcome)
+    assert outcome.figures['law_relative_rms'] < 0.005
+    assert outcome.figures['law_relative_worst'] < 0.01
+    assert outcome.figures['force_at_1_a_n']['349 um'] == pytest.approx(96.12, abs=0.01)
+
+
+def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
+    outcome = run(inductance_map, tmp_path)
+    check(outcome)
+    figures = outcome.figures
+    assert figures['ramp_gap_at_rest_m'] == pytest.approx(492e-6, abs=4e-6)
+    assert figures['ramp_gap_at_crossing_m'] == pytest.approx(341.2e-6, abs=2e-6)
+    assert figures['initialisation']['contact_gap'] == pytest.approx(349e-6, abs=2e-6)
+    assert any(low <= 0.9 <= high for low, high in figures['ambiguous_currents_a'])
+    assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
+    (folder,) = outcome.recordings
+    assert {'/coil_ripple', '/air_gap', '/session'} <= set(engine_mount.open(folder).topics)
+    _check_that_calibration_reads_the_ramp(folder, figures['ramp_inductance_at_rest_h'])
+
+
+def _check_that_calibration_reads_the_ramp(folder, inductance_at_rest):
+    turns_area = default_specimen().turns_area
+    (ripple,) = read_ripple([folder], {}, GivenValues({folder: 492e-6}, {}), turns_area)
+    assert ripple.celsius == 20.0
+    resting = np.abs(ripple.current - 0.2) < 0.005
+    assert np.nanmean(ripple.inductance[resting]) == pytest.approx(inductance_at_rest, rel=1e-3)
+
+
+def test_both_computations_of_the_penetration_agree_at_rest(tmp_path):
+    outcome = run(field_penetration, tmp_path, highest_current=0.1, current_step=0.2)
+    check(outcome)
+    assert outcome.figures['currents_a'] == [0.0]
+    assert outcome.figures['equivalent_depth_m'][0] == pytest.approx(16.15e-6, abs=0.02e-6)
+    assert abs(outcome.figures['difference_in_middle'][0]) < 0.01

@@ -1,0 +1,96 @@
+"""The comparison of policies on a short version, and the estimates and bounds that it states."""
+
+import json
+
+import numpy as np
+import pytest
+
+from engine_mount.experiments.harness.contract import Order
+from engine_mount.experiments.policy import experiment as policy
+from engine_mount.experiments.policy import learnable, limits, runs
+from engine_mount.experiments.policy.cases import CONTINUOUS, POLICIES
+from engine_mount.signals.roads.inversion import road_of
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.road import RandomRoad, random_road
+from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
+
+SHORT = {
+    'road_levels': '0.06,',
+    'last_frequency': 16.0,
+    'gap_depths': '0.02,',
+    'gap_seeds': 1,
+    'rack_frequencies': '8,',
+    'thorough': 0,
+    'workers': 1,
+}
+
+
+@pytest.fixture(scope='module')
+def compared(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('policy')
+    return policy.EXPERIMENT.run(Order(folder, {policy.NAME: SHORT}), lambda share, what: None)
+
+
+@pytest.mark.slow
+def test_figures_are_plain_and_hold_what_is_promised(compared):
+    figures = json.loads(json.dumps(compared.figures, allow_nan=False))
+    for key in ('sweep_ratio', 'gap_peak_ratio', 'thd', 'energy_j_per_km'):
+        assert set(POLICIES) <= set(figures[key])
+    assert list(figures['sweep_ratio'][CONTINUOUS]) == ['0.06']
+    assert len(figures['gap_peak_ratio'][CONTINUOUS]['20']) == 1
+    assert list(figures['thd'][CONTINUOUS]) == ['8']
+
+
+@pytest.mark.slow
+def test_continuous_law_is_below_the_hydromount_where_the_paper_policy_is_not(compared):
+    figures = compared.figures
+    assert (
+        figures['sweep_ratio'][CONTINUOUS]['0.06'] < 0.6 < 1.0 < figures['sweep_ratio'][POLICIES[0]]['0.06']
+    )
+    assert figures['gap_peak_ratio'][CONTINUOUS]['20'][0] < 0.87
+    assert figures['gap_first_extremum_ratio'][CONTINUOUS]['20'][0] < 1.05
+    assert figures['thd'][CONTINUOUS]['8'] < 1.0
+
+
+def test_page_and_pictures_are_written_from_the_numbers(compared):
+    (page,) = compared.pages
+    text = page.read_text(encoding='utf-8')
+    assert f'{compared.figures["sweep_ratio"][CONTINUOUS]["0.06"]:.2f}' in text
+    assert all(f'figures/{picture.name}' in text for picture in compared.pictures)
+
+
+def test_road_behind_an_acceleration_gives_that_acceleration_again():
+    time = STEP_TIME * np.arange(round(12.0 / STEP_TIME))
+    within = np.sin(np.pi * time / time[-1]) ** 2  # begins and ends at rest
+    road = within * random_road(time, RandomRoad(highest_frequency=0.6, lowest_frequency=0.06))
+    _, wanted = ride_without_friction(Vehicle(), resting_vehicle(), road, np.zeros(road.size), STEP_TIME)
+    found = road_of(wanted, STEP_TIME, Vehicle())
+    _, again = ride_without_friction(Vehicle(), resting_vehicle(), found, np.zeros(road.size), STEP_TIME)
+    middle = slice(road.size // 4, 3 * road.size // 4)
+    assert np.std(again[middle] - wanted[middle]) < 0.1 * np.std(wanted[middle])
+
+
+def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():
+    assert limits.sweep_limit(0.06, 3000.0) < limits.sweep_limit(0.06, 1000.0)
+    peaks = [limits.gap_limit(0.02, 2000.0, delay).peak_m for delay in (0.0, 0.065, 0.15)]
+    assert peaks[0] < peaks[1] < peaks[2]
+
+
+def test_first_extremum_is_the_first_clear_turning_point():
+    time = SAMPLE_TIME * np.arange(1000)
+    ringing = 0.02e-3 * np.sin(2.0 * np.pi * 90.0 * time) * (time < 0.02)
+    ringing += np.where(time > 0.03, 1e-3 * np.sin(2.0 * np.pi * 8.0 * (time - 0.03)), 0.0)
+    assert runs.first_extremum(ringing) == pytest.approx(1e-3, rel=0.01)
+
+
+def test_frequency_in_band_is_that_of_a_sine():
+    time = SAMPLE_TIME * np.arange(4000)
+    motion = 1e-3 * np.sin(2.0 * np.pi * 7.0 * time) + 1e-3 * np.sin(2.0 * np.pi * 30.0 * time)
+    assert learnable.frequency_in_band(motion) == pytest.approx(7.0, abs=0.05)
+
+
+def test_band_rms_of_a_sine_is_its_amplitude_over_root_two():
+    time = SAMPLE_TIME * np.arange(4000)
+    both = 3.0 * np.sin(2.0 * np.pi * 25.0 * time) + 5.0 * np.sin(2.0 * np.pi * 8.0 * time)
+    assert runs.rms_in_bands(both, [(20.0, 200.0)])[0] == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)

@@ -1,0 +1,163 @@
+"""A recorded drive under all three mounts: made up, and the real one where it lies."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from engine_mount.cli.command import app
+from engine_mount.experiments import page
+from engine_mount.experiments.harness.contract import ExperimentError, Holds, Order
+from engine_mount.experiments.recorded_drive import experiment as recorded_drive
+from engine_mount.experiments.recorded_drive.evaluation import (
+    ELASTOMER,
+    FRICTION,
+    HYDRO,
+    near,
+    rms_in_bands,
+    rms_in_bands_within,
+)
+from engine_mount.experiments.registry import experiments_named
+from engine_mount.recordings.signals.signal import SignalError
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
+from mount_sim.excitation.scenario import STEP_TIME
+
+pytestmark = pytest.mark.slow
+
+REPOSITORY = Path(__file__).resolve().parents[4]
+I280 = REPOSITORY.parent / 'shared' / 'data' / 'motorway_i280'
+needs_i280 = pytest.mark.skipif(
+    not I280.is_dir(), reason='the recorded I-280 drive is not committed (../shared/data)'
+)
+
+
+def run(folder, file, **settings):
+    order = Order(folder, {recorded_drive.NAME: {'file': str(file), **settings}})
+    return recorded_drive.EXPERIMENT.run(order, lambda share, what: None)
+
+
+@pytest.fixture(scope='module')
+def driven(tmp_path_factory):
+    # 20 Hz all the time; from 6 to 7 s the engine's eigenfrequency
+    folder = tmp_path_factory.mktemp('drive')
+    times = np.arange(0.0, 14.0, 0.005)
+    burst = 2.0 * np.sin(2 * np.pi * 7.5 * times) * ((times >= 6.0) & (times < 7.0))
+    down = -0.5 * (0.3 * np.sin(2 * np.pi * 20.0 * times) + burst)
+    np.savetxt(
+        folder / 'drive.csv', np.column_stack([times, down]), delimiter=',', header='t,az', comments=''
+    )
+    return run(folder / 'out', folder / 'drive.csv', column='az', scale=-2.0)
+
+
+def test_it_writes_recordings_pictures_plain_figures_and_a_page_without_places(driven):
+    json.dumps(driven.figures, allow_nan=False)
+    assert len(driven.recordings) == 3
+    assert all(picture.read_bytes().startswith(b'\x89PNG') for picture in driven.pictures)
+    text = driven.pages[0].read_text()
+    assert 'Driven: `drive.csv`, `az`, times -2, 14.0 s at 200 samples per second' in text
+    assert str(driven.pages[0].parent) not in text
+    for picture in driven.pictures:
+        assert f'(figures/{picture.name})' in text
+
+
+def test_the_chassis_moves_as_recorded(driven):
+    low, middle, high = driven.figures['acceleration_band_rms_m_s2']
+    assert high == pytest.approx(0.3 / np.sqrt(2), rel=0.03)
+    assert middle == pytest.approx(2.0 / np.sqrt(2) * np.sqrt(1.0 / 14.0), rel=0.05)
+    assert low < 0.2 * middle
+
+
+def test_damping_comes_on_in_the_burst_and_lowers_the_displacement(driven):
+    assert driven.figures['times_on'] >= 1
+    assert 6.1 < driven.figures['switched_on_s'][0] < 6.6
+    at_events = {
+        name: each['displacement_band_rms_at_events_m'][1] for name, each in driven.figures['runs'].items()
+    }
+    assert at_events[FRICTION] < 0.7 * at_events[ELASTOMER]
+
+
+def test_away_from_the_burst_the_friction_mount_is_the_elastomer_alone(driven):
+    forces = {name: each['force_band_rms_else_n'][2] for name, each in driven.figures['runs'].items()}
+    assert forces[FRICTION] == pytest.approx(forces[ELASTOMER], rel=0.02)  # swinging out
+    assert forces[HYDRO] > 1.1 * forces[ELASTOMER]
+
+
+def test_a_drive_without_damping_says_so(tmp_path):
+    times = np.arange(0.0, 13.0, 0.005)
+    np.savetxt(tmp_path / 'calm.csv', np.column_stack([times, 0.1 * np.sin(90 * times)]), delimiter=',',
+               header='t,az', comments='')  # fmt: skip
+    outcome = run(tmp_path / 'out', tmp_path / 'calm.csv', column='az')
+    json.dumps(outcome.figures, allow_nan=False)
+    assert outcome.figures['times_on'] == 0
+    assert 'Damping was never on' in outcome.pages[0].read_text()
+    assert outcome.statements[1].holds is Holds.NOT_COMPARABLE
+
+
+@pytest.mark.parametrize(('frequency', 'band'), [(3.0, 0), (8.0, 1), (20.0, 2)])
+def test_a_sine_has_its_rms_in_its_own_band(frequency, band):
+    values = 5.0 + 2.0 * np.sin(2 * np.pi * frequency * np.arange(20000) * SAMPLE_TIME)
+    expected = np.zeros(3)
+    expected[band] = np.sqrt(2.0)
+    assert rms_in_bands(values) == pytest.approx(expected, rel=0.01, abs=0.02)
+
+
+def test_a_part_of_the_time_has_the_rms_of_that_part():
+    time = np.arange(20000) * SAMPLE_TIME
+    values = np.where(time < 10.0, 1.0, 3.0) * np.sin(2 * np.pi * 8.0 * time)
+    late = time > 11.0
+    assert rms_in_bands_within(values, late)[1] == pytest.approx(3.0 / np.sqrt(2), rel=0.03)
+    assert rms_in_bands_within(values, time < 9.0)[1] == pytest.approx(1.0 / np.sqrt(2), rel=0.03)
+    assert rms_in_bands_within(values, np.zeros(len(values), bool)) is None
+
+
+def test_near_takes_the_margin_on_both_sides():
+    active = np.zeros(1000, bool)
+    active[400:500] = True
+    assert np.flatnonzero(near(active, 0.125))[[0, -1]].tolist() == [275, 624]
+
+
+def test_without_a_file_it_says_what_to_give(tmp_path):
+    refused = CliRunner().invoke(app, ['experiment', 'recorded_drive', '--out', str(tmp_path / 'out')])
+    assert refused.exit_code != 0
+    with pytest.raises(
+        ExperimentError, match=r'needs a recorded vertical acceleration .* --set recorded_drive\.file='
+    ):
+        run(tmp_path / 'other', '')
+
+
+def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(SignalError, match='does not exist'):
+        run(tmp_path / 'out', tmp_path / 'none.csv')
+    with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
+        run(tmp_path / 'out', tmp_path / 'none.csv', duration=5.0)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_all_are_those_that_need_nothing_and_those_asked_for_by_name():
+    assert recorded_drive.NAME not in [each.name for each in experiments_named(['all'])]
+    assert recorded_drive.NAME in [each.name for each in experiments_named(['all', recorded_drive.NAME])]
+
+
+def test_alone_its_own_page_is_the_page(driven, tmp_path):
+    page.write_page([(recorded_drive.EXPERIMENT, driven)], tmp_path / 'page.md')
+    assert (tmp_path / 'page.md').read_text() == driven.pages[0].read_text()
+    assert (tmp_path / 'figures' / driven.pictures[0].name).exists()
+
+
+@needs_i280
+def test_the_committed_page_tells_of_this_recording():
+    signal = recorded_acceleration(I280, column='accelerometer.2')
+    values = acceleration_at(signal, -1.0, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
+    text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
+    told = re.findall(r'([\d.]+) m/s\^2 from', text)
+    assert [float(number) for number in told] == pytest.approx(rms_in_bands(values), abs=0.001)
+
+
+@needs_i280
+def test_the_first_seconds_of_the_i280_switch_damping_on_as_the_whole_drive_does(tmp_path):
+    outcome = run(tmp_path, I280, column='accelerometer.2', scale=-1.0, duration=12.5)
+    assert outcome.figures['switched_on_s'] == pytest.approx([5.927, 6.661, 10.045], abs=0.002)

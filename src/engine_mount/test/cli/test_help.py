@@ -1,0 +1,48 @@
+"""Every `--help`, as a new user sees it on a terminal of 80 columns."""
+
+import re
+import sys
+
+import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from engine_mount.cli.command import app
+
+RUNNER = CliRunner(env={'COLUMNS': '80', 'NO_COLOR': '1', 'TERM': 'dumb'})
+WITHOUT_EXAMPLE = {'prepare'}
+
+
+def leaves(group, prefix=()):
+    for name, command in group.commands.items():
+        if hasattr(command, 'commands'):
+            yield from leaves(command, (*prefix, name))
+        else:
+            yield (*prefix, name)
+
+
+COMMANDS = sorted(leaves(get_command(app)))
+
+
+@pytest.mark.parametrize('words', [(), ('calibrate',), ('identify',), *COMMANDS], ids=' '.join)
+def test_help_fits_80_columns_and_names_no_type_of_python(words):
+    shown = RUNNER.invoke(app, [*words, '--help'])
+    assert shown.exit_code == 0
+    assert max(map(len, shown.output.splitlines())) <= 80
+    assert not re.search(r'<\w+|list\[|\{\w+\}', shown.output)
+
+
+@pytest.mark.parametrize('words', COMMANDS, ids=' '.join)
+def test_help_says_what_an_option_takes_and_gives_an_example(words):
+    shown = RUNNER.invoke(app, [*words, '--help']).output
+    assert words[-1] in WITHOUT_EXAMPLE or f'engine-mount {" ".join(words)}' in shown.split('╯')[-1]
+    assert words[-1] == 'prepare' or 'xit code' in shown
+    for option in re.findall(r'--[\w-]+ +NUMBER +(.*)', shown):
+        assert option.strip(' │'), 'an option without a word of help'
+
+
+def test_the_version_is_one_short_line():
+    shown = RUNNER.invoke(app, ['--version'])
+    assert shown.exit_code == 0
+    assert re.fullmatch(r'engine-mount \S+, ROS 2 \w+ \(rclpy \S+\), Python \S+, numpy \S+\n', shown.output)
+    assert f'Python {sys.version.split()[0]}' in shown.output

@@ -1,0 +1,368 @@
+"""`engine-mount identify friction` from files to files."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine_mount.cli.command import main
+from engine_mount.cli.commands.identify_arguments import with_repeated_options
+from engine_mount.experiments.harness.rack_recording import record_friction_rack
+from engine_mount.identification.friction import ladder
+from engine_mount.identification.friction.channels import said
+from engine_mount.identification.friction.files import read_recording
+from engine_mount.identification.friction.looks.force_zero import zeroed
+from engine_mount.identification.friction.recording import IdentificationError
+from engine_mount.identification.rack.given import described
+from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.signals.signal import SignalError
+from mount_bringup.chosen import chosen_control
+from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
+from mount_models.friction.contact import FrictionContact
+from mount_models.specimen import default_specimen, load_specimen
+from mount_sim.rack.friction import (
+    RackNoise,
+    move,
+    ramp_and_hold,
+    sawtooth,
+    sawtooth_corners,
+    with_noise,
+    write_csv,
+)
+
+RIG = Path(__file__).resolve().parents[5] / 'shared' / 'data' / 'friction_rig'
+SPEEDS = (0.002, 0.004, 0.006, 0.010)
+
+
+@pytest.fixture(scope='module')
+def rack(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('rack')
+    write_csv(ramp_and_hold(duration=4.0), folder / 'ramp.csv', with_desired=True)
+    for seed, load in enumerate((40.0, 80.0, 120.0)):
+        write_csv(
+            sawtooth(noise=RackNoise(seed=seed), normal_force=load, speeds=SPEEDS), folder / f'{load:.0f}.csv'
+        )
+    return folder
+
+
+def test_several_paths_after_one_option_become_repeated_options():
+    words = ['identify', 'friction', '--train', 'a', 'b', '--held-out', 'c', '--json', 'd', '--file', 'e']
+    assert with_repeated_options(words) == (
+        [
+            'identify',
+            'friction',
+            '--train',
+            'a',
+            '--train',
+            'b',
+            '--held-out',
+            'c',
+            '--json',
+            'd',
+            '--file',
+            'e',
+        ]
+    )
+    assert with_repeated_options(['--train', 'a', '--', 'b']) == ['--train', 'a', '--', 'b']
+    assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
+
+
+@pytest.mark.slow
+def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
+    # a search from fewer starts on fewer samples: which law is best here is no close race
+    for name, value in (('SEARCH_SAMPLES', 400), ('FINAL_SAMPLES', 1500), ('STARTS', 2), ('DRAWS', 4)):
+        monkeypatch.setattr(ladder, name, value)
+    _run(
+        'identify', 'friction', '--train', *(str(rack / name) for name in ('ramp.csv', '40.csv', '120.csv')),
+        '--held-out', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'), '--out', str(tmp_path /
+        'f.yaml'),
+        '--figure', str(tmp_path / 'f.png'),
+    )  # fmt: skip
+    result = json.loads((tmp_path / 'f.json').read_text())
+    assert set(result['ladder']["paper's model"]) >= {'train_error', 'held_out_error', 'parameters'}
+    assert result['best'] == "paper's model"
+    assert result['ladder']["paper's model"]['held_out_error'] < 0.05
+    assert result['contact']['contact_stiffness'] == pytest.approx(4e6, rel=0.03)
+    specimen = load_specimen(tmp_path / 'f.yaml')
+    assert specimen.friction == pytest.approx({**result['coefficients'], **result['contact']})
+    assert specimen.force_law == default_specimen().force_law
+    told = specimen.provenance['parts']['friction']
+    digests = {
+        name: hashlib.sha256((rack / name).read_bytes()).hexdigest()
+        for name in ('ramp.csv', '40.csv', '80.csv', '120.csv')
+    }
+    assert {entry['file']: entry['sha256'] for entry in told['recordings']} == digests
+    held_out = {'file': '80.csv', 'part': 'held out', 'kind': 'sawtooth', 'sha256': digests['80.csv']}
+    assert held_out in told['recordings']
+    assert told['valid']['normal_force'] == pytest.approx([40.0, 120.0], rel=0.01)
+    assert told['residuals']['held_out']['80.csv'] < 0.05
+    for names, matrix in told['covariance'].items():
+        assert np.shape(matrix) == (len(names.split(', ')),) * 2
+        assert (np.diag(matrix) >= 0.0).all()
+    drive = chosen_control({'mount_control': {'parameters_file': str(tmp_path / 'f.yaml')}})
+    assert drive.friction._asdict() == pytest.approx(result['coefficients'])
+    assert drive.contact._asdict() == pytest.approx(result['contact'])
+    assert (tmp_path / 'f.png').stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ('make', 'words'),
+    [
+        (lambda f: f.with_suffix('.csv').write_text('time_s,displacement_mm,friction_force_n,normal_force_n\n'
+                                                    '0,0,1,9\n0.001,1,1,9\n'), '2 samples'),
+        (lambda f: f.with_suffix('.csv').write_text('t,f\n0.0,1.5\n'), 'no column for displacement'),
+        (lambda f: f.with_suffix('.mcap').write_bytes(b'no recording at all' * 9), 'MCAP'),
+        (lambda f: f.with_suffix('.json').write_text('{"data": [[1, 2]]}'), 'shape'),
+        (lambda f: f.with_suffix('.png').write_bytes(b'\x89PNG\r\n\0' * 9), 'are not read'),
+    ],
+)  # fmt: skip
+def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, capsys):
+    make(tmp_path / 'bad')
+    bad = next(iter(tmp_path.iterdir()))
+    outputs = tmp_path / 'f.json', tmp_path / 'f.yaml', tmp_path / 'f2.png'
+    with pytest.raises(SystemExit) as ended:
+        main(['identify', 'friction', '--train', str(bad), '--json', str(outputs[0]), '--out',
+        str(outputs[1]),
+              '--figure', str(outputs[2])])  # fmt: skip
+    assert ended.value.code == 1
+    assert words in capsys.readouterr().err.replace('\n', ' ')
+    assert not any(each.exists() for each in outputs)
+
+
+def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_path, monkeypatch):
+    from engine_mount.identification.friction import identify as identify_friction
+    from engine_mount.identification.friction.ladder import fit_ladder
+    from engine_mount.identification.friction.laws.coulomb import Coulomb
+
+    whole = read_recording(rack / '80.csv')
+    middle = whole.force.size // 2
+
+    def quick(training, held_out, **others):
+        assert [each.name for each in training] == ['80.csv, first half']
+        assert [each.name for each in held_out] == ['80.csv, second half']
+        for (half,), part in ((training, slice(None, middle)), (held_out, slice(middle, None))):
+            np.testing.assert_array_equal(half.displacement, whole.displacement[part])
+            np.testing.assert_array_equal(half.force, whole.force[part])
+            np.testing.assert_array_equal(half.normal_force, whole.normal_force[part])
+        return fit_ladder(training, held_out, laws=[Coulomb()])
+
+    monkeypatch.setattr(identify_friction, 'fit_ladder', quick)
+    _run('identify', 'friction', '--file', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'))
+    result = json.loads((tmp_path / 'f.json').read_text())
+    assert 'second half is held out' in result['notes'][-1]
+    entry = result['ladder']['Coulomb']
+    assert 0.0 < entry['train_error'] < 1.0
+    assert entry['held_out_error'] != entry['train_error']
+
+
+def test_the_recordings_of_the_sawtooth_experiment_are_read_as_the_rack_measured_them(tmp_path):
+    rack = move(
+        FrictionContact(), FrictionCoefficients(), *sawtooth_corners(2.5e-3, (2e-3, 4e-3, 6e-3, 8e-3)), 100.0
+    )
+    samples = with_noise(rack, force_noise=0.5, displacement_noise=0.0, seed=1)
+    recording = record_friction_rack(tmp_path / 'sawtooth', samples, {'scenario': 'sawtooth'})
+    read = read_recording(recording)
+    assert read.displacement == pytest.approx(samples.displacement, abs=1e-12)
+    assert read.force == pytest.approx(samples.friction_force, abs=1e-9)
+    assert read.normal_force == pytest.approx(np.full((read.force.size, 2), 100.0))
+    assert read.dt == pytest.approx(1e-3, rel=1e-9)
+    _run(
+        'identify', 'friction', '--step', 'sawtooth', '--train', str(recording),
+        '--json', str(tmp_path / 'f.json'),
+    )  # fmt: skip
+    found = json.loads((tmp_path / 'f.json').read_text())
+    assert found['recordings']['sawtooth']['kind'] == 'sawtooth'
+    coefs = FrictionCoefficients(**found['coefficients'])
+    assert offset_coefficient(coefs, 0.006, 100.0) == pytest.approx(
+        offset_coefficient(FrictionCoefficients(), 0.006, 100.0), abs=0.01
+    )
+
+
+@pytest.fixture(scope='module')
+def in_mcap(rack):
+    """Return what the rack measured, and the folder with its MCAP recording."""
+    recorded = sawtooth(noise=RackNoise(seed=4), normal_force=70.0, speeds=(0.004, 0.008), stroke=1e-3)
+    folder = record_friction_rack(rack / 'as_mcap', recorded, {})
+    return recorded, folder
+
+
+def test_mcap_is_read_as_the_csv_of_the_same_measurement_is(in_mcap, tmp_path):
+    recorded, folder = in_mcap
+    write_csv(recorded, tmp_path / 'same.csv')
+    (file,) = folder.glob('*.mcap')
+    same = read_recording(tmp_path / 'same.csv')
+    for other in (read_recording(folder), read_recording(file)):
+        assert other.dt == pytest.approx(same.dt, rel=1e-6)
+        assert other.displacement == pytest.approx(same.displacement, abs=1e-9)
+        assert other.force == pytest.approx(same.force, abs=1e-4)
+        assert other.normal_force == pytest.approx(same.normal_force, abs=1e-4)
+
+
+def test_the_folder_of_a_run_is_read_as_the_recording_in_it(in_mcap, tmp_path):
+    (tmp_path / 'run').mkdir()
+    (tmp_path / 'run' / 'recording').symlink_to(in_mcap[1], target_is_directory=True)
+    whole = read_recording(tmp_path / 'run')
+    np.testing.assert_array_equal(whole.force, read_recording(in_mcap[1]).force)
+
+
+def test_channels_of_mcap_are_chosen_with_their_unit(in_mcap):
+    recorded, folder = in_mcap
+    read = read_recording(folder, said(['friction_force=sim/clamp_force.wrench.force.z:lb']))
+    assert read.force == pytest.approx(4.4482216152605 * recorded.normal_force, rel=1e-9)
+    assert read.normal_force[:, 0] == pytest.approx(recorded.normal_force, rel=1e-9)
+    with pytest.raises(SignalError, match=r"column 'force.z' is ambiguous: .*clamp_force"):
+        read_recording(folder, said(['friction_force=force.z']))
+    with pytest.raises(SignalError, match=r"has no column '/cell.z'; its columns are .*clamp_force"):
+        read_recording(folder, said(['friction_force=/cell.z']))
+
+
+def test_a_held_out_recording_must_be_unseen(rack, capsys):
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(rack / '40.csv'), '--held-out', str(rack / '40.csv')])
+    assert 'must be unseen' in capsys.readouterr().err.replace('\n', ' ')
+
+
+def test_a_held_out_recording_must_be_unseen_under_another_name_too(rack, tmp_path, capsys):
+    seen, copy, out = rack / '40.csv', tmp_path / 'other.csv', tmp_path / 'f.json'
+    copy.write_bytes(seen.read_bytes())
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(seen), '--held-out', str(copy), '--json', str(out)])
+    refusal = capsys.readouterr().err.replace('\n', ' ')
+    assert 'other.csv and 40.csv (train) are the same to the bit' in refusal
+    assert not out.exists()
+
+
+def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
+    run = tmp_path / 'run' / 'recording'
+    run.mkdir(parents=True)
+    for name, content in (('b_1.mcap', b'second'), ('a_0.mcap', b'first'), ('metadata.yaml', b'x')):
+        (run / name).write_bytes(content)
+    expected = hashlib.sha256(b'firstsecond').hexdigest()
+    assert recording_hash(run) == recording_hash(tmp_path / 'run') == expected
+    assert described([run / 'b_1.mcap', run]) == [
+        {'file': 'b_1.mcap', 'sha256': hashlib.sha256(b'second').hexdigest()},
+        {'file': 'recording', 'sha256': expected},
+    ]
+
+
+def test_the_hash_of_a_folder_without_mcap_is_that_of_its_files(tmp_path):
+    for name, content in (('t.npy', b'second'), ('a/value.npy', b'first')):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    assert recording_hash(tmp_path) == hashlib.sha256(b'firstsecond').hexdigest()
+
+
+def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(['identify', 'friction', '--train', str(rack / 'ramp.csv'), '--out', str(tmp_path / 'f.yaml')])
+    assert 'the sawtooth is missing' in capsys.readouterr().err.replace('\n', ' ')
+    assert not (tmp_path / 'f.yaml').exists()
+
+
+def test_channels_name_column_and_unit(tmp_path):
+    time = np.arange(0.0, 2.0, 1e-3)
+    table = np.column_stack([time, np.sin(6 * time), 0.05 * np.cos(6 * time), np.full(time.size, 0.1)])
+    file = tmp_path / 'own.csv'
+    np.savetxt(file, table, delimiter=',', header='time,way,cell,load', comments='')
+    with pytest.raises(IdentificationError, match='name it as in --channel'):
+        read_recording(file)
+    chosen = said(['displacement=way:mm', 'friction_force=cell:kN', 'normal_force=load:kN'])
+    read = read_recording(file, chosen)
+    assert read.displacement.max() == pytest.approx(1e-3, rel=1e-3)
+    assert read.force.max() == pytest.approx(50.0, rel=1e-3)
+    assert np.mean(read.normal_force) == pytest.approx(100.0)
+
+
+def rig_file(folder):
+    time = np.arange(0.0, 4.0, 1e-3)
+    moved = np.clip(time - 0.5, 0.0, None)
+    table = np.column_stack(
+        [time, np.sin(3 * moved), 2 * np.sign(np.cos(3 * moved)) * (time > 0.5) - 0.07, 0 * time,
+         np.where(np.cos(3 * moved) > 0, 10.0, 900.0), np.where(np.cos(3 * moved) > 0, 1000.0, 10.0)]
+    )  # fmt: skip
+    file = folder / 'rig.json'
+    file.write_text(json.dumps({'data': table.tolist()}))
+    return file
+
+
+def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path):
+    read, look = zeroed(read_recording(rig_file(tmp_path)), 'rest')
+    by_law, _ = zeroed(read_recording(rig_file(tmp_path)))
+    assert by_law.force[:400] == pytest.approx(0.0, abs=40.0)  # of +- 8896 N
+    assert 'from the loop; the rest before the motion agrees' in by_law.notes[-1]
+    assert abs(look.zero) < 40.0
+    assert read.displacement.max() == pytest.approx(0.0254, rel=1e-3)
+    assert read.force.max() == pytest.approx(2 * 4448.2216, rel=1e-6)
+    assert read.force[:400] == pytest.approx(0.0, abs=1e-6)
+    assert read.normal_force[0] == pytest.approx([4448.2216, 0.9 * 4448.2216], rel=1e-3)
+    assert read_recording(rig_file(tmp_path), clamp='none').normal_force[0] == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.skipif(not RIG.is_dir(), reason='the measured friction damper is not committed (../shared/data)')
+def test_the_measured_damper_is_predicted_at_another_clamp():
+    from engine_mount.identification.friction.ladder import fit_ladder
+    from engine_mount.identification.friction.laws.elastic_play import ElasticPlay
+
+    first, second = (zeroed(read_recording(RIG / name))[0] for name in (
+        'ds1_1Hz80lbtension.json', 'ds2_0.5Hz36lbtension0.5amplitude.json'))  # fmt: skip
+    (rung,) = fit_ladder([first], [second], laws=[ElasticPlay()])
+    assert rung.held_out_error < 0.20
+
+
+def _run(*words: str) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(list(words))
+    assert ended.value.code == 0
+
+
+def _rig_file(folder, swapped=False):
+    """A test of the measured damper, with its columns 1 and 2 swapped or not."""
+    time = np.arange(2048) / 1024.0
+    motion = np.clip(time - 0.2, 0.0, None)
+    x = np.sin(2.0 * np.pi * motion)
+    force = 0.5 * np.tanh(20.0 * np.cos(2.0 * np.pi * motion) * (motion > 0.0)) + 0.01 * x
+    columns = [time, x, force, 0.0 * x, 600.0 + 0.0 * x, 650.0 + 0.0 * x]
+    if swapped:
+        columns[1], columns[2] = columns[2], columns[1]
+    path = folder / f'rig_{swapped}.json'
+    path.write_text(json.dumps({'data': np.column_stack(columns).tolist()}))
+    return path
+
+
+def test_channels_are_heard_for_json_too(tmp_path):
+    as_made = read_recording(_rig_file(tmp_path), clamp='none')
+    swapped = _rig_file(tmp_path, swapped=True)
+    for texts in (
+        ['displacement=2:inch', 'friction_force=1:kip'],
+        ['displacement=friction_force_kip:inch', 'friction_force=displacement_in:kip'],
+    ):
+        found = read_recording(swapped, said(texts), clamp='none')
+        np.testing.assert_array_equal(found.displacement, as_made.displacement)
+        np.testing.assert_array_equal(found.force, as_made.force)
+    in_mm = read_recording(_rig_file(tmp_path), said(['displacement=1:mm']), clamp='none')
+    np.testing.assert_allclose(in_mm.displacement, as_made.displacement / 25.4)
+    clamped = read_recording(_rig_file(tmp_path), said(['normal_force=4']))
+    np.testing.assert_allclose(clamped.normal_force, 600.0 * 4.4482216152605)
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('displacement=9:mm', "column '9' is not in"),
+        ('friction_force=cell:kN', "column 'cell' is not in"),
+        ('friction_force=velocity_in_per_s', 'does not say its unit'),
+        ('time=cell', "time column 'cell' is not in"),
+    ],
+)
+def test_a_channel_that_json_does_not_have_is_refused(text, words, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        read_recording(_rig_file(tmp_path), said([text]))
+
+
+def test_a_channel_that_cannot_be_heard_is_refused(in_mcap):
+    with pytest.raises(IdentificationError, match="unit 'mm' is none of time; known are s, ms"):
+        said(['time=t:mm'])
+    with pytest.raises(SignalError, match="has no column 't'; its columns are"):
+        read_recording(in_mcap[1], said(['time=t']))

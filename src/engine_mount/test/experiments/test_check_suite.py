@@ -1,0 +1,382 @@
+"""Suites of manoeuvres: what is read, what is refused, and how figures are judged."""
+
+import contextlib
+import io
+import json
+import math
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine_mount.experiments.check import session, trial
+from engine_mount.experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
+from engine_mount.experiments.check.measures import MEASURES
+from engine_mount.experiments.check.page import write_page
+from engine_mount.experiments.check.session import CheckError, CheckOrder, run_trials, trials_of
+from engine_mount.experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
+from engine_mount.experiments.check.telling import Told, figures_of, table_of
+from engine_mount.experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
+from engine_mount.recordings.run.screen import Screen
+from engine_mount.reports.drive.signals import Truth
+from mount_bringup.graph.domain import DomainError
+from mount_bringup.graph.nodes import GraphError
+from mount_bringup.graph.shutdown import Interrupted
+from mount_models.plain_yaml import plain_yaml
+
+PAGE = Path(__file__).resolve().parents[4] / 'docs' / 'how-to' / 'check_a_change.md'
+LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
+ROAD = {'mount_sim.scenario': 'motorway', 'mount_sim.timeline.duration': 3}
+
+
+def content(**changes):
+    """A suite of two manoeuvres; `changes` are those of the second one."""
+    road = {'about': 'A road.', 'set': dict(ROAD), 'limits': {'peak_over_undamped': dict(LIMIT)}}
+    common = {'faults': {'at_most': 0, 'source': 'contract', 'reason': 'none is brought in'}}
+    return {'limits': common, 'manoeuvres': {'first': road, 'second': {**road, **changes}}}
+
+
+def refusal(given):
+    with pytest.raises(SuiteError) as caught:
+        suite_of(given)
+    return str(caught.value)
+
+
+def result(**figures):
+    moved = {name: np.zeros(3000) for name in ('driven', 'hydromount', 'undamped')}
+    shown = Shown(moved, moved, np.zeros(3000), ((-1.0, 0.5), (1.0, 2.0)))
+    return Result({'peak_over_undamped': 0.5, 'faults': 0.0, **figures}, (), shown)
+
+
+# What is read.
+
+
+def test_the_shipped_suite_names_a_reason_and_a_source_for_every_limit_and_can_be_driven(tmp_path):
+    suite = shipped_suite()
+    assert {'gap_10mm', 'gap_20mm', 'gap_30mm', 'rough_road', 'sweep', 'idle', 'rack', 'tip_in'} <= {
+        each.name for each in suite
+    }
+    assert all(limit.reason and limit.source for each in suite for limit in (*each.limits, *each.common))
+    for through in (CORE, LOCKSTEP, GRAPH):
+        assert len(trials_of(CheckOrder(suite, through), tmp_path)) == len(suite)
+
+
+def test_a_limit_of_all_manoeuvres_is_one_of_each_on_which_it_can_be_told():
+    given = content()
+    given['limits']['rms_displacement_mm'] = dict(LIMIT)
+    given['manoeuvres']['second']['set'] = {'mount_sim.scenario': 'bench'}
+    given['manoeuvres']['second']['limits'] = {'switched_on': {**LIMIT, 'at_least': 0.5}}
+    road, rack = suite_of(given)
+    measures = [[v.limit.measure for v in verdicts_of(each, result(), CORE)] for each in (road, rack)]
+    assert measures == [
+        ['peak_over_undamped', 'faults', 'rms_displacement_mm'],
+        ['switched_on', 'switched_on', 'faults'],
+    ]
+
+
+def test_manoeuvres_are_chosen_by_name_in_the_order_of_the_suite():
+    suite = suite_of(content())
+    assert [each.name for each in chosen_of(suite, ['second', 'first'])] == ['first', 'second']
+    with pytest.raises(SuiteError, match="'secnd' is no manoeuvre of the suite; did you mean second"):
+        chosen_of(suite, ['secnd'])
+
+
+@pytest.mark.parametrize(
+    ('changes', 'sentence'),
+    [
+        ({'limit': {}}, "'limit' is no key of second; did you mean limits?"),
+        ({'evaluated_from': 1.0}, "'evaluated_from' is no key of second; did you mean evaluated_from_s?"),
+        ({'evaluated_from_s': '1 s'}, "second.evaluated_from_s must be a number; instead received '1 s'"),
+        ({'evaluated_from_s': -1}, 'second.evaluated_from_s (-1 s) must be 0 or more'),
+        ({'about': ''}, "second.about must be a text; instead received ''"),
+        ({'limits': {'peak_over_undampd': LIMIT}}, "'peak_over_undampd' is no quantity of second"),
+        ({'limits': {'faults': {**LIMIT, 'at_mots': 1}}}, "'at_mots' is no key of second.faults; did"),
+        ({'limits': {'faults': {'source': 'paper', 'reason': 'x'}}}, 'second.faults must have at_most'),
+        ({'limits': {'faults': {**LIMIT, 'source': 'guess'}}}, 'second.faults.source must be contract'),
+        ({'limits': {'faults': {**LIMIT, 'reason': None}}}, 'second.faults.reason must be a text'),
+        ({'limits': {'faults': {**LIMIT, 'at_most': math.nan}}}, 'second.faults.at_most must be a number'),
+        ({'limits': {'distortion_percent': LIMIT}}, 'second: distortion_percent cannot be told on a road'),
+        ({'set': {**ROAD, 'mount_sim.sed': 1}}, "second.set: 'sed' is no parameter of mount_sim; did"),
+        ({'set': {**ROAD, 'mount_smi.seed': 1}}, "'mount_smi' is no node of second.set; did"),
+        ({'set': {'mount_sim.seed': 1}}, 'second.set must have mount_sim.scenario'),
+        ({'set': [1]}, 'second.set must be a mapping; instead received [1]'),
+    ],
+)  # fmt: skip
+def test_what_a_suite_cannot_mean_is_refused_with_its_place(changes, sentence):
+    assert refusal(content(**changes)).startswith(sentence)
+
+
+def test_names_that_do_not_fit_the_table_and_suites_without_manoeuvres_are_refused():
+    given = content()
+    given['manoeuvres']['a_long_way_home'] = given['manoeuvres']['first']
+    assert refusal(given) == 'a_long_way_home: a name has at most 10 characters, this one 15'
+    assert refusal({'manoeuvres': {}}) == 'manoeuvres must name at least one manoeuvre'
+    assert refusal(None).startswith('the suite must be a mapping with about, limits, manoeuvres')
+
+
+def test_a_file_is_refused_with_its_name(tmp_path):
+    file = tmp_path / 'ours.yaml'
+    file.write_text('manoeuvres: {}\nmanoeuvres: {}\n', encoding='utf-8')
+    with pytest.raises(SuiteError, match=r'ours\.yaml: is refused in line 2'):
+        suite_in_file(file)
+    with pytest.raises(SuiteError, match=r'none\.yaml: cannot be read'):
+        suite_in_file(tmp_path / 'none.yaml')
+
+
+# What is driven.
+
+
+def trials(tmp_path, settings=None, through=CORE, **more):
+    return trials_of(CheckOrder(suite_of(content()), through, settings or {}, **more), tmp_path)
+
+
+def test_settings_of_the_user_reach_every_manoeuvre(tmp_path):
+    made = trials(tmp_path, {'mount_control': {'policy': 'switched_viscous'}})
+    assert [each.parameters['mount_control'] for each in made] == [{'policy': 'switched_viscous'}] * 2
+    always = trials(tmp_path, {'mount_sim': {'mount': 'friction_always_on'}})[0].parameters
+    assert always['mount_control']['switching'] == 'always'
+
+
+@pytest.mark.parametrize(
+    ('settings', 'sentence'),
+    [
+        ({'mount_sim': {'scenario': 'sweep'}}, 'mount_sim.scenario is set by the manoeuvre first itself'),
+        ({'mount_sim': {'mounts': 'left,right'}}, 'a suite checks one mount'),
+        ({'mount_control': {'sample_rate': 2000.0}}, 'a suite is judged at 1000 Hz'),
+        ({'mount_control': {'policy': 'none'}}, 'first: '),
+    ],
+)
+def test_orders_that_no_manoeuvre_can_follow_are_refused_before_the_first(tmp_path, settings, sentence):
+    with pytest.raises(CheckError) as caught:
+        trials(tmp_path, settings)
+    assert str(caught.value).startswith(sentence)
+    assert not any(tmp_path.iterdir())
+
+
+def test_through_nodes_one_manoeuvre_is_driven_at_a_time(tmp_path):
+    with pytest.raises(CheckError, match='one manoeuvre is driven at a time'):
+        trials(tmp_path, through=LOCKSTEP, jobs=2)
+
+
+def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
+    late = suite_of(content(evaluated_from_s=3.0))
+    with pytest.raises(CheckError, match=r'second: evaluated_from_s \(3 s\) must lie before the end'):
+        trials_of(CheckOrder(late), tmp_path)
+
+
+@pytest.mark.parametrize('error', [GraphError('no gap'), DomainError('a graph already runs')])
+def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
+    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
+    made = trials(tmp_path, through=GRAPH)[0]
+    broken = trial.run_trial(made)
+    assert (broken.figures, broken.broke_down) == ({}, str(error))
+    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(Interrupted()))
+    with pytest.raises(Interrupted):
+        trial.run_trial(made)
+
+
+def raise_(error):
+    raise error
+
+
+class Seen(Screen):
+    """Keeps the texts that it is to show, and the shares of its bar."""
+
+    def __init__(self):
+        super().__init__(io.StringIO())
+        self.texts, self.shares = [], []
+
+    def say(self, text):
+        self.texts.append(text)
+
+    @contextlib.contextmanager
+    def bar(self, what, *, transient=False):
+        yield lambda share, what='', detail='': self.shares.append((round(share, 3), what, detail))
+
+
+def test_each_manoeuvre_is_told_when_it_is_done_and_the_bar_goes_on_within_it(tmp_path, monkeypatch):
+    given = content(set={**ROAD, 'mount_sim.timeline.duration': 17})  # 3 and 17 s, each behind a start
+
+    def drive(made, screen):
+        with screen.bar('driving') as show:
+            show(0.5, detail='no damping yet')
+        screen.say('of the drive alone')
+        return result(peak_over_undamped=0.9) if made.manoeuvre.name == 'first' else result()
+
+    monkeypatch.setattr(session, 'run_trial', drive)
+    made = trials_of(CheckOrder(suite_of(given), GRAPH), tmp_path)
+    first = made[0].seconds / (made[0].seconds + made[1].seconds)
+    screen, seen = Seen(), []
+    results = run_trials(made, 0, screen, lambda *told: seen.append((*told, list(screen.shares))))
+    assert [*results] == ['first', 'second']
+    assert results['first'].figures['peak_over_undamped'] == 0.9
+    assert [(name, round(share, 3)) for name, _, share, _ in seen] == [
+        ('first', round(first, 3)), ('second', 1.0),
+    ]  # fmt: skip
+    assert seen[0][3] == [(0.0, 'first', ''), (round(first / 2, 3), 'first', 'no damping yet'),
+                          (round(first, 3), 'first', '')]  # fmt: skip
+    assert screen.shares[-2] == (round((first + 1.0) / 2, 3), 'second', 'no damping yet')
+    assert screen.texts == []
+
+
+def test_the_line_of_a_manoeuvre_is_its_worst_limit_with_the_time_to_go_and_its_remarks_below():
+    name, quantity = 'gap_of_2mm', max(MEASURES, key=len)
+    limit = {'at_most': 1234.0, 'source': 'chosen', 'reason': 'x'}
+    given = {'manoeuvres': {name: {'about': 'A gap.', 'set': ROAD, 'limits': {quantity: limit}}}}
+    given['manoeuvres']['free'] = {'about': 'A road.', 'set': ROAD}
+    screen, now = Seen(), iter([100.0, 160.0, 400.0])
+    tell = Told(CheckOrder(suite_of(given), GRAPH), screen, clock=lambda: next(now))
+    tell(name, Result({quantity: 123456.0}, ('control began late',), Shown()), 0.0625)
+    tell('free', result(), 1.0)
+    head, failed_line, note, free = screen.texts
+    assert head.split() == ['manoeuvre', 'quantity', 'value', 'limit', 'left', 'to', 'go']
+    assert failed_line.split() == ['fail', name, quantity, '123456', '≤', '1234', '-9905', '%', '15:00']
+    assert max(map(len, screen.texts)) <= 80
+    assert note == f'{name} control began late'
+    assert free.split() == ['free', 'no', 'limit', '0:00']
+
+
+# How it is judged.
+
+
+def judged(through=CORE, **figures):
+    first = suite_of(content())[0]
+    return {v.limit.measure: v.judged for v in verdicts_of(first, result(**figures), through)}
+
+
+def test_a_limit_holds_up_to_its_value_and_what_is_not_known_fails():
+    assert judged(peak_over_undamped=0.7)['peak_over_undamped'] is Judged.PASSED
+    assert judged(peak_over_undamped=0.7001)['peak_over_undamped'] is Judged.FAILED
+    assert judged(peak_over_undamped=math.nan)['peak_over_undamped'] is Judged.FAILED
+    assert judged(faults=1.0)['faults'] is Judged.FAILED
+    broken = verdicts_of(suite_of(content())[0], broken_down('no gap'), GRAPH)
+    assert {verdict.judged for verdict in broken} == {Judged.NOT_JUDGED}
+    assert not passed(broken)
+
+
+def test_a_limit_from_below_fails_below_it():
+    given = content(limits={'switched_on': {'at_least': 1, 'source': 'chosen', 'reason': 'x'}})
+    second = suite_of(given)[1]
+    assert not passed(verdicts_of(second, result(switched_on=0.0), CORE))
+    assert passed(verdicts_of(second, result(switched_on=1.0), CORE))
+
+
+def test_latency_is_judged_in_real_time_alone():
+    given = content(limits={'latency_p99_us': {'at_most': 1000, 'source': 'chosen', 'reason': 'x'}})
+    second, late = suite_of(given)[1], result(latency_p99_us=2000.0)
+    assert [passed(verdicts_of(second, late, each)) for each in (CORE, LOCKSTEP, GRAPH)] == [
+        True,
+        True,
+        False,
+    ]
+
+
+def test_the_worst_stands_first_and_what_is_not_known_before_it():
+    limits = {name: dict(LIMIT) for name in ('rms_over_undamped', 'ringing_s', 'pad_energy_j', 'switched_on')}
+    manoeuvre = suite_of(content(limits=limits))[1]
+    figures = result(rms_over_undamped=0.1, ringing_s=9.0, pad_energy_j=math.nan, switched_on=0.6)
+    ordered = [v.limit.measure for v in worst_first(verdicts_of(manoeuvre, figures, CORE))]
+    assert ordered == ['pad_energy_j', 'ringing_s', 'switched_on', 'rms_over_undamped', 'faults']
+
+
+def told(**figures):
+    suite = suite_of(content())
+    results = {'first': result(), 'second': result(**figures)}
+    return CheckOrder(suite), results, all_verdicts(suite, results, CORE)
+
+
+def test_a_common_limit_that_holds_everywhere_is_told_once_and_one_that_fails_by_its_manoeuvre():
+    rows = [row[:3] for row in table_of(*told()[1:]).rows]
+    assert rows == [
+        ('ok', 'first', 'peak_over_undamped'),
+        ('ok', 'second', 'peak_over_undamped'),
+        ('ok', 'all 2', 'faults'),
+    ]
+    table = table_of(*told(faults=2.0)[1:])
+    assert table.rows[0][:4] == ('fail', 'second', 'faults', '2')
+    assert table.marked == {0}
+    assert table.caption == '1 of 2 manoeuvres within their 4 limits; not second.'
+
+
+def test_a_manoeuvre_that_broke_down_is_one_row_with_its_reason_and_how_much_is_not_judged():
+    suite = suite_of(content())
+    results = {'first': result(), 'second': broken_down('mount_sim ended with code 1')}
+    verdicts = all_verdicts(suite, results, CORE)
+    table = table_of(results, verdicts)
+    assert table.rows[0] == (
+        'fail', 'second', 'broke down: mount_sim ended with code 1; not judged: 2 limits', '', '', '',
+    )  # fmt: skip
+    assert [row[1] for row in table.rows] == ['second', 'first', 'first']
+    assert table.marked == {0}
+    assert table.caption == '1 of 2 manoeuvres within their 2 limits; not second.'
+    figures = figures_of(CheckOrder(suite), results, verdicts)
+    assert not figures['passed']
+    second = figures['manoeuvres']['second']
+    assert second['broke_down'] == 'mount_sim ended with code 1'
+    assert [each['verdict'] for each in second['verdicts']] == ['not judged'] * 2
+    screen = Seen()
+    Told(CheckOrder(suite), screen)('second', results['second'], 1.0)
+    assert screen.texts[1].split()[:4] == ['fail', 'second', 'broke', 'down']
+    assert screen.texts[2] == 'second mount_sim ended with code 1'
+
+
+def test_figures_are_plain_json_with_null_for_what_is_not_known():
+    order, results, verdicts = told(rms_over_undamped=math.nan)
+    figures = json.loads(json.dumps(figures_of(order, results, verdicts), allow_nan=False))
+    assert figures['passed'] is True
+    assert figures['manoeuvres']['second']['figures']['rms_over_undamped'] is None
+    assert figures['manoeuvres']['first']['verdicts'][0] == {
+        'quantity': 'peak_over_undamped',
+        'value': 0.5,
+        'at_most': 0.7,
+        'verdict': 'ok',
+        'left': pytest.approx(2 / 7),
+        'source': 'chosen',
+        'reason': 'less is no use',
+    }
+
+
+def test_the_page_leads_from_each_verdict_to_its_manoeuvre_and_survives_a_graph_that_broke_down(tmp_path):
+    order, results, verdicts = told(peak_over_undamped=0.9)
+    results['first'] = broken_down('mount_sim ended with code 1 <b>')
+    verdicts = all_verdicts(order.manoeuvres, results, CORE)
+    write_page(order, results, verdicts, tmp_path / 'check.html')
+    text = (tmp_path / 'check.html').read_text(encoding='utf-8')
+    assert text.count('<li class="bad">') == 2
+    assert 'href="#second"' in text
+    assert 'data-chart="second"' in text
+    assert 'mount_sim ended with code 1 &lt;b&gt;' in text
+
+
+def test_the_truth_is_that_of_the_samples_of_the_excitation_where_some_are_missing():
+    time = np.arange(-5, 20) * 1e-3
+    whole = Truth(time, *(time + place for place in range(6)))
+    cut = at_samples(whole, 10)
+    np.testing.assert_array_equal(cut.time, time[5:15])
+    np.testing.assert_array_equal(cut.chassis_acceleration, time[5:15] + 5)
+    kept = np.delete(np.arange(25), [8, 9])
+    holed = Truth(*(getattr(whole, field.name)[kept] for field in fields(Truth)))
+    np.testing.assert_allclose(at_samples(holed, 10).displacement, cut.displacement, atol=1e-15)
+
+
+def test_the_suite_of_the_page_can_be_used_and_the_page_names_every_quantity():
+    text = PAGE.read_text(encoding='utf-8')
+    (block,) = re.findall(r'```yaml\n(.*?)```', text, re.DOTALL)
+    assert [each.name for each in suite_of(plain_yaml(block))] == ['deep_gap']
+    assert [name for name in MEASURES if f'`{name}`' not in text] == []
+
+
+def test_every_measure_has_its_unit_in_its_name():
+    ends = {
+        'mm': '_mm',
+        's': '_s',
+        'J': '_j',
+        'W': '_w',
+        'A': '_a',
+        'µm': '_um',
+        'µs': '_us',
+        '%': '_percent',
+    }
+    assert all(name.endswith(ends[each.unit]) for name, each in MEASURES.items() if each.unit)

@@ -1,0 +1,39 @@
+"""A run of the fault matrix that is told to end leaves no graph behind."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from engine_mount.faults import session
+from engine_mount.faults.graph import Place
+from engine_mount.faults.matrix import MATRIX
+from mount_ros.testing import free_domain
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_graph_that_runs_is_ended_whatever_signal_comes(monkeypatch, number):
+    ended = []
+
+    class Session:
+        def __init__(self, *_):
+            pass
+
+        def outcome(self, _):
+            os.kill(os.getpid(), number)
+            pytest.fail('the run goes on')
+
+        def end_graph(self):
+            os.kill(os.getpid(), number)  # whoever is in a hurry
+            ended.append(number)
+
+    monkeypatch.setattr(session, '_Session', Session)
+    before = signal.getsignal(number)
+    cases = [MATRIX['can_silent']]
+    with free_domain() as domain:
+        place = Place([], domain, Path(), 0)
+        with pytest.raises(KeyboardInterrupt):
+            session.run_faults(cases, place, lambda *_: None, lambda *_: None)
+    assert ended == [number]
+    assert signal.getsignal(number) is before

@@ -1,0 +1,82 @@
+"""The example fleet is what it says, and the same bytes each time."""
+
+import hashlib
+from dataclasses import replace
+
+import pytest
+
+import engine_mount
+from engine_mount.drives.preflight import preflight
+from engine_mount.fleet.example.fleet import (
+    FEWEST,
+    WHOLE_FLEET,
+    ExampleError,
+    make_example,
+    make_one,
+    settings_of,
+    whole_fleet,
+)
+from engine_mount.fleet.example.variations import VARIATIONS
+from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.bag.recording import ReadingError
+
+
+def order_named(folder, name):
+    return next(order for order in whole_fleet(folder) if str(order.folder).endswith(name))
+
+
+def digests(folder):
+    return {
+        str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in folder.rglob('*')
+        if file.is_file()
+    }
+
+
+def test_the_whole_fleet_can_be_driven_and_each_recording_has_a_folder_of_its_own(tmp_path):
+    orders = list(whole_fleet(tmp_path))
+    assert len({order.folder for order in orders}) == len(orders) == WHOLE_FLEET
+    for order in orders:
+        preflight(settings_of(order), core=True)
+
+
+def test_longer_drives_can_be_driven_and_a_sweep_ends_at_its_last_frequency(tmp_path):
+    for order in (order for order in whole_fleet(tmp_path) if order.variation is VARIATIONS[0]):
+        longer = replace(order, seconds=40.0)
+        length = preflight(settings_of(longer), core=True).duration
+        assert length == pytest.approx(
+            {'sweep': 18.0, 'sweep_switched': 46.0 / 3.0}.get(order.drive.name, 40.0), abs=1e-3
+        )
+
+
+def test_the_same_order_makes_the_same_bytes(tmp_path):
+    for name in ('tip_in/16_without_ramp', 'tip_in/15_two_mounts', 'tip_in/19_foreign'):
+        once, again = (make_one(order_named(tmp_path / place, name)) for place in ('once', 'again'))
+        assert digests(once) == digests(again)
+
+
+@pytest.mark.slow
+def test_each_damage_is_seen_by_the_reader(tmp_path):
+    damaged = {done.result.name[3:]: done.result for done in make_example(tmp_path, FEWEST, workers=1)}
+    for damage, reason in (('garbage', 'is no MCAP file'), ('no_data', 'holds no MCAP file')):
+        with pytest.raises(ReadingError, match=reason):
+            engine_mount.open(damaged[damage])
+    told = {
+        'truncated': 'without its footer',
+        'no_metadata': 'metadata.yaml is missing',
+        'wrong_checksum': 'lost',
+    }
+    for damage, sentence in told.items():
+        recording = engine_mount.open(damaged[damage])
+        audit(recording)
+        assert sentence in '\n'.join(recording.warnings)
+    assert list(engine_mount.open(damaged['foreign'])) == ['/imu/data']
+
+
+@pytest.mark.parametrize('order', [{'recordings': FEWEST - 1}, {'recordings': 201}, {'seconds': 1.0}])
+def test_an_order_that_cannot_be_met_is_refused(tmp_path, order):
+    with pytest.raises(ExampleError):
+        make_example(tmp_path, **order)
+    (tmp_path / 'something').touch()
+    with pytest.raises(ExampleError, match='not empty'):
+        make_example(tmp_path)

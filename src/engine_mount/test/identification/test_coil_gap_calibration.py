@@ -1,0 +1,232 @@
+"""Gap curves from noisy ripple at known gaps: how near to the truth, and what temperature leaves."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engine_mount.identification.coil.gap_calibration import calibrate_gap_curves
+from engine_mount.identification.coil.gap_point import RippleRecording, measured_point
+from engine_mount.identification.coil.temperature_fit import (
+    gap_reluctance,
+    measured_compensation,
+    stated_compensation,
+)
+from engine_mount.identification.coil.unique_region import unique_region, warnings
+from mount_models.coil.crossing import find_crossing
+from mount_models.coil.gap import GapCurvesRefusedError, OutsideCurveError, evaluate
+from mount_models.coil.temperature import (
+    CompensationError,
+    check_compensation,
+    crossing_at_calibration,
+    inductance_at_calibration,
+    temperature_share,
+)
+from mount_models.quantity import with_values
+from mount_models.specimen import default_specimen
+from mount_sim.plant.reluctance import ReluctanceActuator
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
+
+MAGNET, COIL = ReluctanceActuator(), RippleCoil()
+GAPS = np.linspace(270e-6, 550e-6, 15)
+CURRENTS = np.concatenate([np.full(1000, 0.2), np.linspace(0.2, 2.5, 1500)])
+JUDGED = np.linspace(300e-6, 500e-6, 9)
+
+
+def coil_at(celsius, coefficient=0.0043):
+    return with_values(
+        COIL,
+        conductivity=COIL.conductivity / (1.0 + coefficient * (celsius - 20.0)),
+        resistance=COIL.resistance * (1.0 + 0.0039 * (celsius - 20.0)),
+    )
+
+
+@functools.lru_cache
+def without_noise(celsius, gaps, coefficient):
+    coil, currents = coil_at(celsius, coefficient), CURRENTS.tolist()
+    return np.array(
+        [[incremental_inductance(coil, MAGNET, current, gap) for current in currents] for gap in gaps]
+    )
+
+
+def recorded(celsius=20.0, seed=0, noise=0.01, gaps=GAPS, coefficient=0.0043):
+    clean = without_noise(celsius, tuple(gaps.tolist()), coefficient)
+    inductance = clean * (1.0 + noise * np.random.default_rng(seed).standard_normal(clean.shape))
+    return [
+        RippleRecording(f'{gap * 1e6:.0f} um', float(gap), celsius, CURRENTS, row)
+        for gap, row in zip(gaps, inductance, strict=True)
+    ]
+
+
+@functools.lru_cache
+def truth(gap, celsius=20.0, coefficient=0.0043):
+    coil = coil_at(celsius, coefficient)
+    currents = np.linspace(1.0, 2.4, 281)
+    at_rest = incremental_inductance(coil, MAGNET, 0.2, gap)
+    curve = [incremental_inductance(coil, MAGNET, current, gap) for current in currents]
+    return at_rest, find_crossing(currents, curve, 20e-3, 0.2).current
+
+
+def gap_errors(curves, celsius=20.0, compensation=None, coefficient=0.0043):
+    """Return the largest errors at rest and at contact, um, against the simulated truth."""
+    worst = [0.0, 0.0]
+    for gap in JUDGED:
+        inductance, crossing = truth(gap, celsius, coefficient)
+        if compensation is not None:
+            inductance = inductance_at_calibration(compensation, curves, inductance, celsius)
+            crossing = crossing_at_calibration(compensation, curves, crossing, celsius)
+        found = (
+            evaluate(curves.gap_of_inductance, inductance),
+            evaluate(curves.gap_of_crossing_current, crossing),
+        )
+        worst = [max(old, 1e6 * abs(float(value) - gap)) for old, value in zip(worst, found, strict=True)]
+    return worst
+
+
+@pytest.fixture(scope='module')
+def recordings():
+    return recorded()
+
+
+@pytest.fixture(scope='module')
+def points(recordings):
+    return [measured_point(recording) for recording in recordings]
+
+
+@pytest.fixture(scope='module')
+def calibration(points):
+    return calibrate_gap_curves(points)
+
+
+@pytest.fixture(scope='module')
+def compensation(calibration):
+    warm = [measured_point(recording) for recording in recorded(80.0, gaps=GAPS[::2])]
+    return measured_compensation(calibration.curves, 20.0, warm)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_curves_from_noisy_ripple_meet_the_truth_within_a_micrometre(seed):
+    found = calibrate_gap_curves([measured_point(recording) for recording in recorded(seed=seed)])
+    assert max(gap_errors(found.curves)) <= 1.0
+
+
+def test_the_stated_uncertainty_is_that_of_repeated_calibrations(calibration):
+    found = [
+        calibrate_gap_curves([measured_point(r) for r in recorded(seed=seed)], highest_degree=2)
+        for seed in range(8)
+    ]
+    middle = [float(evaluate(each.curves.inductance_of_gap, 410e-6)) for each in found]
+    stated = np.sqrt(found[0].inductance.covariance[0, 0])
+    assert np.std(middle, ddof=1) == pytest.approx(stated, rel=0.7)
+
+
+def test_a_gap_that_contradicts_the_others_is_refused_and_named(points):
+    wrong = [replace(p, gap=p.gap + 15e-6) if p.name == '390 um' else p for p in points]
+    with pytest.raises(GapCurvesRefusedError, match=r'390 um: the .* off the given 405\.0 um'):
+        calibrate_gap_curves(wrong)
+
+
+def test_too_few_gaps_are_refused(points):
+    with pytest.raises(GapCurvesRefusedError, match=r'6 or more air gaps .* 5 given'):
+        calibrate_gap_curves(points[:5])
+
+
+def test_the_same_gap_twice_is_refused(points):
+    with pytest.raises(GapCurvesRefusedError, match='differ by 1 um'):
+        calibrate_gap_curves([*points, points[3]])
+
+
+def test_a_recording_that_is_not_long_enough_is_refused(recordings):
+    short = replace(recordings[0], current=CURRENTS[:2], inductance=recordings[0].inductance[:2])
+    with pytest.raises(GapCurvesRefusedError, match=r'270 um: 1 different currents, at least 5'):
+        measured_point(short)
+
+
+def test_a_recording_without_the_rest_current_is_refused(recordings):
+    late = replace(recordings[0], current=CURRENTS[1100:], inductance=recordings[0].inductance[1100:])
+    with pytest.raises(GapCurvesRefusedError, match=r'270 um: samples within 0\.02 A of the rest current'):
+        measured_point(late)
+
+
+def test_a_recording_that_never_reaches_the_crossing_is_refused(recordings):
+    low = replace(recordings[0], current=CURRENTS[:1300], inductance=recordings[0].inductance[:1300])
+    with pytest.raises(GapCurvesRefusedError, match='270 um: coil inductance must fall through'):
+        measured_point(low)
+
+
+def test_the_unique_region_is_found_from_the_data(recordings):
+    region = unique_region(recordings)
+    falling, rising, (levels,) = region.falling[0], region.rising[0], region.levels
+    assert falling[0] <= 0.2 < 0.45 <= falling[1] <= 0.75
+    assert 0.95 <= rising[0] <= 1.2 < 1.9 <= rising[1]
+    assert levels[0] < 10e-3
+    assert 25e-3 < levels[1] < 36e-3
+    assert warnings(region, 0.2, 20e-3) == []
+
+
+def test_choices_in_the_ambiguous_region_are_warned_of(recordings):
+    current, inductance = warnings(unique_region(recordings), 0.9, 34e-3)
+    assert 'rest_current (0.90 A) must lie where' in current
+    assert 'crossing_inductance (34.0 mH) must be one' in inductance
+
+
+@pytest.mark.parametrize('celsius', [-20.0, 80.0])
+def test_a_measured_compensation_leaves_little_of_what_temperature_does(calibration, compensation, celsius):
+    rest, contact = gap_errors(calibration.curves, celsius)
+    assert rest > 50.0
+    assert contact > 20.0
+    rest, contact = gap_errors(calibration.curves, celsius, compensation)
+    assert rest <= 2.0
+    assert contact <= (1.5 if celsius > 20.0 else 7.0)
+
+
+@pytest.mark.parametrize('coefficient', [0.0034, 0.0052])
+def test_a_wrong_coefficient_matters_little_where_two_temperatures_were_measured(calibration, coefficient):
+    warm = [measured_point(r) for r in recorded(80.0, gaps=GAPS[::2], coefficient=coefficient)]
+    found = measured_compensation(calibration.curves, 20.0, warm)
+    assert max(gap_errors(calibration.curves, 80.0, found, coefficient)) <= 1.5
+    assert max(gap_errors(calibration.curves, -20.0, found, coefficient)) <= 9.0
+
+
+def test_a_stated_compensation_takes_the_larger_part(calibration, points):
+    law = default_specimen().force_law
+    found = stated_compensation(calibration.curves, 20.0, points, law, 0.2, 20e-3)
+    rest, contact = gap_errors(calibration.curves, 80.0)
+    left_rest, left_contact = gap_errors(calibration.curves, 80.0, found)
+    assert left_rest <= 0.35 * rest
+    assert left_contact <= 0.2 * contact
+
+
+def test_at_the_temperature_of_the_curves_nothing_changes(calibration, compensation):
+    assert temperature_share(compensation, 20.0) == 0.0
+    assert temperature_share(compensation, 80.0) == pytest.approx(1.0)
+    assert inductance_at_calibration(compensation, calibration.curves, 0.0461, 20.0) == 0.0461
+    assert crossing_at_calibration(compensation, calibration.curves, 1.51, 20.0) == 1.51
+
+
+def test_a_temperature_that_is_not_compensated_is_refused(calibration, compensation):
+    with pytest.raises(
+        OutsideCurveError, match=r'coil temperature \(140\.0 degC\) must lie within -40\.0 \.\. 120'
+    ):
+        inductance_at_calibration(compensation, calibration.curves, 0.046, 140.0)
+
+
+@pytest.mark.parametrize(
+    ('change', 'sentence'),
+    [
+        ({'reference_celsius': 25.0}, r'must differ from calibration_celsius \(20 degC\) by 10 K'),
+        ({'lowest_celsius': 30.0}, r'calibration_celsius \(20 degC\) must lie within'),
+        ({'conductivity_coefficient': 0.02}, 'must leave the core a resistivity'),
+    ],
+)
+def test_a_compensation_of_nonsense_is_refused(calibration, compensation, change, sentence):
+    with pytest.raises(CompensationError, match=sentence):
+        check_compensation(compensation._replace(**change), calibration.curves)
+
+
+def test_the_reluctance_of_the_gaps_follows_from_the_force(calibration):
+    """Without leakage in the magnet it is that of the gaps alone; the core's own is some percent."""
+    found = gap_reluctance(default_specimen().force_law, np.array([349e-6]))[0]
+    exact = 2.0 * (349e-6 + MAGNET.residual_gap) / (4e-7 * np.pi * MAGNET.gap_area * MAGNET.turns**2)
+    assert found == pytest.approx(exact, rel=0.08)

@@ -1,0 +1,214 @@
+"""Friction identification: steps 1 to 3, the ladder's laws, and what is refused."""
+
+import numpy as np
+import pytest
+
+from engine_mount.identification.friction.kind import RAMP, SAWTOOTH, recognised
+from engine_mount.identification.friction.ladder import best_rung, fit_ladder, law_error
+from engine_mount.identification.friction.laws.coulomb import Coulomb
+from engine_mount.identification.friction.laws.dahl import Dahl
+from engine_mount.identification.friction.laws.elastic_play import ElasticPlay
+from engine_mount.identification.friction.recording import IdentificationError, checked_recording
+from engine_mount.identification.friction.steps.coefficient_fit import fit_coefficients
+from engine_mount.identification.friction.steps.ramp_hold import fit_ramp_hold
+from engine_mount.identification.friction.steps.ramp_response import ramp_response
+from engine_mount.identification.friction.steps.sawtooth import stroke_lines
+from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
+from mount_models.friction.contact import FrictionContact
+from mount_sim.plant.friction import full_response
+
+CONTACT = FrictionContact()
+TIME = np.arange(0.0, 5.0, 1e-3)
+
+
+def ramp(contact=CONTACT, p=2e6, noise=0.0, seed=0, start=0.3, time=TIME):
+    random = np.random.default_rng(seed)
+    channels = ramp_response(contact, p, 20e-6, start, 0.2, time)
+    x, force, desired = (
+        each + noise * np.sqrt(np.mean(each**2)) * random.standard_normal(each.size) for each in channels
+    )
+    return checked_recording('ramp', time, x, force, 100.0, desired)
+
+
+def sawtooth(load, speeds=(0.002, 0.004, 0.006, 0.010), noise=0.01, seed=0, coefs=None):
+    corners, times = [0.0, 2.5e-3], [0.0, 2.5e-3 / speeds[0]]
+    for speed in speeds:
+        for corner in (-2.5e-3, 2.5e-3):
+            corners.append(corner)
+            times.append(times[-1] + 5e-3 / speed)
+    time = np.arange(0.0, times[-1], 1e-3)
+    x = np.interp(time, times, corners)
+    force, _, _ = full_response(CONTACT, coefs or FrictionCoefficients(), x, np.full(x.size, load), 1e-3)
+    random = np.random.default_rng(seed)
+    force = force + noise * np.sqrt(np.mean(force**2)) * random.standard_normal(force.size)
+    return checked_recording(f'saw {load:g}', time, x, force, load)
+
+
+def test_step_1_recovers_the_contact_exactly_from_a_ramp_without_noise():
+    fit = fit_ramp_hold(ramp(start=0.0))
+    assert fit.contact == pytest.approx(CONTACT, rel=0.005)
+    assert fit.time_constant == pytest.approx(0.44118, abs=1e-5)
+    assert fit.kappa == pytest.approx(1 - 0.19048, abs=1e-5)
+
+
+def test_formulas_as_printed_give_what_the_print_gives():
+    printed = fit_ramp_hold(ramp()).printed
+    assert printed.contact_stiffness == pytest.approx(4.0e6, rel=1e-3)
+    assert printed.tangential_stiffness_with_p == pytest.approx(1.67e6, rel=5e-3)
+    assert printed.tangential_stiffness_without_p == pytest.approx(1.0e7, rel=5e-3)
+    assert printed.tangential_damping == pytest.approx(4.41e6, rel=1e-3)
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_step_1_recovers_drawn_contacts_within_3_percent_with_noise(seed):
+    random = np.random.default_rng(seed)
+    stiff = 1e7 * random.uniform(0.7, 1.4)
+    contact = FrictionContact(stiff, stiff * random.uniform(0.35, 0.7), 4e6 * random.uniform(0.7, 1.4))
+    fit = fit_ramp_hold(ramp(contact, 2e6 * random.uniform(0.7, 1.4), 0.01, seed))
+    assert fit.contact == pytest.approx(contact, rel=0.03)
+
+
+def held(time_constants, noise):
+    return ramp(noise=noise, time=np.arange(0.0, 0.5 + time_constants * 0.44118, 1e-3))
+
+
+@pytest.mark.parametrize('noise', [0.0, 0.01])
+def test_step_1_refuses_a_ramp_that_is_held_for_less_than_three_time_constants(noise):
+    assert fit_ramp_hold(held(3.4, noise)).contact == pytest.approx(CONTACT, rel=0.05)
+    for short in (0.5, 2.6):
+        with pytest.raises(
+            IdentificationError, match=r'held for .* time constants of .* \(at least 3\).* hold for'
+        ):
+            fit_ramp_hold(held(short, noise))
+
+
+def test_step_1_refuses_a_contact_that_slides():
+    with pytest.raises(IdentificationError, match=r'step 1|misses'):
+        fit_ramp_hold(sawtooth(100.0))
+
+
+def test_steps_2_and_3_recover_a_and_b():
+    truth = FrictionCoefficients()
+    lines = [
+        line
+        for seed, load in enumerate((40.0, 80.0, 120.0))
+        for line in stroke_lines(sawtooth(load, seed=seed), CONTACT)
+    ]
+    found = fit_coefficients(lines).coefficients
+    points = [
+        (s * v, load) for s in (1, -1) for v in (0.002, 0.004, 0.007, 0.01) for load in (40.0, 60.0, 120.0)
+    ]
+    a = [offset_coefficient(found, *point) - offset_coefficient(truth, *point) for point in points]
+    b = [1e-3 * (slope_coefficient(found, *point) - slope_coefficient(truth, *point)) for point in points]
+    assert np.sqrt(np.mean(np.square(a))) < 0.003
+    assert np.sqrt(np.mean(np.square(b))) < 0.5
+
+
+def test_most_lines_hold_the_truth_in_their_confidence_interval():
+    truth = FrictionCoefficients()
+    lines = stroke_lines(sawtooth(100.0), CONTACT)
+    inside = [
+        abs(line.a - offset_coefficient(truth, line.velocity, 100.0)) < line.a_interval + 0.002
+        for line in lines
+    ]
+    assert np.mean(inside) > 0.8
+
+
+def test_alpha_and_beta_are_one_at_100_newton():
+    lines = [line for load in (40.0, 120.0) for line in stroke_lines(sawtooth(load), CONTACT)]
+    found = fit_coefficients(lines).coefficients
+    assert found.alpha_p1 + 100 * found.alpha_p2 == pytest.approx(1.0)
+    assert found.beta_1 + 100 * found.beta_2 == pytest.approx(1.0)
+
+
+def test_too_few_speeds_are_refused():
+    with pytest.raises(IdentificationError, match=r'2 speeds .* at least 4'):
+        fit_coefficients(stroke_lines(sawtooth(100.0, (0.004, 0.008)), CONTACT))
+
+
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_one_direction_only_is_refused(sign, side):
+    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if sign * line.velocity > 0]
+    with pytest.raises(IdentificationError, match=f'only strokes to the {side} side'):
+        fit_coefficients(lines)
+    with pytest.raises(IdentificationError, match=f'{side} side only'):
+        recognised(checked_recording('one way', TIME, sign * 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
+
+
+@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
+def test_too_few_speeds_to_one_side_are_refused(sign, side):
+    lines = stroke_lines(sawtooth(100.0), CONTACT)
+    fewer = [line for line in lines if sign * line.velocity < 0 or abs(line.velocity) < 0.005]
+    with pytest.raises(IdentificationError, match=f'2 speeds to the {side} side'):
+        fit_coefficients(fewer)
+
+
+def test_recordings_are_recognised():
+    assert recognised(ramp(noise=0.01)) == RAMP
+    assert recognised(sawtooth(100.0)) == SAWTOOTH
+    sine = checked_recording('sine', TIME, 1e-3 * np.sin(6 * TIME), 50 * np.cos(6 * TIME), 100.0)
+    assert recognised(sine) == 'other motion'
+
+
+X, F = 1e-3 * np.sin(6 * TIME), 50 * np.cos(6 * TIME)
+
+
+@pytest.mark.parametrize(
+    ('x', 'force', 'clamp', 'words'),
+    [
+        (0 * X, F, 100.0, 'displacement is constant .*sensor'),
+        (X, 0 * F + 3, 100.0, 'friction force is constant'),
+        (np.where(TIME > 2, X[2000], X), F, 100.0, 'stuck'),
+        (np.where(TIME > 3, np.nan, X), F, 100.0, r'no number at sample 3001 \(1999 such'),
+        (X * 1e3, F * 1e-3, 100.0, r'displacement spans 2 m.*mm under a heading in m'),
+        (X, F * 1e-3, 100.0, 'in kN'),
+        (X, F, 0.1, 'normal force in kN'),
+        (X, F, -100.0, 'above 0 N'),
+    ],
+)  # fmt: skip
+def test_bad_channels_are_refused_with_a_sentence(x, force, clamp, words):
+    with pytest.raises(IdentificationError, match=words):
+        checked_recording('bad', TIME, x, force, clamp)
+
+
+def test_two_samples_are_refused():
+    with pytest.raises(IdentificationError, match=r'2 samples; at least 50'):
+        checked_recording('short', TIME[:2], X[:2], F[:2], 100.0)
+
+
+def test_elastic_play_lingers_at_zero_then_rises_and_slides():
+    x = np.concatenate([np.linspace(0, 5e-3, 500), np.linspace(5e-3, -5e-3, 1000)])
+    force = ElasticPlay().simulate(np.array([0.5, 1.0, 1e5, 1e-3]), x, 1e-3, np.full((x.size, 2), 100.0))
+    assert force[499] == pytest.approx(50.0)
+    after = 5e-3 - x
+    assert np.all(force[500:][(after[500:] > 0.6e-3) & (after[500:] < 2.4e-3)] == 0.0)
+    assert force[-1] == pytest.approx(-100.0)
+
+
+def test_dahl_becomes_coulomb_when_stiff():
+    x = 1e-3 * np.sin(6 * TIME)
+    loads = np.full((x.size, 2), 100.0)
+    stiff = Dahl().simulate(np.array([0.5, 0.4, 1e9]), x, 1e-3, loads)
+    coulomb = Coulomb().simulate(np.array([0.5, 0.4]), x, 1e-3, loads)
+    moving = np.abs(np.gradient(x, TIME)) > 1e-3
+    assert stiff[moving] == pytest.approx(coulomb[moving], abs=0.2)
+
+
+def test_a_law_without_any_force_has_an_error_of_one():
+    recording = checked_recording('sine', TIME, X, F, 100.0)
+    assert law_error(Coulomb(), np.zeros(2), [recording]) == pytest.approx(1.0)
+
+
+def test_the_ladder_finds_the_law_that_made_the_data_and_judges_by_held_out_error():
+    truth = np.array([0.5, 0.7, 2e5, 0.3e-3])
+    train, other = (
+        checked_recording(
+            name, TIME, x, ElasticPlay().simulate(truth, x, 1e-3, np.full((x.size, 2), load)), load
+        )
+        for name, x, load in (('a', 3e-3 * np.sin(5 * TIME), 100.0), ('b', 2e-3 * np.sin(9 * TIME), 60.0))
+    )
+    rungs = fit_ladder([train], [other], laws=[Coulomb(), Dahl(), ElasticPlay()])
+    assert best_rung(rungs).law.name == 'Coulomb + elastic play'
+    assert rungs[2].held_out_error < 0.02
+    assert rungs[2].values == pytest.approx(truth, rel=0.05)
+    assert rungs[0].held_out_error == law_error(Coulomb(), rungs[0].values, [other]) > 0.1

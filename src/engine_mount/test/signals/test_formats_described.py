@@ -1,0 +1,32 @@
+"""What is listed of a file of others."""
+
+import numpy as np
+
+from engine_mount.signals.formats.described import columns_table, described
+from engine_mount.signals.formats.reading import is_foreign, read
+from engine_mount.signals.testing import make_csv, make_mcap, make_mdf
+
+TIMES = np.arange(11) / 100.0
+COLUMNS = {'az': ('g', np.array([np.nan, *range(10)], float))}
+
+
+def test_columns_are_told_with_unit_rate_span_and_range(tmp_path):
+    (facts,) = described(read(make_mdf(tmp_path, 'x', TIMES, COLUMNS).path))
+    told = (facts.name, facts.unit, facts.samples, facts.missing, facts.least, facts.greatest, facts.mean)
+    assert told == ('az', 'g', 11, 1, 0.0, 9.0, 4.5)
+    np.testing.assert_allclose([facts.rate, facts.span], [100.0, 0.1])
+    (row,) = columns_table([facts]).rows
+    assert row == ('az', 'g', '11', '100 Hz', '0.1 s', '0 .. 9', '4.5')
+
+
+def test_a_column_without_times_of_its_own_has_no_rate(tmp_path):
+    facts = described(read(make_csv(tmp_path, 'x', TIMES, COLUMNS).path))
+    assert facts[1].as_json()['rate'] is None
+    assert [row[3:5] for row in columns_table(facts).rows] == [('', ''), ('', '')]
+
+
+def test_a_recording_of_ros_is_none_of_others(tmp_path):
+    assert is_foreign(make_csv(tmp_path, 'x', TIMES, COLUMNS).path)
+    folder = make_mcap(tmp_path, 'bag', TIMES, COLUMNS).path
+    assert not is_foreign(folder)
+    assert not is_foreign(next(folder.glob('*.mcap')))

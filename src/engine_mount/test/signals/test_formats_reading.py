@@ -1,0 +1,71 @@
+"""Every format, made by a writer of others, is read with the same numbers, times and units."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.testing import MAKERS
+from engine_mount.signals.testing.made import BEGIN
+
+N = 400
+TIMES = np.arange(N) / 200.0
+RANDOM = np.random.default_rng(7)
+COLUMNS = {
+    'az': ('m/s^2', RANDOM.standard_normal(N)),
+    'travel': ('mm', 3.0 + RANDOM.standard_normal(N)),
+}
+DATED = ('blf', 'asc', 'candump', 'trc', 'mcap', 'db3_zstd')
+
+
+@pytest.fixture(params=sorted(MAKERS))
+def made(request, tmp_path):
+    return request.param, MAKERS[request.param](tmp_path, 'drive', TIMES, COLUMNS)
+
+
+def test_numbers_times_and_units_come_back(made):
+    kind, file = made
+    measured = read(file.path, [*file.names.values(), *filter(None, [file.time])], file.stated)
+    for name, (unit, values) in COLUMNS.items():
+        column = measured.column(file.names[name])
+        np.testing.assert_allclose(column.values, values, rtol=1e-15 if kind == 'excel' else 0.0)  # 16 digits
+        assert column.values.dtype == np.float64
+        assert column.unit == (unit if file.units else '')
+        times = measured.column(file.time).values if file.time else column.time.times
+        np.testing.assert_allclose(times - times[0], TIMES, atol=2e-6)
+        assert (column.time is None) == bool(file.time)
+        if kind in DATED:
+            assert abs(column.time.begin * 1e-9 + column.time.times[0] - BEGIN) < 0.01
+    assert not [note for note in measured.notes if 'hold no number' in note]
+
+
+def test_headings_are_told_without_reading_and_only_chosen_columns_are_read(made):
+    _, file = made
+    there = headings(file.path, file.stated)
+    measured = read(file.path, [file.names['travel']], file.stated)
+    assert [one.values.size for one in measured.columns.values()] == [N]
+    assert {one.name for one in there} == {one.name for one in (*measured.columns.values(), *measured.others)}
+
+
+def test_the_provenance_tells_the_bytes(made):
+    _, file = made
+    told = read(file.path, [file.names['az']], file.stated).provenance
+    assert told.uri == str(file.path)
+    if file.path.is_file():
+        content = file.path.read_bytes()
+        assert (told.sha256, told.size) == (hashlib.sha256(content).hexdigest(), len(content))
+    else:
+        lines = [
+            f'{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.relative_to(file.path).as_posix()}\n'
+            for one in sorted(file.path.rglob('*')) if one.is_file()
+        ]  # fmt: skip
+        assert told.sha256 == hashlib.sha256(''.join(lines).encode()).hexdigest()
+        assert told.size == sum(one.stat().st_size for one in file.path.rglob('*') if one.is_file())
+
+
+def test_a_column_that_is_not_there_is_refused_with_those_that_are(made):
+    _, file = made
+    with pytest.raises(SignalError, match=r"has no column 'yaw'; its columns are .*"):
+        read(file.path, ['yaw'], file.stated)

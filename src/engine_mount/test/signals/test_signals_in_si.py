@@ -1,0 +1,160 @@
+"""Columns as signals in SI: units and times that are said, those that are not, and those that cannot be."""
+
+import numpy as np
+import pytest
+from measured_columns import SHAKING, TIMES, TRAVEL, measured
+
+from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.units.mapping import Mapping, MappingError, with_options
+from engine_mount.signals.units.signals import signals
+from engine_mount.signals.units.unit import UnitError
+
+GRAVITY, LBF = 9.80665, 4.4482216152605
+
+
+def read(columns, *options, **more):
+    return signals(measured(columns), with_options(Mapping(), options, **more))
+
+
+def refusal(columns, *options, **more):
+    with pytest.raises((MappingError, UnitError, SignalError)) as caught:
+        read(columns, *options, **more)
+    sentence = str(caught.value)
+    assert 'drive.csv' in sentence
+    return sentence
+
+
+def test_what_is_said_becomes_si():
+    found = read(
+        {'t': 1e3 * TIMES, 'az': SHAKING / GRAVITY + 1.0, 'Weg': 1e3 * TRAVEL, 'F': TRAVEL * 1e6 / LBF},
+        'acceleration=az:g', 'displacement=Weg:mm', 'force=F:lbf', time='t:ms',
+    )  # fmt: skip
+    assert found['acceleration'].values == pytest.approx(SHAKING + GRAVITY)
+    assert found['displacement'].values == pytest.approx(TRAVEL)
+    assert found['force'].values == pytest.approx(TRAVEL * 1e6)
+    assert found['force'].times == pytest.approx(TIMES)
+    assert found['force'].clock == "column 't' in ms"
+    assert not found['force'].notes
+
+
+def test_the_header_says_it_too():
+    found = read({'Zeit [ms]': 1e3 * TIMES, 'Weg [mm]': 1e3 * TRAVEL}, 'displacement=Weg')
+    assert found['displacement'].values == pytest.approx(TRAVEL)
+    assert found['displacement'].times == pytest.approx(TIMES)
+
+
+def test_the_hand_goes_before_the_header_and_is_noted():
+    found = read({'t [s]': TIMES, 'Weg [m]': 1e3 * TRAVEL / 25.4}, 'displacement=Weg:in')
+    assert found['displacement'].values == pytest.approx(TRAVEL)
+    assert found['displacement'].notes == ('Weg: its header says m; taken as in, as you say',)
+
+
+def test_the_factor_of_a_unit_may_be_said_twice():
+    found = read({'t [s]': TIMES, 'Weg [mm]': 1e3 * TRAVEL}, 'displacement=Weg', scale=1e-3)
+    assert found['displacement'].values == pytest.approx(TRAVEL)
+    turned = read({'t [s]': TIMES, 'Weg [mm]': 1e3 * TRAVEL}, 'displacement=Weg', scale=-1.0)
+    assert turned['displacement'].values == pytest.approx(-TRAVEL)
+    assert 'the scale says 0.01' in refusal({'t': TIMES, 'Weg [mm]': TRAVEL}, 'displacement=Weg', scale=0.01)
+
+
+@pytest.mark.parametrize(
+    ('values', 'guess'),
+    [
+        (SHAKING / GRAVITY + 1.0, 'g'),
+        (-SHAKING / GRAVITY - 1.0, 'g'),
+        (1e3 * (SHAKING / GRAVITY + 1.0), 'mg'),
+        ((SHAKING + GRAVITY) / 0.3048, 'ft/s^2'),
+        (1e3 * (SHAKING + GRAVITY), 'mm/s^2'),
+    ],
+)
+def test_gravity_tells_the_unit_of_an_acceleration_in_the_refusal(values, guess):
+    sentence = refusal({'t': TIMES, 'az': values}, 'acceleration=az')
+    assert f'is gravity in {guess}' in sentence
+    assert f'write --column acceleration=az:{guess}' in sentence
+
+
+def test_gravity_in_si_is_taken_with_a_note_and_what_could_be_g_is_refused():
+    found = read({'t': TIMES, 'az': SHAKING + 9.66}, 'acceleration=az')
+    assert any('gravity in m/s^2: taken so' in note for note in found['acceleration'].notes)
+    sentence = refusal({'t': TIMES, 'az': SHAKING}, 'acceleration=az')
+    assert 'it could be m/s^2, g' in sentence
+    assert read({'t': TIMES, 'az': SHAKING}, 'acceleration=az', scale=-1.0)[
+        'acceleration'
+    ].values == pytest.approx(-SHAKING)
+
+
+@pytest.mark.parametrize(
+    ('header', 'values', 'option', 'reason', 'remedy'),
+    [
+        ('az [g]', SHAKING + GRAVITY, 'az', '9.81 times gravity', 'az:m/s^2'),
+        ('az', SHAKING + GRAVITY, 'az:g', '9.81 times gravity', 'az:m/s^2'),
+        ('az [m/s^2]', SHAKING / GRAVITY + 1.0, 'az', 'would be gravity in g', 'az:g'),
+        ('az [m/s^2]', 1e3 * SHAKING, 'az', 'no chassis is shaken', 'az:'),
+        ('az [mm]', SHAKING, 'az', 'is in mm', 'name another column'),
+    ],
+)
+def test_an_acceleration_in_the_wrong_unit_is_refused(header, values, option, reason, remedy):
+    sentence = refusal({'t': TIMES, header: values}, f'acceleration={option}')
+    assert reason in sentence
+    assert remedy in sentence
+
+
+@pytest.mark.parametrize(('factor', 'guess'), [(1e6, 'um'), (1e3, 'mm')])
+def test_the_range_tells_the_unit_of_a_displacement(factor, guess):
+    sentence = refusal({'t': TIMES, 'x': factor * 3.0 * TRAVEL}, 'displacement=x')
+    assert f'write --column displacement=x:{guess}' in sentence
+
+
+def test_metres_need_not_be_said_of_a_displacement_but_are_noted():
+    found = read({'t': TIMES, 'x': TRAVEL}, 'displacement=x')
+    assert any('taken as m' in note for note in found['displacement'].notes)
+
+
+@pytest.mark.parametrize(('step', 'guess'), [(1.0, 'ms'), (1000.0, 'us'), (1e6, 'ns'), (10.0, 'ms')])
+def test_steps_tell_the_unit_of_time_in_the_refusal(step, guess):
+    sentence = refusal({'t': step * np.arange(4000), 'x': TRAVEL}, 'displacement=x:m')
+    assert f'write --time t:{guess}' in sentence
+    assert read({'t': step * np.arange(4000), 'x': TRAVEL}, 'displacement=x:m', time=f't:{guess}')
+
+
+def test_a_header_that_says_ms_of_seconds_is_refused():
+    sentence = refusal({'t [ms]': TIMES, 'x': TRAVEL}, 'displacement=x:m')
+    assert '1e+06 samples per second' in sentence
+    assert 'write --time t:s' in sentence
+
+
+def test_times_since_1970_give_the_date():
+    found = read({'t': 1.7e9 + TIMES, 'x': TRAVEL}, 'displacement=x:m')
+    assert abs(found['displacement'].begin - 1_700_000_000_000_000_000) < 1000
+    in_ns = read({'t': 1.7e18 + 1e9 * TIMES, 'x': TRAVEL}, 'displacement=x:m', time='t:ns')
+    assert in_ns['displacement'].begin == 1_700_000_000_000_000_000
+
+
+def test_without_times_the_rate_must_be_said():
+    assert '--rate HZ' in refusal({'x': TRAVEL}, 'displacement=x:m')
+    found = read({'x': TRAVEL}, 'displacement=x:m', rate=2000.0)
+    assert found['displacement'].times[-1] == pytest.approx(3999 / 2000.0)
+    sentence = refusal({'t [s]': TIMES, 'x': TRAVEL}, 'displacement=x:m', rate=500.0)
+    assert 'its times tell 1000 samples per second, --rate says 500' in sentence
+
+
+def test_times_of_the_format_go_before_columns():
+    file = measured({'t': 5.0 * TIMES, 'x': TRAVEL}, begin=1_700_000_000_000_000_000)
+    found = signals(file, with_options(Mapping(), ['displacement=x:m']))
+    assert found['displacement'].clock == 'times of the format'
+    assert found['displacement'].begin == 1_700_000_000_000_000_000
+
+
+def test_samples_without_a_number_are_left_out_and_told():
+    values = TRAVEL.copy()
+    values[[0, 7]] = np.nan
+    found = read({'t': TIMES, 'x': values}, 'displacement=x:m')
+    assert found['displacement'].values.size == TIMES.size - 2
+    assert found['displacement'].begin == 1_000_000
+    assert any('2 samples without a number' in note for note in found['displacement'].notes)
+    values[9] = np.inf
+    assert 'value number 9 is inf, at 0.0090 s' in refusal({'t': TIMES, 'x': values}, 'displacement=x:m')
+
+
+def test_a_column_that_is_not_there_is_named_with_those_that_are():
+    assert 't, x' in refusal({'t': TIMES, 'x': TRAVEL}, 'displacement=y:m')

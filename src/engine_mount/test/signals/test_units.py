@@ -1,0 +1,80 @@
+"""Units by every spelling that a header or a user writes."""
+
+import numpy as np
+import pytest
+
+from engine_mount.signals.units.unit import SI_UNITS, UnitError, is_unit, si_unit, unit_of, units_of
+
+
+@pytest.mark.parametrize(
+    ('text', 'symbol', 'value', 'in_si'),
+    [
+        ('mm', 'mm', 1.0, 1e-3),
+        ('[µm]', 'um', 5000.0, 5e-3),
+        ('μm', 'um', 1.0, 1e-6),
+        ('in', 'in', 1.0, 0.0254),
+        ('Inch', 'in', 1.0, 0.0254),
+        ('ft', 'ft', 1.0, 0.3048),
+        ('g', 'g', 1.0, 9.80665),
+        ('mg', 'mg', 1000.0, 9.80665),
+        ('m/s²', 'm/s^2', 1.0, 1.0),
+        ('m·s^-2', 'm/s^2', 1.0, 1.0),
+        ('m/s**2', 'm/s^2', 1.0, 1.0),
+        ('ft/s^2', 'ft/s^2', 1.0, 0.3048),
+        ('lbf', 'lbf', 1.0, 4.4482216152605),
+        ('kip', 'kip', 1.0, 4448.2216152605),
+        ('kN', 'kN', 2.0, 2000.0),
+        ('ms', 'ms', 1.0, 1e-3),
+        ('Sec', 's', 1.0, 1.0),
+        ('min', 'min', 1.0, 60.0),
+        ('km/h', 'km/h', 36.0, 10.0),
+        ('mph', 'mph', 1.0, 0.44704),
+        ('°C', 'degC', 20.0, 293.15),
+        ('degF', 'degF', 212.0, 373.15),
+        ('K', 'K', 300.0, 300.0),
+        ('mH', 'mH', 2.5, 2.5e-3),
+        ('psi', 'psi', 1.0, 6894.757293168),
+        ('rpm', 'rpm', 60.0, 2.0 * np.pi),
+    ],
+)
+def test_a_spelling_leads_to_si(text, symbol, value, in_si):
+    unit = unit_of(text)
+    assert unit.symbol == symbol
+    assert unit.to_si(np.array([value]))[0] == pytest.approx(in_si, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('text', 'hint'),
+    [
+        ('G', 'for gravity write g'),
+        ('mS', 'for milliseconds write ms'),
+        ('S', 'for seconds write s'),
+        ('KN', 'write kN'),
+        ('Mbar', 'is it mbar'),
+        ('MIn', 'is it min'),
+        ('furlong', 'known are m, mm'),
+    ],
+)
+def test_what_is_no_unit_here_is_refused_with_what_it_may_be(text, hint):
+    assert not is_unit(text)
+    with pytest.raises(UnitError, match=hint):
+        unit_of(text)
+
+
+def test_a_prefix_is_told_from_its_capital():
+    assert unit_of('mN').factor == 1e-3
+    assert unit_of('MN').factor == 1e6
+    assert not is_unit('mPa') or unit_of('mPa').factor == 1e-3
+    assert unit_of('MPa').factor == 1e6
+
+
+def test_every_dimension_has_its_si_unit():
+    for dimension, symbol in SI_UNITS.items():
+        assert si_unit(dimension).symbol == symbol
+        assert si_unit(dimension).factor == 1.0
+        assert units_of(dimension)[0] == si_unit(dimension)
+
+
+def test_what_is_in_si_is_not_touched():
+    values = np.arange(3.0)
+    assert unit_of('m').to_si(values) is values

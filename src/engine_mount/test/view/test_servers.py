@@ -1,0 +1,264 @@
+"""The page and the Foxglove server, held against clients that are not ours."""
+
+import asyncio
+import json
+import os
+import signal
+import struct
+import threading
+
+import aiohttp
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from engine_mount.view.feed.feed import FeedError
+from engine_mount.view.feed.recorded import Recorded
+from engine_mount.view.foxglove_server import FoxgloveServer
+from engine_mount.view.page.web import Web
+from engine_mount.view.view import ViewOrder, serve_view
+from engine_mount.view.window.model import Model
+
+LIMIT = 30.0  # s
+UPGRADE = {
+    'Connection': 'Upgrade',
+    'Upgrade': 'websocket',
+    'Sec-WebSocket-Version': '13',
+    'Sec-WebSocket-Key': 'MDEyMzQ1Njc4OWFiY2RlZg==',
+    'Sec-WebSocket-Protocol': 'foxglove.websocket.v1',
+}
+
+
+def run(coroutine):
+    return asyncio.run(asyncio.wait_for(coroutine, LIMIT))
+
+
+@pytest.fixture
+def page(drive, free_port):
+    """Return the page about a recording that is played fast."""
+    feed = Recorded(drive, rate=5.0)
+    model = Model(feed)
+    web = Web(model, feed.title, lambda: 'marked', '127.0.0.1', free_port)
+    web.start()
+    model.start()
+    feed.start(model.take, model.fail)
+    yield web
+    feed.stop()
+    model.stop()
+    web.stop()
+
+
+async def told(address, count):
+    async with aiohttp.ClientSession() as session, session.ws_connect(f'{address}stream') as stream:
+        return [json.loads((await stream.receive()).data) for _ in range(count)]
+
+
+def test_the_stream_tells_the_whole_and_then_each_interval(page):
+    first, *others = run(told(page.address, 60))
+    assert [panel['title'] for panel in first['panels']][:2] == ['displacement', 'damping']
+    numbers = [interval[0] for told_one in others for interval in told_one['intervals']]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert any('displacement' in interval[2] for one in others for interval in one['intervals'])
+
+
+@pytest.mark.slow
+def test_a_viewer_that_does_not_read_holds_up_nobody(page):
+    async def both():
+        async with aiohttp.ClientSession() as session, session.ws_connect(f'{page.address}stream'):
+            return await told(page.address, 200)
+
+    assert len(run(both())) == 200
+
+
+def test_the_page_loads_nothing_from_elsewhere(page):
+    async def texts():
+        async with aiohttp.ClientSession() as session:
+            for name in ('', 'view.js', 'view.css'):
+                async with session.get(page.address + name) as answer:
+                    assert answer.status == 200
+                    yield await answer.text(), answer.headers['Content-Security-Policy']
+
+    async def check():
+        async for text, policy in texts():
+            assert '://' not in text.replace('${scheme}://', '')
+            assert "default-src 'self'" in policy
+
+    run(check())
+
+
+def test_a_mark_is_handed_on(page):
+    async def answer(headers):
+        async with (
+            aiohttp.ClientSession() as session,
+            session.post(f'{page.address}mark', headers=headers) as got,
+        ):
+            return got.status, await got.text()
+
+    assert run(answer({})) == (200, '{"answer": "marked"}')
+    assert run(answer({'Origin': 'http://elsewhere'}))[0] == 403
+
+
+def test_a_page_on_loopback_has_no_other_name(page):
+    async def status(host):
+        async with (
+            aiohttp.ClientSession() as session,
+            session.get(f'{page.address}view.js', headers={'Host': host}) as got,
+        ):
+            return got.status
+
+    assert [run(status(host)) for host in ('localhost:8137', '[::1]:8137', '127.0.0.1')] == [200] * 3
+    assert [run(status(host)) for host in ('elsewhere.example:8137', '127.0.0.1.elsewhere.example')] == [
+        403
+    ] * 2
+
+
+def test_a_model_that_fails_says_so_and_ends_the_view(drive):
+    ended = threading.Event()
+    model = Model(Recorded(drive), beside=False, on_failure=ended.set)
+    model.interval = lambda messages: 1 / 0
+    model.start()
+    assert ended.wait(LIMIT)
+    assert model.failure == 'the view has ended: ZeroDivisionError: division by zero'
+    model.stop()
+
+
+def test_a_recording_that_cannot_be_played_on_ends_the_view_and_says_why(drive, free_port, monkeypatch):
+    monkeypatch.setattr(Recorded, '_message', lambda feed, number: 1 / 0)
+    order = ViewOrder(drive, port=free_port, foxglove_port=0, beside=False)
+    ctrl_c = threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT))  # ends a view that does not end
+    ctrl_c.start()
+    try:
+        with pytest.raises(FeedError, match=r'has ended: .* was not played to its end: ZeroDivisionError'):
+            serve_view(order, lambda line: None)
+    finally:
+        ctrl_c.cancel()
+
+
+@pytest.mark.parametrize('kind', ['page', 'Foxglove server'])
+def test_others_need_the_token(drive, free_port, kind):
+    feed = Recorded(drive)
+    if kind == 'page':
+        server = Web(Model(feed, beside=False), feed.title, feed.mark, '0.0.0.0', free_port)
+        server.start()
+    else:
+        server = FoxgloveServer(feed.topics, '0.0.0.0', free_port)
+    try:
+        for query in ('', '?token=guess', '?token=gue%C3%9F'):
+            assert status_of(free_port, query) == 403
+        own = '?' + server.address.split('?')[1]
+        assert status_of(free_port, own, upgrade=kind != 'page') == (200 if kind == 'page' else 101)
+    finally:
+        server.stop()
+
+
+def status_of(port, query='', *, upgrade=False, **headers):
+    """Return the status of the answer to a request for `/`."""
+
+    async def status():
+        address = f'http://127.0.0.1:{port}/{query}'
+        wanted = UPGRADE | headers if upgrade else headers
+        async with aiohttp.ClientSession() as session, session.get(address, headers=wanted) as answer:
+            return answer.status
+
+    return run(status())
+
+
+@pytest.mark.parametrize(
+    ('headers', 'status'),
+    [
+        ({}, 101),
+        ({'Origin': 'https://app.foxglove.dev'}, 101),
+        ({'Origin': 'file://'}, 101),
+        ({'Origin': 'https://elsewhere.example'}, 403),
+        ({'Host': 'elsewhere.example:8765'}, 403),
+        ({'Host': 'elsewhere.example:8765', 'Origin': 'https://app.foxglove.dev'}, 403),
+    ],
+)
+def test_no_foreign_page_connects_to_the_foxglove_server(drive, free_port, headers, status):
+    server = FoxgloveServer(Recorded(drive).topics, '127.0.0.1', free_port)
+    try:
+        assert status_of(free_port, upgrade=True, **headers) == status
+    finally:
+        server.stop()
+
+
+def test_a_port_that_is_taken_is_named(page, drive):
+    feed = Recorded(drive)
+    other = Web(
+        Model(feed, beside=False), feed.title, feed.mark, '127.0.0.1', int(page.address[:-1].split(':')[-1])
+    )
+    with pytest.raises(FeedError, match='choose another --port'):
+        other.start()
+
+
+async def channels_of(client, count):
+    """Return {topic: channel} as soon as the server has told of `count`."""
+    channels = {}
+    while len(channels) < count:
+        message = await client.receive()
+        content = json.loads(message.data) if message.type == aiohttp.WSMsgType.TEXT else {}
+        channels |= {channel['topic']: channel for channel in content.get('channels', ())}
+    return channels
+
+
+async def messages_on(client, count):
+    """Return the payloads of `count` messages of the first subscription."""
+    found = []
+    while len(found) < count:
+        message = await client.receive()
+        if message.type == aiohttp.WSMsgType.BINARY and message.data[0] == 1:
+            assert struct.unpack_from('<I', message.data, 1)[0] == 1
+            found.append(message.data[13:])
+    return found
+
+
+def test_foxglove_gets_channels_with_definitions_and_the_very_messages(drive, free_port):
+    feed = Recorded(drive, rate=5.0)
+    server = FoxgloveServer(feed.topics, '127.0.0.1', free_port)
+
+    async def first_displacements():
+        options = {'protocols': ['foxglove.sdk.v1'], 'max_msg_size': 0}
+        async with aiohttp.ClientSession() as http, http.ws_connect(server.address, **options) as client:
+            wanted = (await channels_of(client, len(feed.topics)))['/displacement']
+            assert (wanted['encoding'], wanted['schemaEncoding']) == ('cdr', 'ros2msg')
+            assert 'MSG: std_msgs/Header' in wanted['schema']
+            subscription = {'id': 1, 'channelId': wanted['id']}
+            await client.send_json({'op': 'subscribe', 'subscriptions': [subscription]})
+            feed.start(server.take, pytest.fail)
+            return await messages_on(client, 500)
+
+    try:
+        found = [deserialize_message(raw, JointState) for raw in run(first_displacements())]
+    finally:
+        feed.stop()
+        server.stop()
+    stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in found]
+    assert (np.diff(stamps) > 0).all()
+    assert all(message.name == ['mount'] for message in found)
+
+
+def test_foxglove_is_sent_nothing_that_it_has_left_and_a_warning_for_what_is_no_request(drive, free_port):
+    feed = Recorded(drive, rate=5.0)
+    server = FoxgloveServer(feed.topics, '127.0.0.1', free_port)
+
+    async def answers():
+        options = {'protocols': ['foxglove.websocket.v1'], 'max_msg_size': 0}
+        async with aiohttp.ClientSession() as http, http.ws_connect(server.address, **options) as client:
+            channel = (await channels_of(client, len(feed.topics)))['/displacement']['id']
+            subscriptions = [{'id': 1, 'channelId': channel}]
+            await client.send_json({'op': 'subscribe', 'subscriptions': subscriptions})
+            await client.send_json({'op': 'unsubscribe', 'subscriptionIds': [1]})
+            for text in ('{', '[]', '{"op": "fetch"}', '{"op": "subscribe"}'):
+                await client.send_str(text)
+            statuses = [json.loads((await client.receive()).data) for _ in range(4)]
+            feed.start(server.take, lambda: None)
+            return statuses, [(await client.receive()).data[0] for _ in range(5)]
+
+    try:
+        statuses, opcodes = run(answers())
+    finally:
+        feed.stop()
+        server.stop()
+    assert {(each['op'], each['level']) for each in statuses} == {('status', 1)}
+    assert set(opcodes) == {2}  # the time alone

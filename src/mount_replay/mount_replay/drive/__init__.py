@@ -1,1 +1,0 @@
-"""One simulated drive: in real time, in lock-step, or without middleware."""
