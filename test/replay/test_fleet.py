@@ -14,7 +14,7 @@ from engine_mount.cli.command import app
 from engine_mount.fleet.example.fleet import make_example
 
 # The stores are those that the tests of engine_mount.signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount.signals' / 'test'))
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
 
 from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_store
 

@@ -26,7 +26,7 @@ from engine_mount.signals.sources.patience import Patience
 from engine_mount.signals.sources.source import StoreAwayError
 
 # The stores are those that the tests of engine_mount.signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount.signals' / 'test'))
+sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
 
 from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
 

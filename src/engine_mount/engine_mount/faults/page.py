@@ -15,7 +15,7 @@ HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recove
 _INTRODUCTION = """# Faults
 
 What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make
-faults` does it for all of them ([engine_mount.cli](../../src/engine_mount/engine_mount/cli/README.md#faults));
+faults` does it for all of them ([the command](../../src/engine_mount/engine_mount/cli/README.md#faults));
 times are those of the machine that did.
 
 Each fault is brought into a graph that damps (`engine-mount drive --scenario bench`: real processes, CAN
