@@ -29,7 +29,7 @@ from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.topics import Topic
 from mount_sim.mount_choice import with_control_of_mount
-from mount_sim.plant.simulated_mount import DivergedError
+from mount_sim.plant.simulated_car import DivergedError
 
 PAPER = {'policy': 'switched_viscous'}
 PERIOD = 0.125  # s, of 8 Hz

@@ -12,10 +12,9 @@ from mount_sim.excitation.array_file import write_excitation
 from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.scenario import STEP_TIME
-from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.plant import PlantSimulation
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_sim.plant.vehicle import Elastomer, Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
 CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}

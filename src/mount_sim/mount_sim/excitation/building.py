@@ -13,7 +13,7 @@ from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import ParameterError, checked
 from mount_sim.excitation.array_file import read_excitation
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
-from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
 from mount_sim.excitation.scenario import SCENARIO_NAMES, STEP_TIME, TipIn
 from mount_sim.parameters import SimParameters
 
@@ -78,7 +78,7 @@ def _motorway(sim: SimParameters) -> Excitation:
         )
     road = checked(RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=sim.seed))
     position = motorway.speed * gap_time
-    gap = checked(Gap(motorway.gap_depth, position, motorway.gap_length, motorway.speed))
+    gap = Gap(motorway.gap_depth, position, motorway.gap_length, motorway.speed)
 
     def height(time: FloatArray) -> FloatArray:
         rough = random_road(time, road) if road.roughness > 0.0 else np.zeros_like(time)
@@ -101,8 +101,7 @@ def _sweep(sim: SimParameters) -> Excitation:
             f'duration ({duration:g} s) is longer than the sweep from {chosen.first_frequency:g} to '
             f'{chosen.last_frequency:g} Hz ({whole:g} s); ask for at most that, or raise sweep.last_frequency'
         )
-    road = Sweep(chosen.velocity_amplitude, chosen.first_frequency, chosen.rate, chosen.ramp_in)
-    return _over_time(sim, Seat.VEHICLE, duration, partial(sweep_road, sweep=checked(road)))
+    return _over_time(sim, Seat.VEHICLE, duration, partial(sweep_road, sweep=chosen))
 
 
 def _over_time(

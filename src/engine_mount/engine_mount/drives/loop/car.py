@@ -14,8 +14,7 @@ from mount_bringup.chosen import Parameters
 from mount_init.initialisation import OFF
 from mount_sim.electronics.electronics import status_every
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount, mount_parameters
 
 
 @dataclass

@@ -21,8 +21,7 @@ from mount_sim.electronics.faults.schedule import check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_car import SimulatedCar
-from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount
 
 BLOCK = 1000
 """Samples, chosen: packed and written together."""
