@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.quantity import checked, quantities
 from mount_sim.plant.vehicle import Elastomer, branch_step, elastomer_force
 
 ELASTOMER = Elastomer()
@@ -46,12 +45,6 @@ def test_steps_follow_the_dynamic_stiffness(frequency):
     assert abs(found - expected) < 2e-5 * abs(expected)
 
 
-def test_stiffness_rises_from_the_static_to_the_sum_of_all_springs():
-    static, slow, fast = dynamic_stiffness(ELASTOMER, [0.0, 1.0, 1e6])
-    assert static == 1.6e5
-    assert static.real < slow.real < fast.real == pytest.approx(2.08e5, rel=1e-6)
-
-
 @given(velocity=st.floats(-1.0, 1.0), dt=st.floats(1e-6, 0.05), parts=st.integers(2, 7))
 @settings(deadline=None, derandomize=True, max_examples=100)
 def test_one_step_equals_several_at_the_same_velocity(velocity, dt, parts):
@@ -60,14 +53,6 @@ def test_one_step_equals_several_at_the_same_velocity(velocity, dt, parts):
     for _ in range(parts):
         forces = branch_step(ELASTOMER, forces, velocity * dt / parts, dt / parts)
     assert forces == pytest.approx(whole, rel=1e-9, abs=1e-12)
-
-
-@given(changes=st.lists(st.floats(-1e-3, 1e-3), min_size=1, max_size=20), dt=st.floats(1e-5, 0.02))
-@settings(deadline=None, derandomize=True, max_examples=60)
-def test_stretching_and_returning_never_yields_energy(changes, dt):
-    work, exchanged, forces = closed_path(ELASTOMER, np.array([*changes, -sum(changes)]), dt)
-    stored = sum(0.5 * force**2 / ELASTOMER.slow_stiffness for force in forces)
-    assert work >= stored - 1e-3 * exchanged
 
 
 @compiled
@@ -90,8 +75,3 @@ def test_forces_decay_when_the_mount_is_held():
     slow, middle, fast = branch_step(ELASTOMER, (10.0, 10.0, 10.0), 0.0, 0.1)
     assert slow == pytest.approx(10.0 * np.exp(-2.0 * np.pi * 0.2), rel=1e-12)
     assert 0.0 < fast < middle < slow
-
-
-def test_every_parameter_has_unit_meaning_and_a_range_that_holds_its_default():
-    assert set(quantities(ELASTOMER)) == set(ELASTOMER._fields)
-    assert checked(ELASTOMER) == ELASTOMER

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mount_driver.quantisation import quantised_current_rate, quantised_flux_rate
-from mount_driver.watches.ripple_law import RippleLaw, gap_of_crossing, ripple_law, warmth
+from mount_driver.watches.ripple_law import RippleLaw, ripple_law, warmth
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_models.coil.gap import gap_from_crossing_current
 from mount_models.coil.heating import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
@@ -71,14 +70,6 @@ def test_the_defaults_are_the_shipped_specimen_s():
     law = ripple_law(default_specimen())
     for name, value in RippleLaw()._asdict().items():
         assert getattr(law, name) == pytest.approx(value, rel=1e-12), name
-
-
-def test_the_gap_of_a_crossing_is_the_specimen_s_within_3_um():
-    law, curves = RippleLaw(), default_specimen().gap_curves
-    for current in np.linspace(law.crossing[0], law.crossing[2], 20):
-        assert gap_of_crossing(law, current) == pytest.approx(
-            gap_from_crossing_current(curves, current), abs=3e-6
-        )
 
 
 def test_an_unknown_temperature_and_a_specimen_without_compensation_change_nothing():
@@ -227,13 +218,6 @@ def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
     assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
 
 
-def test_what_was_carried_to_the_wrong_temperature_is_forgotten(learnt):
-    warm = coil_at(122.0)
-    assert fed(learnt, readings(READY[:100], warm), begin=10_000) is None
-    assert fed(learnt, readings(np.zeros(250), warm), 14.0, 122.0, begin=10_100) is None
-    assert fed(learnt, readings(READY, warm), 14.0, 122.0, begin=10_350) is None
-
-
 def test_a_deviation_that_goes_is_no_fault(learnt):
     missing = MECHANICS._replace(contact_gap=20e-6)
     for begin in range(10_000, 20_000, 1000):
@@ -318,16 +302,3 @@ def test_pads_that_wear_are_found_where_the_engine_is_damped_for_one_period_alon
     assert doubt is not None
     assert len(READY) + 300 <= doubt[0] < len(READY) + 350
     assert doubt[1].startswith('coil inductance by the ripple at ')
-
-
-@pytest.mark.parametrize('volts', [9.0, 12.0, 16.0])
-def test_another_supply_than_in_the_ramp_is_no_deviation(learnt, volts):
-    assert fed(learnt, readings(DAMPING, coil_at(20.0, volts)), volts, begin=len(RAMP)) is None
-    assert abs(learnt.figures.gap_change) < 3e-6
-
-
-@pytest.mark.parametrize('volts', [9.0, 14.0, 16.0])
-def test_the_gap_of_the_ramp_is_the_same_at_any_supply(volts):
-    found = watch()
-    assert fed(found, readings(RAMP, coil_at(20.0, volts)), volts) is None
-    assert found.figures.gap * 1e6 == pytest.approx(341.0, abs=4.0)
