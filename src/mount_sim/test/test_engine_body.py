@@ -22,7 +22,6 @@ from mount_sim.plant.engine_body import (
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
     Elastomer,
-    Engine,
     Vehicle,
     engine_step,
     resting_vehicle,
@@ -98,10 +97,10 @@ def test_accelerated_chassis_moves_several_mounts_as_one():
         np.zeros(1, BODY_STATE),
         np.zeros(2, SUPPORT_STATE),
     )
-    alone, law = np.zeros(1, ENGINE_STATE), Engine(VEHICLE.engine_mass, VEHICLE.elastomer)
+    alone = np.zeros(1, ENGINE_STATE)
     for value in acceleration:
         accelerated_engine_step(engine, supports, body[0], states, value, 0.0, np.zeros(2), DT)
-        motion = engine_step(law, alone[0], value, 0.0, 0.0, DT)
+        motion = engine_step(VEHICLE, alone[0], value, 0.0, 0.0, DT)
     assert abs(motion.displacement) > 1e-5
     assert states[1]['displacement'] == pytest.approx(motion.displacement, rel=1e-9)
     assert states[0]['velocity'] == pytest.approx(motion.velocity, rel=1e-9)

@@ -9,7 +9,6 @@ from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road,
 from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
-    Engine,
     Vehicle,
     engine_step,
     resting_vehicle,
@@ -18,7 +17,6 @@ from mount_sim.plant.vehicle import (
 )
 
 VEHICLE = Vehicle()
-ENGINE = Engine()
 DT = 5e-5
 
 
@@ -92,4 +90,4 @@ def engine_ride(engine, state, vehicle_state, vehicle, road_height, dt):
 
 def test_engine_on_the_vehicles_chassis_acceleration_moves_like_the_vehicles_engine():
     road = sweep_road(np.arange(0.0, 8.0, DT), SweepScenario())
-    assert engine_ride(ENGINE, np.zeros(1, ENGINE_STATE), resting_vehicle(), VEHICLE, road, DT) < 1e-11
+    assert engine_ride(VEHICLE, np.zeros(1, ENGINE_STATE), resting_vehicle(), VEHICLE, road, DT) < 1e-11
