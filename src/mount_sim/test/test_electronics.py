@@ -94,10 +94,3 @@ def test_ripple_noise_is_the_scatter_of_the_inductance(sigma):
     assert np.std(inductance) / np.mean(inductance) == pytest.approx(sigma, rel=0.03)
     for slope in (readings[:, 2], readings[:, 3]):
         assert np.std(slope) / np.mean(slope) == pytest.approx(sigma * math.sqrt(0.5), rel=0.03)
-
-
-def test_noise_belongs_to_its_seed_and_does_not_repeat():
-    np.testing.assert_array_equal(_readings(5000, seed=3), _readings(5000, seed=3))
-    one = _readings(10_000, seed=3)
-    assert not (one == _readings(10_000, seed=4)).all(axis=1).any()
-    assert len(np.unique(one[:, 0])) == 10_000

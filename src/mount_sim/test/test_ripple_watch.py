@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mount_driver.quantisation import quantised_current_rate, quantised_flux_rate
-from mount_driver.watches.ripple_law import RippleLaw, ripple_law, warmth
+from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
 from mount_models.coil.heating import CoilHeating
 from mount_models.specimen import default_specimen
@@ -72,12 +72,6 @@ def test_the_defaults_are_the_shipped_specimen_s():
         assert getattr(law, name) == pytest.approx(value, rel=1e-12), name
 
 
-def test_an_unknown_temperature_and_a_specimen_without_compensation_change_nothing():
-    law = RippleLaw()
-    assert warmth(law, math.nan) == warmth(law._replace(warm_rise=0.0), 80.0) == 1.0
-    assert warmth(law, -40.0) < 0.95 < 1.0 < 1.05 < warmth(law, 80.0)
-
-
 def test_the_ramp_tells_the_gap_at_the_crossing(learnt):
     figures = learnt.figures
     assert figures.gap == pytest.approx(341.2e-6, abs=6e-6)
@@ -139,13 +133,6 @@ def test_slow_wear_is_warned_of_before_it_is_a_fault(learnt):
     assert learnt.figures.gap_change == pytest.approx(-20e-6, abs=4e-6)
 
 
-def test_what_is_about_to_be_a_fault_is_not_warned_of(learnt):
-    gone = MECHANICS._replace(contact_gap=250e-6)
-    for k in range(0, 300, 10):
-        assert fed(learnt, readings(DAMPING[k : k + 10], mechanics=gone), begin=10_000 + k) is None
-        assert learnt.warning == ''
-
-
 @pytest.mark.parametrize('currents', [np.zeros(2000), READY, DAMPING])
 def test_shorted_turns_are_found_by_the_voltage(learnt, currents):
     shorted = readings(currents, COIL._replace(resistance=1.25), actuator=ACTUATOR._replace(turns=240.0))
@@ -179,13 +166,6 @@ def test_a_ripple_that_is_missing_is_found_also_if_a_reading_comes_now_and_then(
     found = watch()
     assert fed(found, readings(RAMP)) is None
     assert fed(found, samples) is not None
-
-
-def test_readings_that_are_missing_now_and_then_are_no_fault(learnt):
-    samples = readings(DAMPING)
-    samples[1][::3] = math.nan
-    samples[1][100:300] = math.nan  # shorter than the duration
-    assert fed(learnt, samples) is None
 
 
 def test_noise_is_told_as_noise(learnt):
