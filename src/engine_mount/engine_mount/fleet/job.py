@@ -143,7 +143,7 @@ class TableJob:
         """Write and return the tables of the recordings `uris`; the others are forgotten."""
         self.answers = {uri: self.answers[uri] for uri in sorted(uris)}
         tables = {}
-        for name, columns in reversed(self._tables.items()):
+        for name, columns in reversed([*self._tables.items()]):
             rows = [row for answer in self.answers.values() for row in answer.rows.get(name, ())]
             rows.sort(key=lambda row: tuple(row[column] for column in self._sorted_by))
             tables[name] = table_of(columns, rows)
