@@ -26,16 +26,14 @@ from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
-from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import injected_faults, texts_of_mount
 from mount_sim.excitation.building import build_excitation
-from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import ALONE, general_name, mount_names, values_of_mount
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
+from mount_sim.plant.simulated_car import DivergedError, SimulatedCar, SimulatedMount, mount_parameters
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""

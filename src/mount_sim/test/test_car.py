@@ -6,7 +6,7 @@ import pytest
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.car_check import growth
+from mount_sim.plant.check import car_growth
 from mount_sim.plant.places import ALONE, PLACES, general_name, mount_names, values_of_mount
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
@@ -124,8 +124,8 @@ def test_what_does_not_fit_together_is_refused(changes, words):
 def test_the_default_car_is_stable_and_the_step_is_the_limit():
     simulated = car()
     memory, seat = simulated._plant.memory, build_excitation(mount_parameters(SHORT)).seat
-    assert growth(memory, seat, 5e-5) <= 1.0 + 1e-6
-    assert growth(memory, seat, 2e-2) > 1.01
+    assert car_growth(memory, seat, 5e-5) <= 1.0 + 1e-6
+    assert car_growth(memory, seat, 2e-2) > 1.01
 
 
 def test_names_of_mounts_and_of_their_parameters():

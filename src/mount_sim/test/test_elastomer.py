@@ -8,7 +8,7 @@ from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import checked, quantities
-from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
+from mount_sim.plant.vehicle import Elastomer, branch_step, elastomer_force
 
 ELASTOMER = Elastomer()
 

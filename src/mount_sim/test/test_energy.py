@@ -10,7 +10,8 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.plant.friction import full_response, full_step
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.vehicle import VEHICLE_STATE, Vehicle, vehicle_step
@@ -62,12 +63,12 @@ def ride_on_fluid(vehicle, hydromount, contact, road, engine_force, states, acco
 
 def motorway(dt):
     times = np.arange(0.0, 4.0, dt)
-    return times, random_road(times, RandomRoad()) + gap_in_road(times, Gap(position=50.0))
+    return times, random_road(times, RandomRoad()) + gap_in_road(times, Gap(0.020, position=50.0))
 
 
 def sweep(dt):
     times = np.arange(0.0, 14.0, dt)
-    return times, sweep_road(times, Sweep())
+    return times, sweep_road(times, SweepScenario())
 
 
 def account_of_ride(mount, road, idle=0.0, dt=DT):

@@ -8,20 +8,20 @@ import pytest
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
 from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road
-from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.engine_body import (
+    BODY_STATE,
+    SUPPORT_STATE,
     RigidEngine,
     Support,
     accelerated_engine_step,
     car_step,
     engine_modes,
     engine_stiffness,
-    resting_body,
-    resting_supports,
     support_records,
 )
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
+    Elastomer,
     Engine,
     Vehicle,
     engine_step,
@@ -56,7 +56,7 @@ def ride(vehicle, quarters, engine, supports, body, states, road, forces, beside
 
 
 def car(road, supports, engine=ENGINE, quarters=2.0, dt=DT, beside=None, forces=None):
-    body, states = resting_body(), resting_supports(len(supports))
+    body, states = np.zeros(1, BODY_STATE), np.zeros(len(supports), SUPPORT_STATE)
     moved = ride(
         record(VEHICLE),
         quarters,
@@ -74,7 +74,7 @@ def car(road, supports, engine=ENGINE, quarters=2.0, dt=DT, beside=None, forces=
 
 def rough_gap(duration=3.0, dt=DT):
     time = np.arange(0.0, duration, dt)
-    return random_road(time, RandomRoad()) + gap_in_road(time, Gap(position=33.0))
+    return random_road(time, RandomRoad()) + gap_in_road(time, Gap(0.020, position=33.0))
 
 
 @pytest.mark.parametrize('count', [1, 2, 4])
@@ -102,8 +102,8 @@ def test_accelerated_chassis_moves_several_mounts_as_one():
     engine = RigidEngine(mass=VEHICLE.engine_mass)
     supports, body, states = (
         support_records([support(0.0, 0.0, half)] * 2),
-        resting_body(),
-        resting_supports(2),
+        np.zeros(1, BODY_STATE),
+        np.zeros(2, SUPPORT_STATE),
     )
     alone, law = np.zeros(1, ENGINE_STATE), Engine(VEHICLE.engine_mass, VEHICLE.elastomer)
     for value in acceleration:
@@ -120,7 +120,7 @@ def step_frequencies(engine, supports):
     moving += ['engine_height', 'engine_velocity']
     records, columns = support_records(supports), []
     for name in moving:
-        body, states = resting_body(), resting_supports(len(supports))
+        body, states = np.zeros(1, BODY_STATE), np.zeros(len(supports), SUPPORT_STATE)
         body[name] = 1e-3
         levers = {'engine_height': (1, 0, 0), 'roll_angle': (0, 1, 0), 'pitch_angle': (0, 0, 1)}.get(name)
         if levers:
@@ -173,7 +173,7 @@ def test_a_motion_without_stiffness_has_no_frequency():
 def energy_and_losses(supports, road, forces):
     """Return (work put in, energy stored, energy lost) at each step, J, as in `energy.py`."""
     vehicle, engine, records = record(VEHICLE)[0], record(ENGINE)[0], support_records(supports)
-    body, states = resting_body(), resting_supports(len(supports))
+    body, states = np.zeros(1, BODY_STATE), np.zeros(len(supports), SUPPORT_STATE)
     works, stored, lost = [0.0], [], [0.0]
     last = None
     for height, force in zip(road, forces, strict=True):

@@ -9,7 +9,6 @@ from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import checked, quantities
-from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.hydromount import (
     HYDROMOUNT_STATE,
     Hydromount,
@@ -18,6 +17,7 @@ from mount_sim.plant.hydromount import (
     hydromount_step,
     upper_pressure,
 )
+from mount_sim.plant.vehicle import Elastomer
 
 HYDROMOUNT = Hydromount()
 SYMMETRIC = HYDROMOUNT._replace(compliance_asymmetry=0.0)

@@ -14,11 +14,10 @@ from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
 from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
-from mount_sim.car_loop import CarLoop, until_ending
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
-from mount_sim.loop import ElectronicsLoop, NoAnswerError
-from mount_sim.plant.simulated_mount import DivergedError
+from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError, until_ending
+from mount_sim.plant.simulated_car import DivergedError
 
 CODEC = MountCodec()
 _channels = itertools.count()
@@ -312,7 +311,8 @@ def _statuses(host, loop, damage):
     for number in range(902):
         damage(number)
         host.send(Setpoint(1.0, number - 1 & 0xFFFF))
-        loop.step_in_real_time()
+        loop.send_sample()
+        loop.go_on()
         while host.receive() is None:
             pass
     return [status.e2e_error for status in host.statuses]
@@ -361,7 +361,8 @@ def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_th
     for number in range(400):
         if number == 300:
             host.send(Setpoint(1.0, number - 1 - late))
-        loop.step_in_real_time()
+        loop.send_sample()
+        loop.go_on()
         setpoints.append(mount.truth['current_setpoint'])
     # The truth at a sample is that of the step before it.
     assert [number for number, current in enumerate(setpoints) if current > 0.0] == list(
@@ -378,7 +379,8 @@ def test_an_answer_of_the_past_changes_nothing_while_a_good_one_holds(ends, make
             host.send(Setpoint(1.0, 29))
         if number == 35:
             host.send(Setpoint(2.0, 5))
-        loop.step_in_real_time()
+        loop.send_sample()
+        loop.go_on()
         setpoints.append(mount.truth['current_setpoint'])
     assert setpoints == [0.0] * 31 + [1.0] * 20 + [0.0] * 9
     assert loop.figures.answered == 1

@@ -5,13 +5,16 @@ import pytest
 from energy import LOSSES, Books, imbalance
 from stiffness import dynamic_stiffness
 
+from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.electronics import Noise
+from mount_sim.excitation.array_file import write_excitation
 from mount_sim.excitation.building import build_excitation
-from mount_sim.plant.elastomer import Elastomer
+from mount_sim.excitation.excitation import Excitation, Seat
+from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.plant import PlantSimulation
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_sim.plant.vehicle import Elastomer, Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
 CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}
@@ -24,10 +27,9 @@ def closed(number):
 
 @pytest.fixture
 def shaken_chassis(tmp_path):
-    times = np.arange(500) / 200.0
-    np.save(tmp_path / 'z_value.npy', 2.0 * np.sin(2 * np.pi * 6.0 * times))
-    np.save(tmp_path / 'z_t.npy', times)
-    return {**CHASSIS, 'recorded__file': str(tmp_path / 'z_value.npy')}
+    values = series_of(2.0 * np.sin(2 * np.pi * 6.0 * STEP_TIME * np.arange(50_000)))
+    shaken = Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, 0.0)
+    return {**CHASSIS, 'recorded__file': str(write_excitation(tmp_path / 'z.npy', shaken))}
 
 
 def harmonics(truth):

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.table import read_csv
 from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import (
     GAPS,
@@ -65,9 +64,10 @@ def test_drawn_racks_differ_and_come_again_by_their_seed():
 
 def test_files_hold_what_was_measured(tmp_path):
     rack = Rack(seed=2)
-    table = read_csv(write_force(rack, tmp_path / 'force.csv'))
-    assert table.header == ('gap_um', 'current_a', 'force_n')
-    assert table.columns(2)[0] == pytest.approx(measure_force(rack)['force_n'], rel=1e-8)
+    table = np.genfromtxt(write_force(rack, tmp_path / 'force.csv'), delimiter=',', names=True, skip_header=1)
+    assert table.dtype.names == ('gap_um', 'current_a', 'force_n')
+    assert table['force_n'] == pytest.approx(measure_force(rack)['force_n'], rel=1e-8)
     files = write_ripple(rack, tmp_path / 'ripple', GAPS[:2], 60.0)
     assert [file.name for file in files] == ['ripple_270um_+60degC.csv', 'ripple_290um_+60degC.csv']
-    assert read_csv(files[0]).columns(1)[0] == pytest.approx(270.0)
+    ripple = np.genfromtxt(files[0], delimiter=',', names=True, skip_header=1)
+    assert ripple['gap_um'] == pytest.approx(270.0)

@@ -10,7 +10,8 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked, quantities
-from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.plant.friction import full_step
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
@@ -45,7 +46,7 @@ def test_stiffer_mount_raises_the_engine_mode():
 @pytest.mark.parametrize(('velocity_amplitude', 'peak_mm'), [(0.04, 1.16), (0.12, 3.47), (0.20, 5.79)])
 def test_undamped_sweep_has_the_known_resonance_peak(velocity_amplitude, peak_mm):
     time = np.arange(0.0, 15.0, DT)
-    displacement, _ = undamped_ride(sweep_road(time, Sweep(velocity_amplitude=velocity_amplitude)))
+    displacement, _ = undamped_ride(sweep_road(time, SweepScenario(velocity_amplitude=velocity_amplitude)))
     peak = int(np.argmax(abs(displacement)))
     assert abs(displacement[peak]) * 1e3 == pytest.approx(peak_mm, rel=2e-3)
     assert 1.0 + time[peak] == pytest.approx(8.4, abs=0.05)
@@ -63,7 +64,9 @@ def test_undamped_gap_has_the_known_peak_give_or_take_the_background_road(depth,
 
 
 def test_half_the_step_gives_the_same_sweep():
-    coarse, fine = (undamped_ride(sweep_road(np.arange(0.0, 9.0, dt), Sweep()), dt)[0] for dt in (DT, DT / 2))
+    coarse, fine = (
+        undamped_ride(sweep_road(np.arange(0.0, 9.0, dt), SweepScenario()), dt)[0] for dt in (DT, DT / 2)
+    )
     assert abs(coarse).max() == pytest.approx(abs(fine).max(), rel=1e-3)
 
 
@@ -173,7 +176,7 @@ def engine_ride(engine, state, vehicle_state, vehicle, road_height, dt):
 
 
 def test_engine_on_the_vehicles_chassis_acceleration_moves_like_the_vehicles_engine():
-    road = sweep_road(np.arange(0.0, 8.0, DT), Sweep())
+    road = sweep_road(np.arange(0.0, 8.0, DT), SweepScenario())
     assert engine_ride(ENGINE, np.zeros(1, ENGINE_STATE), resting_vehicle(), VEHICLE, road, DT) < 1e-11
 
 

@@ -27,7 +27,7 @@ import numpy.typing as npt
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.quantity import Quantity
-from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
+from mount_sim.plant.vehicle import Elastomer, branch_step, elastomer_force
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -69,20 +69,16 @@ class RigidEngine(NamedTuple):
     proportion to its stiffness.
     """
 
-    mass: Annotated[float, Quantity('kg', 'm: engine with gearbox', 10.0, 1e4, 'chosen')] = 160.0
+    mass: Annotated[float, Quantity('kg', 'm: engine with gearbox', 10.0, 1e4)] = 160.0
     roll_inertia: Annotated[
-        float, Quantity('kg m^2', 'I_x: about the longitudinal axis, of a box', 0.1, 1e4, 'chosen')
+        float, Quantity('kg m^2', 'I_x: about the longitudinal axis, of a box', 0.1, 1e4)
     ] = 15.6
-    pitch_inertia: Annotated[
-        float, Quantity('kg m^2', 'I_y: about the crank, of a box', 0.1, 1e4, 'chosen')
-    ] = 8.1
-    force_x: Annotated[
-        float, Quantity('m', 'x_F: where the force of the idling engine acts', -1.0, 1.0, 'chosen')
-    ] = 0.0
-    force_y: Annotated[float, Quantity('m', 'y_F: likewise', -1.0, 1.0, 'chosen')] = 0.0
-    rod_lever: Annotated[
-        float, Quantity('m', 'h: torque rod below the centre of gravity', 0.0, 1.0, 'chosen')
-    ] = 0.25
+    pitch_inertia: Annotated[float, Quantity('kg m^2', 'I_y: about the crank, of a box', 0.1, 1e4)] = 8.1
+    force_x: Annotated[float, Quantity('m', 'x_F: where the force of the idling engine acts', -1.0, 1.0)] = (
+        0.0
+    )
+    force_y: Annotated[float, Quantity('m', 'y_F: likewise', -1.0, 1.0)] = 0.0
+    rod_lever: Annotated[float, Quantity('m', 'h: torque rod below the centre of gravity', 0.0, 1.0)] = 0.25
     rod: Elastomer = Elastomer(3e5, 3e4, 3e4, 3e4)
 
 
@@ -103,16 +99,6 @@ SUPPORT = record_dtype(Support)
 def support_records(supports: Sequence[Support]) -> npt.NDArray[Any]:
     """Return the supports (n,) as records of `SUPPORT` for the steps."""
     return np.concatenate([record_bytes(support).view(SUPPORT) for support in supports])
-
-
-def resting_body() -> npt.NDArray[Any]:
-    """Return the state (1,) of `BODY_STATE` at rest; pass element 0 to the steps."""
-    return np.zeros(1, BODY_STATE)
-
-
-def resting_supports(count: int) -> npt.NDArray[Any]:
-    """Return the states (count,) of `SUPPORT_STATE` at rest."""
-    return np.zeros(count, SUPPORT_STATE)
 
 
 @compiled

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
-from mount_models.quantity import ParameterError, Quantity, check_name
+from mount_models.quantity import ParameterError, Quantity
 from mount_sim.electronics.faults.schedule import texts_of_mount
 from mount_sim.plant.engine_body import RigidEngine, Support, engine_modes
 from mount_sim.plant.vehicle import Vehicle
 
-_X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0, 'chosen')
-_Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0, 'chosen')
+_X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0)
+_Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0)
 _LOWEST_MODE = 0.5  # Hz, chosen: below it the engine is held by nothing
 
 SUPPORTS = {
@@ -111,10 +111,3 @@ def check_hold(engine: RigidEngine, supports: Mapping[str, Support]) -> None:
             'mount (mounts) or a support (places.rear.support elastomer), or the torque rod a lever '
             '(engine.rod_lever)'
         )
-
-
-def check_own_name(name: str, known: Mapping[str, Any]) -> str:
-    """Return the general name of a parameter of mount_sim; raises `ParameterError` for an unknown one."""
-    general = general_name(name)
-    check_name('mount_sim', general, known)
-    return general

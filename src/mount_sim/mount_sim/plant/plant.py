@@ -12,16 +12,23 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked
 from mount_ros.topics import SIM_TRUTH
 from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
-from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.closing import ClosingMechanics, checked_closing, closed_state
-from mount_sim.plant.elastomer import branch_step, elastomer_force
 from mount_sim.plant.friction import full_step
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.mounts import Contents, SeatedMount
 from mount_sim.plant.reluctance import ReluctanceActuator, gap_flux_density
-from mount_sim.plant.ripple import RippleCoil
-from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
+from mount_sim.plant.vehicle import (
+    ENGINE_STATE,
+    VEHICLE_STATE,
+    Engine,
+    Vehicle,
+    branch_step,
+    elastomer_force,
+    engine_step,
+    vehicle_step,
+)
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)

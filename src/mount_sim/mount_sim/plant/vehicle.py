@@ -4,19 +4,22 @@
     m_b z_b'' = F_s - F_c,              F_c = k_c (z_b - z_c) + c_c (z_b' - z_c')
     m_c z_c'' = F_c + F,   m_e z_e'' = F_e - F,   F = elastomer force + friction force at x = z_e - z_c
 
+Elastomer at x: k_e x + f_1 + f_2 + f_3,  f_j' = k_j x' - f_j / tau_j,  tau_j = 1 / (2 pi corner frequency).
+
 z: heights of wheel (u), body (b), local chassis at the mount (c), engine (e) and road (r) from their rest;
 F: mount force on the chassis, positive for x > 0. Semi-implicit Euler; 50 us is short enough for all modes.
 """
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
-from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,6 +31,46 @@ VEHICLE_STATE = record_type(
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
 ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
+
+
+class Elastomer(NamedTuple):
+    """Static stiffness k_e, stiffness k_j and corner frequency of each branch; loss factor 0.06 .. 0.08."""
+
+    static_stiffness: Annotated[float, Quantity('N/m', 'k_e: stiffness at rest', 1e3, 1e7)] = 1.6e5
+    slow_stiffness: Annotated[float, Quantity('N/m', 'k_1 of the slow branch', 0.0, 1e7)] = 1.6e4
+    middle_stiffness: Annotated[float, Quantity('N/m', 'k_2 of the middle branch', 0.0, 1e7)] = 1.6e4
+    fast_stiffness: Annotated[float, Quantity('N/m', 'k_3 of the fast branch', 0.0, 1e7)] = 1.6e4
+    slow_corner: Annotated[float, Quantity('Hz', 'corner frequency of the slow branch', 0.01, 1e3)] = 2.0
+    middle_corner: Annotated[float, Quantity('Hz', 'corner frequency of the middle branch', 0.01, 1e3)] = 10.0
+    fast_corner: Annotated[float, Quantity('Hz', 'corner frequency of the fast branch', 0.01, 1e3)] = 50.0
+
+
+@compiled
+def elastomer_force(elastomer, displacement, branch_forces):
+    """Return the force (N) at `displacement` (m) with `branch_forces` (slow, middle, fast) in N."""
+    slow, middle, fast = branch_forces
+    return elastomer.static_stiffness * displacement + slow + middle + fast
+
+
+@compiled
+def branch_step(elastomer, branch_forces, displacement_change, dt):
+    """Return the branch forces (slow, middle, fast) in N after `dt` seconds with `displacement_change` in m.
+
+    Exact for a constant velocity within the step.
+    """
+    slow, middle, fast = branch_forces
+    return (
+        _maxwell_step(slow, elastomer.slow_stiffness, elastomer.slow_corner, displacement_change, dt),
+        _maxwell_step(middle, elastomer.middle_stiffness, elastomer.middle_corner, displacement_change, dt),
+        _maxwell_step(fast, elastomer.fast_stiffness, elastomer.fast_corner, displacement_change, dt),
+    )
+
+
+@compiled
+def _maxwell_step(force, stiffness, corner, displacement_change, dt):
+    exponent = 2.0 * math.pi * corner * dt
+    lost = -expm1(-exponent)
+    return force * (1.0 - lost) + stiffness * displacement_change * lost / exponent
 
 
 class Vehicle(NamedTuple):

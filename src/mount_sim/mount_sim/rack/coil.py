@@ -14,10 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from mount_models.quantity import with_values
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SAMPLE_TIME
-from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.reluctance import force as magnetic_force
-from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate, incremental_inductance
+from mount_sim.plant.ripple import (
+    RippleCoil,
+    TemperatureCoefficients,
+    coil_at,
+    current_rate,
+    flux_rate,
+    incremental_inductance,
+)
 
 FloatArray = NDArray[np.float64]
 
