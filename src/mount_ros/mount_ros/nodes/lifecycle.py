@@ -21,7 +21,7 @@ from mount_ros.nodes.diagnostics import (
     Verdict,
 )
 from mount_ros.nodes.parameters import ParameterNode
-from mount_ros.nodes.real_time import LoopTiming, RealTime, RealTimeThreads
+from mount_ros.nodes.real_time import RealTime, RealTimeThreads
 from mount_ros.publishers import PublisherWatch
 
 SPIN_PERIOD = 60.0
@@ -110,10 +110,6 @@ class SafeLifecycleNode(ParameterNode):
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
         return Verdict(Level.OK, 'active')
-
-    def loop_timing(self) -> LoopTiming:
-        """Return how a loop with a clock of its own has kept its time since the activation."""
-        return LoopTiming()
 
     # State.
 
