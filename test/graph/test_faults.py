@@ -11,10 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from ros_testing import free_domain
 
 from engine_mount.faults.fault import SAFE, Reaction
 from engine_mount.faults.matrix import MATRIX
-from mount_ros.testing import free_domain
 
 QUICK = (
     'can_silent',

@@ -7,12 +7,12 @@ import threading
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 import mount_ros.data_thread
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread, DataThreadEndedError, DataThreadError
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 
 

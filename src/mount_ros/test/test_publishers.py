@@ -5,13 +5,13 @@ import types
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 import mount_ros.publishers
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class
 from mount_ros.publishers import NAMING_TIME, PublisherConflictError, PublisherWatch, UnnamedPublisher
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
 
 
