@@ -22,7 +22,7 @@ from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import raw_publisher
 from mount_ros.publishers import PublisherWatch
 from mount_ros.qos import control_qos, publisher_qos
-from mount_ros.topics import Delivery, Topic
+from mount_ros.topics import TOPICS, Delivery, Topic
 
 
 class _DataNode(Node):
@@ -207,7 +207,7 @@ class DataPath:
             self._thread.remove(self.node)
         for local in self._sent_directly:
             local.senders -= 1
-        self.publisher_watch.clear()
+        self.publisher_watch.remove(*TOPICS)
         self.node.destroy_node()
 
     def _receiver(

@@ -66,15 +66,11 @@ class PublisherWatch:
         with self._guard:
             return self._watched.setdefault(topic, WatchedTopic(subscription))
 
-    def remove(self, topic: Topic) -> None:
-        """Watch the writers of `topic` no more."""
+    def remove(self, *topics: Topic) -> None:
+        """Watch the writers of `topics` no more."""
         with self._guard:
-            self._watched.pop(topic, None)
-
-    def clear(self) -> None:
-        """Watch nothing any more."""
-        with self._guard:
-            self._watched.clear()
+            for topic in topics:
+                self._watched.pop(topic, None)
 
     def check(self) -> None:
         """Check who publishes each topic: 15 us each."""
@@ -108,9 +104,9 @@ class PublisherWatch:
 
     def _judge(self, topic: Topic, watched: WatchedTopic) -> None:
         now = time.monotonic()
-        watched.since = watched.since if watched.suspected else now
         confirmed, suspected = self._others(topic)
-        if suspected and now - watched.since > LONGEST_DOUBT:
+        watched.since = watched.since if watched.suspected else now
+        if now - watched.since > LONGEST_DOUBT:
             confirmed, suspected = confirmed or suspected, []
         killed = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
         watched.confirmed = _sentence(topic, confirmed, 'end it')
@@ -119,9 +115,7 @@ class PublisherWatch:
     def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
         """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
         names = Counter(
-            _NAMELESS
-            if info.node_name == _NAMELESS
-            else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._node.get_publishers_info_by_topic(topic.name)
             if info.topic_type == topic.type
         )
@@ -130,7 +124,7 @@ class PublisherWatch:
             return [], twice
         space = self._node.get_namespace().rstrip('/')
         others = names.keys() - {f'{space}/{writer}_io' for writer in topic.writers}
-        nameless = others & {_NAMELESS}
+        nameless = {name for name in others if name.endswith(_NAMELESS)}
         return sorted(others - nameless), twice or sorted(nameless)
 
 
@@ -164,6 +158,6 @@ def present_nodes(seen_by: Node) -> list[tuple[str, str]]:
 def _sentence(topic: Topic, names: list[str], remedy: str) -> str:
     if not names:
         return ''
-    who = ' and '.join(name.replace(_NAMELESS, 'a node without a name') for name in names)
+    who = ' and '.join('a node without a name' if _NAMELESS in name else name for name in names)
     own = ' and '.join(topic.writers)
     return f'{who} must not publish {topic.name} too (limit: one writer, {own}): {remedy}'
