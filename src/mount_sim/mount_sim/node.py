@@ -24,7 +24,7 @@ from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
+from mount_ros.nodes.real_time import RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
@@ -136,12 +136,6 @@ class MountSim(SafeLifecycleNode):
         except ParameterError as error:
             response.message = str(error)
         return response
-
-    def loop_timing(self) -> LoopTiming:
-        figures = [loop.figures for loop in self._loops.values()]
-        if not figures:
-            return LoopTiming()
-        return LoopTiming(min(each.samples for each in figures), max(each.overruns for each in figures))
 
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""

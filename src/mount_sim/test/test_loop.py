@@ -10,11 +10,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ros_testing import LIMIT
 
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
 from mount_driver.quantisation import quantised_displacement
-from mount_ros.testing import LIMIT
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError, until_ending
