@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from mount_init.errors import CoilBusyError, DriverRefusalError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.initialisation import OFF, Initialisation
 
 _CHECK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
@@ -78,7 +78,7 @@ class CoilDialogue:
         """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
         with self._lock:
             if self._ramp is not None:
-                self._intruder = CoilBusyError(sentence)
+                self._intruder = InitialisationError(sentence)
                 self._end()
 
     # What the transition does.
@@ -90,7 +90,7 @@ class CoilDialogue:
             self._foreign_arrival = time.monotonic()
 
     def await_quiet(self, duration: float, ending: threading.Event) -> None:
-        """Return when no other node has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
+        """Return when no other node has sent a setpoint for `duration` (s), else raise `InitialisationError`.
 
         A node that has just been deactivated is given the time to fall silent.
         """
@@ -99,7 +99,7 @@ class CoilDialogue:
             if remaining <= 0.0:
                 return
             if last:
-                raise CoilBusyError(
+                raise InitialisationError(
                     f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed '
                     f'are {duration * 1e3:.0f} ms without any; deactivate mount_control first'
                 )
@@ -136,7 +136,7 @@ class CoilDialogue:
                         f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
                     )
                 if reason := objection():
-                    raise DriverRefusalError(reason)
+                    raise InitialisationError(reason)
             if self._intruder is not None:
                 raise self._intruder
         finally:

@@ -1,10 +1,10 @@
 """ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
 
 import math
-import time
+from dataclasses import replace
 
 from mount_init.dialogue import CoilDialogue, DriverReport
-from mount_init.errors import DriverRefusalError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
@@ -15,10 +15,10 @@ from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
-from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.sensors import temperature_of
 from mount_ros.messages.verdicts import Level, flags_of, verdicts_of
-from mount_ros.nodes.diagnostics import WINDOW, Finding, SlidingWindow, Verdict, verdict_on
+from mount_ros.nodes.diagnostics import Finding, Verdict, verdict_on
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
@@ -38,7 +38,7 @@ class MountInit(SafeLifecycleNode):
         super().__init__('mount_init', **arguments)
         declare(self, InitParameters())
         declare(self, SpecimenChoice())
-        self._dialogue: CoilDialogue | None = None
+        self._dialogue = CoilDialogue(self._publish_setpoint)
         self._result: tuple[int, InitialisationResult] | None = None
         self._unsubscribed = False
 
@@ -50,8 +50,6 @@ class MountInit(SafeLifecycleNode):
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
         with compilation_told(self.get_logger().info):
             load_compiled_laws(self._specimen)
-        self._malformed, self._malformed_reason = 0, ''
-        self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()
         self._driver = DriverReport(self._init_parameters.peak_current)
         self._driver_name = f'{self.get_namespace().strip("/")}/mount_driver'.lstrip('/')
@@ -68,7 +66,6 @@ class MountInit(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        assert self._dialogue is not None
         self.real_time.begin(self)  # the ramp is part of the activation
         if self._unsubscribed:
             self._dialogue.forget_streams()
@@ -76,13 +73,13 @@ class MountInit(SafeLifecycleNode):
         self.wait_for_sole_publishers()
         self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
         if reason := self._driver.settled(False, _DRIVER_TIMEOUT, self.ending):
-            raise DriverRefusalError(reason)
+            raise InitialisationError(reason)
         ramp = Initialisation(self._specimen, self._init_parameters, self._temperatures)
         try:
-            result = self._ramp(self._dialogue, ramp)
+            result = self._ramp(ramp)
         except InitialisationError as error:
             if reason := self._driver.settled(True, _DRIVER_TIMEOUT, self.ending):
-                raise DriverRefusalError(reason) from error
+                raise InitialisationError(reason) from error
             raise
         assert ramp.last_stamp is not None
         table = to_message(ramp.last_stamp, result.table)
@@ -99,33 +96,28 @@ class MountInit(SafeLifecycleNode):
 
     def deactivate(self) -> None:
         self._result = None
-        if self._dialogue is not None:
-            self._dialogue.switch_off()
+        self._dialogue.switch_off()
 
     def cleanup(self) -> None:
         self.deactivate()
 
     def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
-        if self._dialogue is not None and (confirmed or suspected):
+        if confirmed or suspected:
             self._dialogue.give_way(confirmed or suspected)
 
     def judge(self) -> Verdict:
         assert self._result is not None
-        lately = self._malformed - self._malformed_before.earlier(time.monotonic(), self._malformed)
-        found, stamp = [], self._result[0]
-        if lately:
-            sentence = f'{lately} messages could not be read (limit: none in {WINDOW:g} s)'
-            found = [Finding(Level.WARN, 'malformed', f'{sentence}; {self._malformed_reason}')]
-        told = verdict(self._result[1], self._specimen, self._init_parameters)
-        figures = {**told.figures, 'messages_malformed': self._malformed, 'last_stamp': stamp}
-        return verdict_on([*told.findings, *found], told.sentence, figures)
+        stamp, result = self._result
+        found = verdict(result, self._specimen, self._init_parameters)
+        figures = {**found.figures, 'messages_malformed': self._path.refused, 'last_stamp': stamp}
+        return replace(found, figures=figures)
 
-    def _ramp(self, dialogue: CoilDialogue, ramp: Initialisation) -> InitialisationResult:
+    def _ramp(self, ramp: Initialisation) -> InitialisationResult:
         parameters = self._init_parameters
         # in lock-step only silence can tell a stalled chain from a slow machine
         total_timeout = math.inf if self.lockstep else parameters.total_timeout
         before = self._driver.late_setpoints or 0
-        dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
+        self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
         if ramp.disturbed:
             self._driver.wait_for_next(_VERDICT_TIMEOUT, self.ending)
             late = self._driver.late_setpoints
@@ -147,13 +139,8 @@ class MountInit(SafeLifecycleNode):
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))
 
     def _on_ripple(self, raw: bytes) -> None:
-        try:
-            stamp, (current, _), (current_rate, flux_rate) = self._ripple.unpack(raw)
-        except ScalarsError as error:
-            self._note_malformed(error)
-            return
-        if self._dialogue is not None:
-            self._dialogue.take_ripple(stamp, current, current_rate, flux_rate)
+        stamp, (current, _), rates = self._ripple.unpack(raw)
+        self._dialogue.take_ripple(stamp, current, *rates)
 
     def _on_temperature(self, raw: bytes) -> None:
         self._temperatures.take(*temperature_of(raw))
@@ -165,17 +152,8 @@ class MountInit(SafeLifecycleNode):
                 self._driver.take(flags.switched_off or flags.held, report.sentence, report.figures)
 
     def _on_setpoint(self, raw: bytes) -> None:
-        try:
-            stamp, (current,), _ = self._setpoint.unpack(raw)
-        except ScalarsError as error:
-            self._note_malformed(error)
-            return
-        if self._dialogue is not None:
-            self._dialogue.take_setpoint(stamp, current)
-
-    def _note_malformed(self, error: ScalarsError) -> None:
-        self._malformed += 1
-        self._malformed_reason = str(error)
+        stamp, (current,), _ = self._setpoint.unpack(raw)
+        self._dialogue.take_setpoint(stamp, current)
 
 
 def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Verdict:
@@ -187,7 +165,7 @@ def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitPa
         'offset_current_A': f'{result.offset_current:.4f}',
         'highest_normal_force_N': f'{result.table[1, -1]:.1f}',
         'coil_temperature_celsius': f'{evidence.temperature.celsius:.1f}',
-        'coil_temperature_from': evidence.temperature.source.value,
+        'coil_temperature_from': evidence.temperature.source,
         'resistance_ohm': f'{supply.whole.ohm:.3f}',
         'resistance_std_ohm': f'{supply.whole.std:.4f}',
         'link_voltage_V': f'{supply.whole.link_voltage:.2f}',

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from mount_init.errors import OutsideCalibrationError
-from mount_init.estimate import TemperatureReadings, TemperatureSource, coil_temperature
+from mount_init.errors import InitialisationError
+from mount_init.estimate import TemperatureReadings, coil_temperature
 from mount_init.node import verdict
 from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen
@@ -57,11 +57,11 @@ def test_at_10_hz_the_readings_of_the_longest_ramp_are_kept():
 
 def test_what_is_measured_comes_before_what_is_given_and_that_before_nothing():
     made = readings((1.0, 30.0))
-    assert coil_temperature(made, SECOND, 50.0) == (30.0, TemperatureSource.MEASURED)
-    assert coil_temperature(made, 0, 50.0) == (50.0, TemperatureSource.PARAMETER)
+    assert coil_temperature(made, SECOND, 50.0) == (30.0, 'measured')
+    assert coil_temperature(made, 0, 50.0) == (50.0, 'parameter')
     unknown = coil_temperature(made, 0, math.nan)
     assert math.isnan(unknown.celsius)
-    assert unknown.source is TemperatureSource.UNKNOWN
+    assert unknown.source == 'unknown'
 
 
 def warm(simulated_actuator, celsius):
@@ -87,7 +87,7 @@ def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
     given = PARAMETERS._replace(coil_temperature_celsius=60.0)
     expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, given)
     assert (measured.rest_gap, measured.contact_gap) == (expected.rest_gap, expected.contact_gap)
-    assert measured.evidence.temperature == (60.0, TemperatureSource.MEASURED)
+    assert measured.evidence.temperature == (60.0, 'measured')
     said = judged(measured, specimen)
     assert said.level == Level.OK
     assert said.figures['coil_temperature_celsius'] == '60.0'
@@ -121,5 +121,5 @@ def test_a_specimen_without_compensation_asks_for_no_temperature(
 def test_a_measured_temperature_beyond_the_compensation_is_refused(
     simulated_actuator, specimen, run_initialisation
 ):
-    with pytest.raises(OutsideCalibrationError, match=r'coil temperature \(150\.0 degC\)'):
+    with pytest.raises(InitialisationError, match=r'coil temperature \(150\.0 degC\)'):
         run_initialisation(simulated_actuator(), specimen, PARAMETERS, readings((0.0, 150.0)))

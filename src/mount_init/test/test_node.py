@@ -519,14 +519,16 @@ def test_parameters_that_contradict_each_other_are_refused_at_configure(graph):
 
 
 def test_malformed_messages_are_counted_and_not_answered(graph):
-    g = graph()
+    g = graph(coil_temperature_celsius=20.0)
     g.configure()
     g.electronics._publisher.publish(ScalarsLayout(topics.DISPLACEMENT).pack(1, (0.0,)))
     g.electronics.send_sample()
     assert g.change(Transition.TRANSITION_ACTIVATE)
-    verdict = g.init.judge()
+    verdict = g.init._present_verdict()
     assert verdict.figures['messages_malformed'] == 1
     assert verdict.level == Level.WARN
-    assert '1 messages could not be read (limit: none in 10 s); coil_ripple: ' in verdict.sentence
+    assert verdict.sentence.startswith(
+        'errors in the data path (1, limit: none), the last: message of coil_ripple'
+    )
     assert 'needed are' in verdict.sentence
     assert verdict.figures['last_stamp'] == g.electronics.results[-1][0]

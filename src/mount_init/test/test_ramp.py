@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_init.errors import SpecimenMismatchError
+from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import current_ramp
 from mount_models.quantity import with_values
@@ -60,10 +60,10 @@ def test_same_parameters_give_the_same_ramp_to_the_bit(ramp):
 
 
 def test_a_rest_current_beyond_the_peak_is_refused():
-    with pytest.raises(SpecimenMismatchError, match=r'3\.500 A.*\(3\.000 A\); check the specimen'):
+    with pytest.raises(InitialisationError, match=r'3\.500 A.*\(3\.000 A\); check the specimen'):
         current_ramp(InitParameters(), 3.5)
 
 
 def test_a_dwell_that_only_settles_is_refused():
-    with pytest.raises(SpecimenMismatchError, match=r'settle_duration \(0\.3 s\) must lie below'):
+    with pytest.raises(InitialisationError, match=r'settle_duration \(0\.3 s\) must lie below'):
         current_ramp(InitParameters(settle_duration=0.3), 0.2)
