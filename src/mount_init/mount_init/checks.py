@@ -186,27 +186,21 @@ def check_rate(duration: int, count: int, parameters: InitParameters) -> None:
 
 
 def check_readings(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
-    """Raise `InitialisationError` unless the whole ramp has good readings."""
-    _check_count(readings, ramp, parameters)
-    _check_signs(readings, parameters)
-    _check_alive(readings, ramp, parameters)
-
-
-def _check_count(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
-    finite = np.isfinite(readings.current)
+    """Raise `InitialisationError` unless the whole ramp has enough readings, of the right sign and alive."""
     for part in ('dwell_before', 'up', 'down', 'dwell_after'):
-        inside = finite[getattr(ramp, part)]
-        needed = math.ceil(parameters.valid_share * inside.size)
-        found = int(inside.sum())
+        inside = np.isfinite(readings.current[getattr(ramp, part)])
+        needed, found = math.ceil(parameters.valid_share * inside.size), int(inside.sum())
         if found < needed:
             raise InitialisationError(
                 f'air gap not estimated: {found} of {inside.size} ripple samples valid in the part '
                 f'"{part.replace("_", " ")}", needed are {needed}; check the coil ripple measurement'
             )
-
-
-def _check_signs(readings: Readings, parameters: InitParameters) -> None:
-    for name, unit, rate in _kinds(readings)[1:]:
+    kinds = (
+        ('slope of the coil current', 'A/s', readings.current_rate),
+        ('slope of the flux density', 'T/s', readings.flux_rate),
+        ('coil current', 'A', readings.current),
+    )
+    for name, unit, rate in kinds[:2]:
         rate = rate[np.isfinite(rate)]
         wrong = rate[rate <= 0.0]
         if wrong.size > parameters.rejected_share * rate.size:
@@ -214,13 +208,10 @@ def _check_signs(readings: Readings, parameters: InitParameters) -> None:
                 f'{name} after switching to plus must be positive; {wrong.size} of {rate.size} samples are '
                 f'not, such as {wrong[0]:g} {unit}: check the polarity of the coil and of its sensors'
             )
-
-
-def _check_alive(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
     longest = max(2, round(parameters.stuck_duration * parameters.sample_rate))
-    for name, unit, values in _kinds(readings):
-        for part in (ramp.up, ramp.down):
-            length, value = _longest_constant_run(values[part])
+    for name, unit, values in kinds:
+        for side in (ramp.up, ramp.down):
+            length, value = _longest_constant_run(values[side])
             if length > longest:
                 raise InitialisationError(
                     f'{name} stayed at {value:g} {unit} for {length} samples while the current was ramped, '
@@ -237,11 +228,3 @@ def _longest_constant_run(values: FloatArray) -> tuple[int, float]:
     lengths = np.diff(np.append(starts, values.size))
     longest = int(np.argmax(lengths))
     return int(lengths[longest]), float(values[starts[longest]])
-
-
-def _kinds(readings: Readings) -> tuple[tuple[str, str, FloatArray], ...]:
-    return (
-        ('coil current', 'A', readings.current),
-        ('slope of the coil current', 'A/s', readings.current_rate),
-        ('slope of the flux density', 'T/s', readings.flux_rate),
-    )

@@ -1,6 +1,7 @@
 """ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 from mount_init.dialogue import CoilDialogue, DriverReport
@@ -12,7 +13,6 @@ from mount_models.arithmetic.compiled import compilation_told
 from mount_models.specimen import Specimen, chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
-from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout
@@ -41,6 +41,11 @@ class MountInit(SafeLifecycleNode):
         self._dialogue = CoilDialogue(self._publish_setpoint)
         self._result: tuple[int, InitialisationResult] | None = None
         self._unsubscribed = False
+        self._streams = {
+            topics.COIL_RIPPLE: self._on_ripple,
+            topics.CURRENT_SETPOINT: self._on_setpoint,
+            topics.DIAGNOSTICS: self._on_verdicts,
+        }
 
     def configure(self) -> None:
         self._init_parameters = read(self, InitParameters())
@@ -57,19 +62,19 @@ class MountInit(SafeLifecycleNode):
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._path = path = self.open_data_path()
-        self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
-        self._send_air_gap = path.sender(topics.AIR_GAP)
-        self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
+        self._send_setpoint, self._send_air_gap, self._send_table = map(
+            path.sender, (topics.CURRENT_SETPOINT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
+        )
         self._dialogue = CoilDialogue(self._publish_setpoint)
         path.subscribe(topics.COIL_TEMPERATURE, self._on_temperature)
-        self._subscribe_streams(path)
+        self._subscribe_streams()
         path.start()
 
     def activate(self) -> None:
         self.real_time.begin(self)  # the ramp is part of the activation
         if self._unsubscribed:
             self._dialogue.forget_streams()
-            self._subscribe_streams(self._path)
+            self._subscribe_streams()
         self.wait_for_sole_publishers()
         self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
         if reason := self._driver.settled(False, _DRIVER_TIMEOUT, self.ending):
@@ -89,7 +94,7 @@ class MountInit(SafeLifecycleNode):
         self.get_logger().info(_summary(result))
         if not self.lockstep:  # there the sample that waits for the next ramp must not be missed
             # No sample is answered any more: without subscriptions there is less to do.
-            for topic in (topics.COIL_RIPPLE, topics.CURRENT_SETPOINT, topics.DIAGNOSTICS):
+            for topic in self._streams:
                 self._path.unsubscribe(topic)
             self._unsubscribed = True
         self._result = (ramp.last_stamp, result)
@@ -129,10 +134,9 @@ class MountInit(SafeLifecycleNode):
         self._path.publisher_watch.check()  # the diagnostics pause meanwhile
         return self._driver.refusal
 
-    def _subscribe_streams(self, path: DataPath) -> None:
-        path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
-        path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
-        path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
+    def _subscribe_streams(self) -> None:
+        for topic, receive in self._streams.items():
+            self._path.subscribe(topic, receive)
         self._unsubscribed = False
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
@@ -176,9 +180,8 @@ def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitPa
         'samples_used': evidence.samples,
         'samples_invalid': evidence.skipped,
     }
-    warning = _warning(result, specimen, parameters)
-    found = [Finding(Level.WARN, 'result', warning)] if warning else []
-    return verdict_on(found, _summary(result), figures)
+    found = [Finding(Level.WARN, 'result', each) for each in _warnings(result, specimen, parameters)]
+    return verdict_on(found[:1], _summary(result), figures)
 
 
 def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
@@ -187,10 +190,11 @@ def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
     return float(pressed_gap - specimen.force_law.gap_low)
 
 
-def _warning(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> str:
-    reserve = wear_reserve(result, specimen)
+def _warnings(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Iterator[str]:
+    """Yield what a result that holds is warned of, gravest first."""
+    evidence, reserve = result.evidence, wear_reserve(result, specimen)
     if reserve < _WEAR_RESERVE:
-        return (
+        yield (
             f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
             f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
         )
@@ -199,23 +203,22 @@ def _warning(result: InitialisationResult, specimen: Specimen, parameters: InitP
         ('contact gap', result.contact_gap_std, parameters.largest_contact_gap_std),
     ):
         if std > _OF_LIMIT * largest:
-            return (
+            yield (
                 f'standard deviation of the {name} ({std * 1e6:.2f} um) is more than half of its limit '
                 f'{largest * 1e6:.2f} um; check the ripple sensors'
             )
-    skipped, total = result.evidence.skipped, result.evidence.samples + result.evidence.skipped
-    if skipped > _SKIPPED_SHARE * total:
-        return (
-            f'{skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; check the '
-            'coil ripple measurement'
+    total = evidence.samples + evidence.skipped
+    if evidence.skipped > _SKIPPED_SHARE * total:
+        yield (
+            f'{evidence.skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; '
+            'check the coil ripple measurement'
         )
-    if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
-        return (
+    if specimen.temperature is not None and math.isnan(evidence.temperature.celsius):
+        yield (
             f'{_summary(result)}; not compensated for the coil temperature, which is unknown: right at '
             f'{specimen.temperature.calibration_celsius:.0f} degC only; do the electronics report it '
             '(topic coil_temperature)? Else set coil_temperature_celsius'
         )
-    return ''
 
 
 def _summary(result: InitialisationResult) -> str:
