@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 from ros_testing import free_domain
 
-from engine_mount.faults.fault import SAFE, Reaction
-from engine_mount.faults.matrix import MATRIX
+from engine_mount.faults.case import MATRIX, SAFE, Reaction
 
 QUICK = (
     'can_silent',

@@ -8,8 +8,8 @@ import pytest
 from ros_testing import free_domain
 
 from engine_mount.faults import session
+from engine_mount.faults.case import MATRIX
 from engine_mount.faults.graph import Place
-from engine_mount.faults.matrix import MATRIX
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
