@@ -41,11 +41,6 @@ class MountInit(SafeLifecycleNode):
         self._dialogue = CoilDialogue(self._publish_setpoint)
         self._result: tuple[int, InitialisationResult] | None = None
         self._unsubscribed = False
-        self._streams = {
-            topics.COIL_RIPPLE: self._on_ripple,
-            topics.CURRENT_SETPOINT: self._on_setpoint,
-            topics.DIAGNOSTICS: self._on_verdicts,
-        }
 
     def configure(self) -> None:
         self._init_parameters = read(self, InitParameters())
@@ -62,9 +57,9 @@ class MountInit(SafeLifecycleNode):
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._path = path = self.open_data_path()
-        self._send_setpoint, self._send_air_gap, self._send_table = map(
-            path.sender, (topics.CURRENT_SETPOINT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
-        )
+        self._send_setpoint = path.sender(topics.CURRENT_SETPOINT)
+        self._send_air_gap = path.sender(topics.AIR_GAP)
+        self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
         self._dialogue = CoilDialogue(self._publish_setpoint)
         path.subscribe(topics.COIL_TEMPERATURE, self._on_temperature)
         self._subscribe_streams()
@@ -94,7 +89,7 @@ class MountInit(SafeLifecycleNode):
         self.get_logger().info(_summary(result))
         if not self.lockstep:  # there the sample that waits for the next ramp must not be missed
             # No sample is answered any more: without subscriptions there is less to do.
-            for topic in self._streams:
+            for topic in (topics.COIL_RIPPLE, topics.CURRENT_SETPOINT, topics.DIAGNOSTICS):
                 self._path.unsubscribe(topic)
             self._unsubscribed = True
         self._result = (ramp.last_stamp, result)
@@ -135,8 +130,9 @@ class MountInit(SafeLifecycleNode):
         return self._driver.refusal
 
     def _subscribe_streams(self) -> None:
-        for topic, receive in self._streams.items():
-            self._path.subscribe(topic, receive)
+        self._path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
+        self._path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        self._path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
         self._unsubscribed = False
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:

@@ -39,20 +39,10 @@ def test_a_reading_that_is_too_old_does_not_count():
     assert math.isnan(at(readings((1.0, 30.0)), 6.001))
 
 
-def test_nan_is_no_reading():
-    assert at(readings((1.0, 30.0), (1.1, math.nan)), 1.2) == 30.0
-
-
 def test_readings_from_before_the_time_started_anew_are_gone():
     """A new stream may come to the stamps of the old one before it has a reading of its own there."""
     assert math.isnan(at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 7.5))
     assert at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 9.0) == 20.0
-
-
-def test_at_10_hz_the_readings_of_the_longest_ramp_are_kept():
-    longest = 2 * (1.0 + 5.0 + 10.0) + 1.0 + 1.0  # s, of all durations
-    made = readings(*((0.1 * k, 20.0 + 0.1 * k) for k in range(round(10 * longest))))
-    assert at(made, 0.5 * longest) == pytest.approx(20.0 + 0.5 * longest)
 
 
 def test_what_is_measured_comes_before_what_is_given_and_that_before_nothing():

@@ -75,15 +75,6 @@ def test_every_sample_of_the_ramp_is_answered_once_with_its_own_stamp(bench):
     assert bench.ramp.last_stamp == bench.ramp.length * STEP
 
 
-def test_after_the_ramp_nothing_is_answered(bench):
-    bench.start()
-    for number in range(1, bench.ramp.length + 4):
-        bench.sample(number)
-    assert bench.join() is None
-    assert len(bench.setpoints) == bench.ramp.length
-    assert bench.setpoints[-1][1] == 0.0
-
-
 def test_without_a_ramp_nothing_is_answered(bench):
     for number in range(1, 10):
         bench.sample(number)
@@ -169,20 +160,6 @@ def test_silence_ends_the_ramp_with_zero_current(bench):
     assert bench.setpoints[-1] == (37 * STEP, 0.0)
 
 
-def test_silence_from_the_start_publishes_nothing(bench):
-    bench.start(silence=0.05)
-    assert '0 of 275 ripple samples' in str(bench.join())
-    assert bench.setpoints == []
-
-
-def test_repeated_samples_count_as_silence(bench):
-    bench.start(silence=0.1)
-    bench.sample(1)
-    while bench._thread.is_alive():
-        bench.sample(1)
-    assert isinstance(bench.join(), InitialisationError)
-
-
 def test_a_ramp_that_takes_too_long_is_given_up(bench):
     bench.start(total=0.1)
     number = 0
@@ -216,15 +193,6 @@ def test_a_setpoint_of_another_node_ends_the_ramp_with_zero_current(bench):
     assert bench.setpoints[-1] == (99 * STEP, 0.0)
 
 
-def test_a_late_setpoint_for_a_sample_before_the_ramp_disturbs_nothing(bench):
-    bench.start()
-    bench.sample(10)
-    bench.dialogue.take_setpoint(9 * STEP, 0.0)
-    for number in range(11, 10 + bench.ramp.length):
-        bench.sample(number)
-    assert bench.join() is None
-
-
 def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
     stop = threading.Event()
 
@@ -239,12 +207,6 @@ def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
         bench.dialogue.await_quiet(0.1, bench.ending)
     stop.set()
     other.join()
-
-
-def test_another_node_that_has_just_fallen_silent_is_waited_for(bench):
-    bench.dialogue.take_setpoint(5 * STEP, 0.5)
-    bench.dialogue.await_quiet(0.05, bench.ending)
-    bench.dialogue.await_quiet(0.05, bench.ending)
 
 
 def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample_is_answered(bench):
