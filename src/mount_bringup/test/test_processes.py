@@ -74,7 +74,7 @@ def test_a_process_that_has_made_nothing_yet_is_ended_without_a_complaint(held):
 def ended(processes_, **how):
     """End processes and return the complaints."""
     owner = processes.NodeProcesses()
-    owner._processes += processes_
+    owner += processes_
     return owner.end(**how)
 
 
@@ -167,4 +167,4 @@ def test_a_process_that_died_before_the_end_is_told_once(tmp_path, monkeypatch):
     dead = [started(monkeypatch, tmp_path, node, 'print("up"); exit(3)') for node in (DRIVER, CONTROL)]
     wait_until(lambda: all(process.exit_code is not None for process in dead), 'their ends')
     dead[1].reported = True
-    assert ended(dead) == ['mount_driver ended with code 3 before it was told to end: up']
+    assert ended(dead) == ['mount_driver ended with code 3 before the end of the graph: up']

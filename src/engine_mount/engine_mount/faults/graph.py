@@ -126,7 +126,7 @@ class GraphUnderTest:
             node.name: each
             for each in processes
             for node in SIMULATED
-            if f'from {node.package}.node' in each.command
+            if f'from {node.name}.node' in each.command
         }
 
     def damping(self) -> bool:

@@ -12,11 +12,20 @@ _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an acti
 
 
 class Activation:
-    """Takes nodes to their active state."""
+    """Takes nodes to their active state; `repeats` is {node: sentences why it was activated again}."""
 
     def __init__(self, graph: Graph):
+        self.repeats: dict[str, list[str]] = {}
         self._graph = graph
-        self._noted: dict[str, tuple[int, int]] = {}  # node -> place in the notes, and how often
+
+    @property
+    def notes(self) -> list[str]:
+        """One sentence for each node that was activated again: the last reason, with a count."""
+        return [
+            f'{reasons[-1]}; it was activated again'
+            + (f', the last of {len(reasons)} times' if len(reasons) > 1 else '')
+            for reasons in self.repeats.values()
+        ]
 
     def activate(
         self, nodes: Sequence[GraphNode], report: Callable[[str], None] = lambda sentence: None
@@ -26,70 +35,62 @@ class Activation:
         A refusal while the machine was late does not count, for a minute. Nor does one while the driver
         requests a new initialisation: the driver is deactivated and activated first.
         """
+        graph = self._graph
         begin, remaining = time.monotonic(), {node: node.activations for node in nodes}
         report(f'activating {", ".join(node.full_name for node in nodes)}')
         for node in nodes:
-            self._graph.reports.observer.on_state(node, 'activating')
+            graph.reports.observer.on_state(node, 'activating')
         while remaining:
             before = {node: self._counts(node) for node in remaining}
-            refused = self._graph.change_states(list(remaining), ACTIVATE)
+            refused = graph.change_states(list(remaining), ACTIVATE)
             for node in remaining.keys() - refused.keys():
-                self._graph.reports.note_active(node)
+                graph.reports.note_active(node)
             if refused:
-                self._graph.serve_for(FRESH_DIAGNOSTICS)
+                graph.serve_for(FRESH_DIAGNOSTICS)
             for node, refusal in refused.items():
-                late = self._was_late(before[node], self._counts(node))
-                remaining[node] -= not (late or self._needs_initialisation(node))
+                driver = self._driver(node)
+                figures = graph.figures(driver)
+                late = _was_late(before[node], self._counts(node))
+                renewed = node != driver and flags_of(figures).needs_initialisation
+                remaining[node] -= not (late or renewed)
                 if not remaining[node] or time.monotonic() - begin > _LATE_PATIENCE:
                     raise GraphError(refusal)
                 if late:
-                    rate = float(self._driver(node)[1].get('sample_rate', SAMPLE_RATE))
-                    refusal = f'{refusal} (this machine was too late for {rate / 1000.0:g} kHz)'
+                    rate = float(figures.get('sample_rate', SAMPLE_RATE)) / 1000.0
+                    refusal = f'{refusal} (this machine was too late for {rate:g} kHz)'
                 self._note(node, refusal)
                 report(f'activating {node.full_name} again: {refusal}')
-                self._renew_driver(node)
+                if renewed:  # before that the driver sends no setpoint
+                    self._note(driver, figures['sentence'])
+                    graph.transition([driver], DEACTIVATE)
+                    graph.reports.forget(driver)  # the report is of the activation before
+                    graph.transition([driver], ACTIVATE)
+                    graph.reports.note_active(driver)
             remaining = {node: remaining[node] for node in refused}
 
-    def _renew_driver(self, node: GraphNode) -> None:
-        """Activate the driver anew where it sends no setpoint before that."""
-        if self._needs_initialisation(node):
-            driver, figures = self._driver(node)
-            self._note(driver, figures.get('sentence', ''))
-            self._graph.transition([driver], DEACTIVATE)
-            self._graph.reports.forget(driver)  # the report is of the activation before
-            self._graph.transition([driver], ACTIVATE)
-            self._graph.reports.note_active(driver)
-
-    def _needs_initialisation(self, node: GraphNode) -> bool:
-        return not node.is_a(DRIVER) and flags_of(self._driver(node)[1]).needs_initialisation
-
     def _note(self, node: GraphNode, reason: str) -> None:
-        """Note why a node was activated again: one note for each node, of the last time, with a count."""
-        place, count = self._noted.get(node.full_name, (len(self._graph.notes), 0))
-        self._noted[node.full_name] = place, count + 1
-        times = f', the last of {count + 1} times' if count else ''
-        self._graph.notes[place : place + 1] = [f'{reason}; it was activated again{times}']
+        self.repeats.setdefault(node.full_name, []).append(reason)
+
+    def _driver(self, node: GraphNode) -> GraphNode:
+        """Return the driver of the mount of a node."""
+        drivers = (other for other in self._graph.nodes if other.is_a(DRIVER) and other.mount == node.mount)
+        return next(drivers, DRIVER)
 
     def _counts(self, node: GraphNode) -> tuple[int, int, int]:
-        """Return setpoints that were late, samples, and samples that were late, as counted so far."""
-        driver, sim = self._driver(node)[1], self._graph.figures(SIM)
+        """Return setpoints that were late, samples that were late, and all samples, as counted so far."""
+        driver, sim = self._graph.figures(self._driver(node)), self._graph.figures(SIM)
         return (
             int(driver.get('late_setpoints', 0)),
-            int(sim.get('samples', 0)),
             int(sim.get('overruns', 0)),
+            int(sim.get('samples', 0)),
         )
 
-    def _was_late(self, before: tuple[int, int, int], now: tuple[int, int, int]) -> bool:
-        """Return whether setpoints stopped, or more samples were late than the simulator tolerates."""
-        timeouts, samples, overruns = (count - earlier for count, earlier in zip(now, before, strict=True))
-        if overruns <= 0:
-            return timeouts > 0
-        from mount_sim.diagnosis import LATE_SHARE  # counted by the simulator alone
 
-        return timeouts > 0 or overruns > LATE_SHARE * samples
+def _was_late(before: tuple[int, int, int], now: tuple[int, int, int]) -> bool:
+    """Return whether setpoints stopped, or more samples were late than the simulator tolerates."""
+    timeouts, overruns, samples = (count - earlier for count, earlier in zip(now, before, strict=True))
+    if overruns <= 0:
+        return timeouts > 0
+    from mount_sim.diagnosis import LATE_SHARE  # counted by the simulator alone
 
-    def _driver(self, node: GraphNode) -> tuple[GraphNode, dict[str, str]]:
-        """Return the driver of the mount of a node, and its last report."""
-        drivers = (other for other in self._graph.nodes if other.is_a(DRIVER) and other.mount == node.mount)
-        driver = next(drivers, DRIVER)
-        return driver, self._graph.figures(driver)
+    return timeouts > 0 or overruns > LATE_SHARE * samples

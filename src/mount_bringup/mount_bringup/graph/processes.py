@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import yaml
@@ -37,7 +37,7 @@ class NodeProcess:
         self.log_file = folder / f'{stem}.log'
         self._settings = settings
         parameter_file = folder / f'{stem}.yaml'
-        parameter_file.write_text(parameter_text(nodes, settings))
+        parameter_file.write_text(_parameter_text(nodes, settings))
         self._command = [
             *(sys.executable, '-c', _program(nodes, settings.namespace), '--ros-args'),
             *('--params-file', str(parameter_file), '--log-level', settings.log_level),
@@ -72,6 +72,11 @@ class NodeProcess:
         self._process.wait()
         self._process, self.reported = self._start(), False
         self.begin()
+
+    @property
+    def pid(self) -> int:
+        """The number of the process that runs now."""
+        return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -112,33 +117,22 @@ class NodeProcess:
         return sum(file.stat().st_size for file in files)
 
 
-class NodeProcesses:
+class NodeProcesses(list[NodeProcess]):
     """All processes of a graph, in start order."""
-
-    def __init__(self) -> None:
-        self._processes: list[NodeProcess] = []
 
     def start(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> None:
         """Start the processes of `nodes`; parameter files and logs are in `folder`."""
         for group in groups(nodes, settings.grouping):
-            self._processes.append(NodeProcess(group, settings, folder))
+            self.append(NodeProcess(group, settings, folder))
 
     def begin(self) -> None:
         """Let them make their nodes."""
-        for process in self._processes:
+        for process in self:
             process.begin()
 
-    def ended(self) -> NodeProcess | None:
-        """Return the first process that has ended, which counts as reported from now on."""
-        for process in self._processes:
-            if process.exit_code is not None:
-                process.reported = True
-                return process
-        return None
-
-    def start_again(self, nodes: Sequence[GraphNode]) -> None:
+    def start_again(self, nodes: Collection[GraphNode]) -> None:
         """End what is left of the processes of `nodes`, and start them again."""
-        for process in self._processes:
+        for process in self:
             if {*process.nodes} & {*nodes}:
                 process.start_again()
 
@@ -147,7 +141,7 @@ class NodeProcesses:
 
         One after the other, so that none drives the coil without those that watch it, or `at_once`.
         """
-        processes = self._processes[::-1]
+        processes = self[::-1]
         known = [process for process in processes if process.reported or not process.begun]
         died = [process for process in processes if process.exit_code is not None]
         complaints = []
@@ -160,7 +154,7 @@ class NodeProcesses:
             code = process.wait()
             if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
                 after = f'after {time.monotonic() - begin:.1f} s'
-                when = 'before it was told to end' if process in died else after
+                when = 'before the end of the graph' if process in died else after
                 complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
         return complaints
 
@@ -176,19 +170,19 @@ def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[st
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
     """Return a program of Python; each node has a namespace, which no remapping of ROS could tell apart."""
-    imports = ''.join(f'from {node.package}.node import {node.class_name}; ' for node in dict.fromkeys(nodes))
-    creates = []
+    imports, creates = 'import sys; from functools import partial; ', []
     for node in nodes:
         space = '/' + name_in(namespace.strip('/'), node.mount).rstrip('/')
+        imports += f'from {node.name}.node import {node.class_name}; '
         creates.append(f'partial({node.class_name}, namespace={space!r})')
-    run = 'from functools import partial; from mount_ros.nodes.process import run_nodes; import sys; '
-    return f'{QUIET_START}{imports}{run}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
+    imports += 'from mount_ros.nodes.process import run_nodes; '
+    return f'{QUIET_START}{imports}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
 
 
-def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
     """Return a parameter file of ROS for these nodes, whatever their namespace."""
     tables = {
         f'/**/{node.full_name}': {'ros__parameters': dict(settings.parameters.get(node.full_name, {}))}
         for node in nodes
     }
-    return yaml.safe_dump(tables, sort_keys=True)
+    return yaml.safe_dump(tables)

@@ -1,47 +1,34 @@
-"""The graph with the simulated car, as the arguments of `sim.launch.py` order it."""
+"""Checks of a simulated graph before its simulator starts; a `ValueError` says what cannot be."""
 
-from mount_bringup.graph.launch_arguments import COMMON_ARGUMENTS, PORT, LaunchArgument
-from mount_bringup.graph.nodes import SIM, SIMULATED
-from mount_bringup.graph.order import LaunchOrder, Settings, Texts, launch_order
+from collections.abc import Mapping
+from typing import Any
+
 from mount_models.quantity import with_flattened
-from mount_sim.electronics.faults.schedule import FORM, told_faults
+from mount_sim.electronics.faults.schedule import told_faults
 from mount_sim.excitation.building import build_excitation
 from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import MOUNTS, seated_mount
-from mount_sim.plant.places import mount_names
+from mount_sim.plant.mounts import seated_mount
+from mount_sim.plant.places import mount_names as mount_names
 from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
-SIM_ARGUMENTS = (
-    *COMMON_ARGUMENTS,
-    LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
-    LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
-    LaunchArgument(
-        'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)
-    ),
-    LaunchArgument('port', PORT, ('mount_driver.port', 'mount_sim.port')),
-    LaunchArgument('fault', f'faults as {FORM}, with commas between them', ('mount_sim.faults',)),
-)
-"""The arguments of the graph with the simulated car."""
+Settings = Mapping[str, Mapping[str, Any]]
 
 
-def sim_order(given: Texts) -> LaunchOrder:
-    """Return the graph with the simulated car; a `ValueError` says what cannot be."""
-    mount_names(given['mounts'])
-    order = launch_order(SIMULATED, SIM_ARGUMENTS, given, '', _checked_mount)
-    values = order.settings.parameters[SIM.name]
-    sim = mount_parameters(values)
-    if values.get('mounts'):
-        SimulatedCar(values, build_excitation(sim))
-    return order._replace(scenario=sim.scenario)
-
-
-def _checked_mount(settings: Settings) -> Settings:
-    """Return the settings as the mount in the seat needs them; refuse what the simulator cannot work with."""
-    settings = with_control_of_mount(settings)
-    check_control_of_mount(settings)
-    sim = with_flattened(SimParameters(), settings[SIM.name])
+def with_checked_mount(settings: Settings) -> dict[str, dict[str, Any]]:
+    """Return the settings of a mount, with those that the mount in the seat needs."""
+    completed = with_control_of_mount(settings)
+    check_control_of_mount(completed)
+    sim = with_flattened(SimParameters(), completed['mount_sim'])
     seated_mount(sim.mount)
     told_faults(sim.faults)
     build_excitation(sim)
-    return settings
+    return completed
+
+
+def checked_scenario(values: Mapping[str, Any]) -> str:
+    """Return the scenario of the simulator's parameters; several mounts must hold an engine."""
+    sim = mount_parameters(values)
+    if values.get('mounts'):
+        SimulatedCar(values, build_excitation(sim))
+    return sim.scenario
