@@ -255,8 +255,8 @@ def test_topics_that_are_waited_for_are_those_of_the_mount():
     graph = Graph(nodes, GraphSettings(namespace='/car'))
     unmatched = '/car/left/current_setpoint, /car/right/displacement, /car/left/event'
     graph.figures = lambda node: {'unmatched': unmatched}
-    assert graph.missing_topics(left) == ['current_setpoint']
-    assert graph.missing_topics(right) == ['displacement']
-    assert graph.missing_topics(recorder) == ['left/current_setpoint', 'right/displacement']
+    assert graph.missing_topics(left) == ['/car/left/current_setpoint']
+    assert graph.missing_topics(right) == ['/car/right/displacement']
+    assert graph.missing_topics(recorder) == ['/car/left/current_setpoint', '/car/right/displacement']
     graph.figures = lambda node: {}
     assert graph.missing_topics(left) == ['its first diagnostics']

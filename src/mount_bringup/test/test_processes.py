@@ -71,11 +71,9 @@ def test_a_process_that_has_made_nothing_yet_is_ended_without_a_complaint(held):
     assert held.exit_code is not None
 
 
-def ended(processes_, **how):
+def ended(processes_, *, at_once=False):
     """End processes and return the complaints."""
-    owner = processes.NodeProcesses()
-    owner += processes_
-    return owner.end(**how)
+    return processes.end_processes(processes_, at_once=at_once)
 
 
 def test_a_process_that_still_loads_is_ended_quietly_and_without_a_complaint(tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import re
 import time
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -108,8 +109,9 @@ class Graph:
     def forget(self, node):
         pass
 
-    def start_again(self, nodes):
-        self.done += [f'start {node.full_name}' for node in nodes]
+    def process(self, node):
+        start = partial(self.done.append, f'start {node.full_name}')
+        return SimpleNamespace(nodes=(node,), start_again=start)
 
     def client(self, kind, service):
         answer = GetState.Response(current_state=State(id=State.PRIMARY_STATE_UNCONFIGURED))
@@ -155,7 +157,7 @@ def recovered(graph):
     """Return the function that recovers from failures of nodes: the last action, and what was reported."""
 
     def recover(*nodes, limit=3, times=1, reason='lost'):
-        recovery, reports = Recovery(graph, graph, graph, limit), []
+        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)], graph, limit), []
         recovery.report = reports.append
         for _ in range(times):
             recovery.recover(NodesFailedError(nodes, reason))
@@ -289,7 +291,7 @@ def test_failures_of_long_ago_do_not_count(graph, recovered, monkeypatch):
 
 
 def initialised_again(graph, mount):
-    return Recovery(graph, graph, graph, 3).initialise_again(mount)
+    return Recovery(graph, [], graph, 3).initialise_again(mount)
 
 
 @pytest.mark.parametrize('resting', [(), (CONTROL.name,)])

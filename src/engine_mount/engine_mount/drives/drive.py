@@ -17,7 +17,7 @@ from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from mount_bringup.chosen import Parameters
-from mount_bringup.graph.domain import can_port, domain_locks
+from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
     CONTROL,
     RECORDER,
@@ -105,7 +105,7 @@ def _drive_graph(
     supervisor.recovery.report = screen.note
     happenings = Happenings(supervisor.nodes, screen.say)
     supervisor.reports.observer = happenings
-    with domain_locks(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
+    with domain_lock(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
         try:
             happenings.begin()
             with screen.line(happenings.states) as show:

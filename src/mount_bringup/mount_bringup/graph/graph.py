@@ -232,13 +232,12 @@ class Graph:
         figures = self.figures(node)
         if 'unmatched' not in figures:
             return ['its first diagnostics']
-        prefix = '/'.join(['', *filter(None, [self.settings.namespace.strip('/'), node.mount]), ''])
-        names = {name.removeprefix(prefix) for name in figures['unmatched'].split(', ')}
-        needed = {*node.needs}
+        needed = {name_in(node.mount, name) for name in node.needs}
         if node.is_a(RECORDER):
             needed = {name_in(other.mount, name) for other in self.nodes for name in other.needs}
             needed |= {name_in(mount, SESSION.name) for mount in self.mounts}
-        return sorted(names & needed)
+        space = f'/{self.settings.namespace}'.replace('//', '/').rstrip('/')
+        return sorted({f'{space}/{name}' for name in needed} & {*figures['unmatched'].split(', ')})
 
     def _waiting(self) -> list[str]:
         """Return in words which nodes wait for which topics."""

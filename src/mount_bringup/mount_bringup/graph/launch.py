@@ -37,7 +37,7 @@ def launch_description(graph: str) -> LaunchDescription:
             argument.name,
             default_value=str(config) if argument.name == 'config' else argument.default,
             description=argument.description,
-            choices=list(argument.choices) or None,
+            choices=argument.choices.split() or None,
         )
         for argument in arguments_of(graph)
     ]

@@ -11,7 +11,6 @@ from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, arguments_of
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
-    INIT,
     RECORDER,
     SIM,
     SIMULATED,
@@ -26,16 +25,14 @@ from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import (
     NODES,
     SettingError,
+    check_ranges,
     check_sample_rate,
     checked_settings,
     defaults_of_nodes,
     settings_of_mount,
 )
 from mount_driver.parameters import DriverParameters
-from mount_init.parameters import InitParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_models.quantity import with_flattened
-from mount_recorder.parameters import RecorderParameters
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 
@@ -140,7 +137,7 @@ def _of_arguments(graph: str, given: Texts, node: GraphNode, known: Settings) ->
     values = {}
     for argument in arguments_of(graph):
         text = given[argument.name]
-        for target in argument.sets if text else ():
+        for target in argument.sets.split() if text else ():
             owner, _, name = target.partition('.')
             if owner == node.name:
                 values[name] = _value(argument.name, text, known[owner][name])
@@ -195,9 +192,7 @@ def _check(settings: Settings, given: Texts, known: Settings) -> None:
             f'damper:={given["damper"]} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
             f'add policy:={POLICY_OF_DAMPER}'
         )
-    sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
-    for node, defaults in sets:
-        with_flattened(defaults, settings.get(node.name, {}))
+    check_ranges(settings)
     check_sample_rate(settings, [name for name in NODES if name in known])
     chosen_control(settings)
 

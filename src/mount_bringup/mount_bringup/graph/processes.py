@@ -6,12 +6,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups, name_in
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, name_in
 from mount_ros.nodes.process import environment_of_children
 
 QUIET_START = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
@@ -25,15 +25,13 @@ _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for 
 class NodeProcess:
     """One process of the graph with the nodes that live in it.
 
-    It loads what it needs at once, and makes its nodes after `begin`.
+    It loads what it needs at once, and makes its nodes after `begin`. `reported`: the user knows of its end.
     """
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
         self.name = ' + '.join(node.full_name for node in nodes)
-        self.reported = False
-        """Whether the user knows of its end."""
-        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
+        stem = self.name.replace('/', '_').replace(' + ', '_')
         self.log_file = folder / f'{stem}.log'
         self._settings = settings
         parameter_file = folder / f'{stem}.yaml'
@@ -45,6 +43,7 @@ class NodeProcess:
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
+        self.begun = self.reported = False
         with contextlib.ExitStack() as files:
             log = None if self._settings.log_to_screen else files.enter_context(self.log_file.open('ab'))
             return subprocess.Popen(
@@ -60,17 +59,13 @@ class NodeProcess:
         """Let it make its nodes."""
         assert self._process.stdin is not None
         self._process.stdin.close()
-
-    @property
-    def begun(self) -> bool:
-        """Whether it makes or has made its nodes."""
-        return self._process.stdin is None or self._process.stdin.closed
+        self.begun = True
 
     def start_again(self) -> None:
         """Kill what is left of the process and start it with the same parameters; its log goes on."""
         self._process.kill()
         self._process.wait()
-        self._process, self.reported = self._start(), False
+        self._process = self._start()
         self.begin()
 
     @property
@@ -117,46 +112,26 @@ class NodeProcess:
         return sum(file.stat().st_size for file in files)
 
 
-class NodeProcesses(list[NodeProcess]):
-    """All processes of a graph, in start order."""
+def end_processes(processes: Sequence[NodeProcess], *, at_once: bool) -> list[str]:
+    """End processes, last started first; return a sentence per unclean end.
 
-    def start(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> None:
-        """Start the processes of `nodes`; parameter files and logs are in `folder`."""
-        for group in groups(nodes, settings.grouping):
-            self.append(NodeProcess(group, settings, folder))
-
-    def begin(self) -> None:
-        """Let them make their nodes."""
-        for process in self:
-            process.begin()
-
-    def start_again(self, nodes: Collection[GraphNode]) -> None:
-        """End what is left of the processes of `nodes`, and start them again."""
-        for process in self:
-            if {*process.nodes} & {*nodes}:
-                process.start_again()
-
-    def end(self, *, at_once: bool = False) -> list[str]:
-        """End all, last started first; return a sentence per unclean end.
-
-        One after the other, so that none drives the coil without those that watch it, or `at_once`.
-        """
-        processes = self[::-1]
-        known = [process for process in processes if process.reported or not process.begun]
-        died = [process for process in processes if process.exit_code is not None]
-        complaints = []
-        for process in processes if at_once else ():
+    One after the other, so that none drives the coil without those that watch it, or `at_once`.
+    """
+    known = [process for process in processes if process.reported or not process.begun]
+    died = [process for process in processes if process.exit_code is not None]
+    complaints = []
+    for process in processes[::-1] if at_once else ():
+        process.interrupt()
+    for process in processes[::-1]:
+        if not at_once:
             process.interrupt()
-        for process in processes:
-            if not at_once:
-                process.interrupt()
-            begin = time.monotonic()
-            code = process.wait()
-            if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
-                after = f'after {time.monotonic() - begin:.1f} s'
-                when = 'before the end of the graph' if process in died else after
-                complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
-        return complaints
+        begin = time.monotonic()
+        code = process.wait()
+        if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
+            after = f'after {time.monotonic() - begin:.1f} s'
+            when = 'before the end of the graph' if process in died else after
+            complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
+    return complaints
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:

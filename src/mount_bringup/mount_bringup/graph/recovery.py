@@ -1,7 +1,7 @@
 """What follows the failure of nodes, how often, and its steps; only in real time."""
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.graph import ANSWER_LIMIT, CONFIGURE, Graph
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, Figures, GraphError, GraphNode
-from mount_bringup.graph.processes import NodeProcesses
+from mount_bringup.graph.processes import NodeProcess
 from mount_models.sampling import sample_time_ns
 from mount_recorder.folders import next_recording
 from mount_ros.messages.verdicts import flags_of
@@ -105,7 +105,7 @@ class Recovery:
     More than `limit` failures of a node within a minute end the graph; 0: the first.
     """
 
-    def __init__(self, graph: Graph, processes: NodeProcesses, activation: Activation, limit: int):
+    def __init__(self, graph: Graph, processes: Sequence[NodeProcess], activation: Activation, limit: int):
         self.restarts: list[Restart] = []
         self.report: Callable[[str], None] = lambda sentence: None
         """Takes the sentence about each failure at once."""
@@ -142,8 +142,7 @@ class Recovery:
         Of the mount of this name, of all if it is empty. Where it raises `GraphError` control is not active.
         """
         graph = self._graph
-        nodes = [node for node in graph.nodes if node.is_a(DRIVER, INIT, CONTROL)]
-        nodes = [node for node in nodes if mount in ('', node.mount)]
+        nodes = self._chain({mount} if mount else ())
         for node in reversed(nodes):  # control first: damping off, 0 A
             graph.deactivate(node)
         graph.wait_for_matches()
@@ -170,44 +169,49 @@ class Recovery:
 
     def _bring_back(self, failed: Collection[GraphNode], active: set[GraphNode]) -> RecoveryAction:
         graph, action = self._graph, self._action(failed)
+        chain = self._chain_of(failed)
+        wanted = {node for node in failed if not node.is_a(INIT)} & active
         for node in failed:
             graph.reports.forget(node)
-        # First: each wait for the others would find them failed once more.
-        self._processes.start_again(failed)
+        for process in self._processes:  # first: each wait for the others would find them failed once more
+            if {*process.nodes} & {*failed}:
+                process.start_again()
         if action is RecoveryAction.INITIALISE:
-            for node in self._of_mounts(failed, CONTROL, INIT, DRIVER):
+            wanted |= {node for node in chain if node in active or not node.is_a(CONTROL)}
+            for node in reversed(chain):
                 if node not in failed:
                     graph.deactivate(node)
-        for node in (node for node in graph.nodes if node in failed):
-            self._wait_for_start(node)
-            self._prepare(node, action)
-            graph.transition([node], CONFIGURE)
+        for node in graph.nodes:
+            if node in failed:
+                self._wait_for_start(node)
+                self._prepare(node, action)
+                graph.transition([node], CONFIGURE)
         graph.wait_for_matches()
         if action is RecoveryAction.DAMP_ON:
-            for driver in self._of_mounts(failed, DRIVER):
-                graph.fresh_figures(driver)
+            for node in chain:
+                if node.is_a(DRIVER):
+                    graph.fresh_figures(node)
             if self._action(failed) is not action:  # a later break is seen by the control itself
                 return self._bring_back(failed, active)
-        wanted = {node for node in failed if not node.is_a(INIT)} & active
-        if action is RecoveryAction.INITIALISE:
-            wanted |= {*self._of_mounts(failed, DRIVER, INIT)}
-            wanted |= {*self._of_mounts(failed, CONTROL)} & active
         for node in graph.nodes:
             if node in wanted:
                 self._activation.activate([node])
         return action
 
     def _action(self, failed: Collection[GraphNode]) -> RecoveryAction:
-        figures = self._graph.figures
-        pairs = zip(self._of_mounts(failed, DRIVER), self._of_mounts(failed, INIT), strict=True)
-        holds = all(table_holds(figures(driver), figures(init)) for driver, init in pairs)
-        return recovery_action(failed, table_holds=holds)
+        chain, figures = self._chain_of(failed), self._graph.figures
+        drivers, inits = ([figures(node) for node in chain if node.is_a(kind)] for kind in (DRIVER, INIT))
+        return recovery_action(failed, table_holds=all(map(table_holds, drivers, inits)))
 
-    def _of_mounts(self, failed: Collection[GraphNode], *kinds: GraphNode) -> list[GraphNode]:
-        """Return the nodes of these kinds in the mounts of a failure; one of the electronics is of all."""
+    def _chain_of(self, failed: Collection[GraphNode]) -> list[GraphNode]:
+        """Return the nodes of the mounts of a failure; one of the electronics is of all."""
         mounts = {node.mount for node in failed if node.is_a(DRIVER, INIT, CONTROL)}
-        of_them = [node for node in self._graph.nodes if node.mount in mounts or not failed]
-        return [node for kind in kinds for node in of_them if node.is_a(kind)]
+        return self._chain(mounts) if mounts or not failed else []
+
+    def _chain(self, mounts: Collection[str]) -> list[GraphNode]:
+        """Return driver, initialisation and control of these mounts, of all if there are none."""
+        chain = [node for node in self._graph.nodes if node.is_a(DRIVER, INIT, CONTROL)]
+        return [node for node in chain if not mounts or node.mount in mounts]
 
     def _wait_for_start(self, node: GraphNode) -> None:
         """Wait until the new node answers: not yet configured."""

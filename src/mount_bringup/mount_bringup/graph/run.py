@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rclpy.logging import get_logger
 
-from mount_bringup.graph.domain import domain_locks
+from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.launch_arguments import GRAPHS, texts_of
 from mount_bringup.graph.nodes import GraphError
 from mount_bringup.graph.order import LaunchOrder, launch_order
@@ -46,7 +46,7 @@ def run(command: Sequence[str]) -> int:
         order = ordered(command)
         mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
         with (
-            domain_locks(order.settings.domain, order.settings.namespace, mounts),
+            domain_lock(order.settings.domain, order.settings.namespace, mounts),
             tempfile.TemporaryDirectory(prefix=f'{SUPERVISOR}_') as folder,
         ):
             return _supervise(order, Path(folder))

@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.graph import CONFIGURE, LONGEST_HANG, Graph
 from mount_bringup.graph.nodes import SIM, GraphError, GraphNode, GraphSettings, ending_order, groups, name_in
-from mount_bringup.graph.processes import NodeProcesses
+from mount_bringup.graph.processes import NodeProcess, end_processes
 from mount_bringup.graph.recovery import NodesFailedError, Recovery
 from mount_bringup.graph.reports import SILENCE_LIMIT
 from mount_bringup.settings import settings_of_mount
@@ -35,7 +35,7 @@ class Supervisor(Graph):
         super().__init__(nodes, settings)
         self._folder = folder
         self._starter = Starter()
-        self.processes = NodeProcesses()
+        self.processes: list[NodeProcess] = []
         self._activation = Activation(self)
         self.recovery = Recovery(self, self.processes, self._activation, settings.restart_limit)
         self._recovers = False
@@ -60,11 +60,14 @@ class Supervisor(Graph):
         report('starting the nodes')
         if inherited := drop_real_time():
             self.notes.append(started_in_real_time(inherited))
-        self.processes.start(self.nodes, self.settings, self._folder)
+        of_processes = groups(self.nodes, self.settings.grouping)
+        for group in of_processes:
+            self.processes.append(NodeProcess(group, self.settings, self._folder))
         self.refuse_other_graph()  # while the processes load
-        self.processes.begin()
+        for process in self.processes:
+            process.begin()
         # Those of one process in their order: its data thread serves those first that came last.
-        for side_by_side in zip_longest(*groups(self.nodes, self.settings.grouping)):
+        for side_by_side in zip_longest(*of_processes):
             self.transition([node for node in side_by_side if node is not None], CONFIGURE)
         parameters = {node.full_name: self.parameters_of(node) for node in self.nodes}
         for mount in self.mounts:
@@ -105,7 +108,7 @@ class Supervisor(Graph):
         self.deadline.set(LONGEST_HANG)
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
         self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
-        complaints = self.processes.end(at_once=all(resting))
+        complaints = end_processes(self.processes, at_once=all(resting))
         self.notes += self._activation.notes
         self.close()
         remove_abandoned()
