@@ -9,7 +9,7 @@ from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
-from mount_models.quantity import ParameterError, check_name, flattened, with_flattened
+from mount_models.quantity import ParameterError, check_name, flattened
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_recorder.parameters import RecorderParameters
@@ -27,13 +27,6 @@ class SettingError(ParameterError):
 def defaults_of_nodes(nodes: Sequence[str] = NODES) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
     return {node: _defaults(node) for node in NODES if node in nodes}
-
-
-def check_ranges(settings: Known) -> None:
-    """Raise the `ParameterError` of the first parameter outside its range; the control checks its own."""
-    for node, values in settings.items():
-        for declared in _declared(node) if node != 'mount_control' else ():
-            with_flattened(declared, values)
 
 
 def _defaults(node: str) -> dict[str, Any]:

@@ -21,7 +21,6 @@ class Refused(Graph):
             **{name: str(count * self.attempts) for name, count in self.each[node.name].items()},
             **rate,
         }
-        self.activation = activation.Activation(self)
 
     def change_states(self, nodes, transition):
         self.attempts += 1
@@ -33,16 +32,16 @@ class Refused(Graph):
 
 def test_a_refusal_in_time_is_repeated_once():
     graph = Refused(1)
-    graph.activation.activate([INIT])
+    activation.activate(graph, [INIT])
     assert graph.attempts == 2
-    assert graph.activation.notes == ['mount_init refused; it was activated again']
+    assert graph.repeats == {INIT.name: ['mount_init refused']}
 
 
 @pytest.mark.parametrize('pace', [{}, {'overruns': 50}])
 def test_a_node_that_refuses_in_time_is_given_up(pace):
     graph = Refused(9, **pace)
     with pytest.raises(GraphError):
-        graph.activation.activate([INIT])
+        activation.activate(graph, [INIT])
     assert graph.attempts == 2
 
 
@@ -52,17 +51,17 @@ def test_a_node_that_refuses_in_time_is_given_up(pace):
 )
 def test_refusals_of_a_machine_that_was_late_do_not_count(pace, rate):
     graph = Refused(9, **pace)
-    graph.activation.activate([INIT])
+    activation.activate(graph, [INIT])
     assert graph.attempts == 10
     late = f'mount_init refused (this machine was too late for {rate})'
-    assert graph.activation.notes == [f'{late}; it was activated again, the last of 9 times']
+    assert graph.repeats == {INIT.name: [late] * 9}
 
 
 def test_a_machine_that_stays_late_is_given_up(monkeypatch):
     monkeypatch.setattr(activation, '_LATE_PATIENCE', 0.0)
     graph = Refused(9, timeouts=1)
     with pytest.raises(GraphError):
-        graph.activation.activate([INIT])
+        activation.activate(graph, [INIT])
     assert graph.attempts == 1
 
 
@@ -86,17 +85,17 @@ class OffUntilInitialised(Refused):
 @pytest.mark.parametrize('resets', [1, 4])
 def test_a_driver_that_is_off_until_initialised_is_activated_anew_before_the_initialisation(resets):
     graph = OffUntilInitialised(resets)
-    graph.activation.activate([INIT])
+    activation.activate(graph, [INIT])
     anew = ['activate mount_init', 'deactivate mount_driver', 'forget mount_driver', 'activate mount_driver']
     assert graph.done == [*anew * resets, 'activate mount_init']
-    assert [note.partition(';')[0] for note in graph.activation.notes] == [
-        'mount_init refused',
-        'the electronics were reset',
-    ]
+    assert graph.repeats == {
+        INIT.name: ['mount_init refused'] * resets,
+        DRIVER.name: ['the electronics were reset'] * resets,
+    }
 
 
 def test_a_driver_that_is_off_for_good_is_not_activated_anew():
     graph = OffUntilInitialised(1, needs='False')
     with pytest.raises(GraphError):
-        graph.activation.activate([INIT])
+        activation.activate(graph, [INIT])
     assert graph.done == ['activate mount_init'] * 2

@@ -165,4 +165,5 @@ def test_a_process_that_died_before_the_end_is_told_once(tmp_path, monkeypatch):
     dead = [started(monkeypatch, tmp_path, node, 'print("up"); exit(3)') for node in (DRIVER, CONTROL)]
     wait_until(lambda: all(process.exit_code is not None for process in dead), 'their ends')
     dead[1].reported = True
-    assert ended(dead) == ['mount_driver ended with code 3 before the end of the graph: up']
+    told = f'mount_driver ended with code 3 before the end of the graph: up (log: {dead[0].log_file})'
+    assert ended(dead) == [told]

@@ -2,6 +2,7 @@
 
 import re
 import time
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -157,7 +158,8 @@ def recovered(graph):
     """Return the function that recovers from failures of nodes: the last action, and what was reported."""
 
     def recover(*nodes, limit=3, times=1, reason='lost'):
-        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)], graph, limit), []
+        graph.settings = replace(graph.settings, restart_limit=limit)
+        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)], graph.activate), []
         recovery.report = reports.append
         for _ in range(times):
             recovery.recover(NodesFailedError(nodes, reason))
@@ -291,7 +293,7 @@ def test_failures_of_long_ago_do_not_count(graph, recovered, monkeypatch):
 
 
 def initialised_again(graph, mount):
-    return Recovery(graph, [], graph, 3).initialise_again(mount)
+    return Recovery(graph, [], graph.activate).initialise_again(mount)
 
 
 @pytest.mark.parametrize('resting', [(), (CONTROL.name,)])

@@ -108,3 +108,13 @@ def test_a_middleware_that_does_not_start_is_an_error_of_the_graph_and_leaves_no
     with pytest.raises(GraphError, match=r'^the middleware does not start: Domain id \(-1\) '):
         graph.open()
     graph.close()
+
+
+def test_the_end_notes_each_node_that_was_activated_again_once_with_a_count(tmp_path):
+    graph = Supervisor(VEHICLE, GraphSettings(), tmp_path)
+    graph.repeats = {'mount_init': ['no ripple'], 'mount_driver': ['reset'] * 3}
+    assert graph.stop() == []
+    assert graph.notes == [
+        'no ripple; it was activated again',
+        'reset; it was activated again, the last of 3 times',
+    ]

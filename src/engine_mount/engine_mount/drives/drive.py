@@ -15,8 +15,8 @@ from engine_mount.drives.preflight import preflight
 from engine_mount.drives.progress import DriveProgress
 from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
+from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
-from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
     CONTROL,

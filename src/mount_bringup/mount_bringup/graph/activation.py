@@ -11,79 +11,57 @@ from mount_ros.messages.verdicts import flags_of
 _LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
 
 
-class Activation:
-    """Takes nodes to their active state; `repeats` is {node: sentences why it was activated again}."""
+def activate(
+    graph: Graph, nodes: Sequence[GraphNode], report: Callable[[str], None] = lambda sentence: None
+) -> None:
+    """Activate nodes side by side; each may refuse as often as it declares, then raise `GraphError`.
 
-    def __init__(self, graph: Graph):
-        self.repeats: dict[str, list[str]] = {}
-        self._graph = graph
+    A refusal while the machine was late does not count, for a minute. Nor does one while the driver requests
+    a new initialisation: the driver is deactivated and activated first.
+    """
+    begin, remaining = time.monotonic(), {node: node.activations for node in nodes}
+    report(f'activating {", ".join(node.full_name for node in nodes)}')
+    for node in nodes:
+        graph.reports.observer.on_state(node, 'activating')
+    while remaining:
+        before = {node: _counts(graph, node) for node in remaining}
+        refused = graph.change_states(list(remaining), ACTIVATE)
+        for node in remaining.keys() - refused.keys():
+            graph.reports.note_active(node)
+        if refused:
+            graph.serve_for(FRESH_DIAGNOSTICS)
+        for node, refusal in refused.items():
+            driver = _driver(graph, node)
+            figures = graph.figures(driver)
+            late = _was_late(before[node], _counts(graph, node))
+            renewed = node != driver and flags_of(figures).needs_initialisation
+            remaining[node] -= not (late or renewed)
+            if not remaining[node] or time.monotonic() - begin > _LATE_PATIENCE:
+                raise GraphError(refusal)
+            if late:
+                rate = float(figures.get('sample_rate', SAMPLE_RATE)) / 1000.0
+                refusal = f'{refusal} (this machine was too late for {rate:g} kHz)'
+            graph.repeats.setdefault(node.full_name, []).append(refusal)
+            report(f'activating {node.full_name} again: {refusal}')
+            if renewed:  # before that the driver sends no setpoint
+                graph.repeats.setdefault(driver.full_name, []).append(figures['sentence'])
+                graph.transition([driver], DEACTIVATE)
+                graph.reports.forget(driver)  # the report is of the activation before
+                graph.transition([driver], ACTIVATE)
+                graph.reports.note_active(driver)
+        remaining = {node: remaining[node] for node in refused}
 
-    @property
-    def notes(self) -> list[str]:
-        """One sentence for each node that was activated again: the last reason, with a count."""
-        return [
-            f'{reasons[-1]}; it was activated again'
-            + (f', the last of {len(reasons)} times' if len(reasons) > 1 else '')
-            for reasons in self.repeats.values()
-        ]
 
-    def activate(
-        self, nodes: Sequence[GraphNode], report: Callable[[str], None] = lambda sentence: None
-    ) -> None:
-        """Activate nodes side by side; each may refuse as often as it declares, then raise `GraphError`.
+def _driver(graph: Graph, node: GraphNode) -> GraphNode:
+    """Return the driver of the mount of a node."""
+    return next((each for each in graph.nodes if each.is_a(DRIVER) and each.mount == node.mount), DRIVER)
 
-        A refusal while the machine was late does not count, for a minute. Nor does one while the driver
-        requests a new initialisation: the driver is deactivated and activated first.
-        """
-        graph = self._graph
-        begin, remaining = time.monotonic(), {node: node.activations for node in nodes}
-        report(f'activating {", ".join(node.full_name for node in nodes)}')
-        for node in nodes:
-            graph.reports.observer.on_state(node, 'activating')
-        while remaining:
-            before = {node: self._counts(node) for node in remaining}
-            refused = graph.change_states(list(remaining), ACTIVATE)
-            for node in remaining.keys() - refused.keys():
-                graph.reports.note_active(node)
-            if refused:
-                graph.serve_for(FRESH_DIAGNOSTICS)
-            for node, refusal in refused.items():
-                driver = self._driver(node)
-                figures = graph.figures(driver)
-                late = _was_late(before[node], self._counts(node))
-                renewed = node != driver and flags_of(figures).needs_initialisation
-                remaining[node] -= not (late or renewed)
-                if not remaining[node] or time.monotonic() - begin > _LATE_PATIENCE:
-                    raise GraphError(refusal)
-                if late:
-                    rate = float(figures.get('sample_rate', SAMPLE_RATE)) / 1000.0
-                    refusal = f'{refusal} (this machine was too late for {rate:g} kHz)'
-                self._note(node, refusal)
-                report(f'activating {node.full_name} again: {refusal}')
-                if renewed:  # before that the driver sends no setpoint
-                    self._note(driver, figures['sentence'])
-                    graph.transition([driver], DEACTIVATE)
-                    graph.reports.forget(driver)  # the report is of the activation before
-                    graph.transition([driver], ACTIVATE)
-                    graph.reports.note_active(driver)
-            remaining = {node: remaining[node] for node in refused}
 
-    def _note(self, node: GraphNode, reason: str) -> None:
-        self.repeats.setdefault(node.full_name, []).append(reason)
-
-    def _driver(self, node: GraphNode) -> GraphNode:
-        """Return the driver of the mount of a node."""
-        drivers = (other for other in self._graph.nodes if other.is_a(DRIVER) and other.mount == node.mount)
-        return next(drivers, DRIVER)
-
-    def _counts(self, node: GraphNode) -> tuple[int, int, int]:
-        """Return setpoints that were late, samples that were late, and all samples, as counted so far."""
-        driver, sim = self._graph.figures(self._driver(node)), self._graph.figures(SIM)
-        return (
-            int(driver.get('late_setpoints', 0)),
-            int(sim.get('overruns', 0)),
-            int(sim.get('samples', 0)),
-        )
+def _counts(graph: Graph, node: GraphNode) -> tuple[int, int, int]:
+    """Return setpoints that were late, samples that were late, and all samples, as counted so far."""
+    late = int(graph.figures(_driver(graph, node)).get('late_setpoints', 0))
+    sim = graph.figures(SIM)
+    return late, int(sim.get('overruns', 0)), int(sim.get('samples', 0))
 
 
 def _was_late(before: tuple[int, int, int], now: tuple[int, int, int]) -> bool:

@@ -59,6 +59,8 @@ class Graph:
         self.figures = self.reports.figures
         self.notes: list[str] = []
         """Sentences for the user about what was not as it should be."""
+        self.repeats: dict[str, list[str]] = {}
+        """The reasons why a node was activated again."""
         self.deadline = Deadline(code=1)
         self._interrupted = False  # no lock: a second signal may come during the first
         self._context = Context()

@@ -14,13 +14,11 @@ from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, LogInfo, OpaqueFunction
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
-from launch.logging import get_logger
 
 from mount_bringup.graph.launch_arguments import arguments_of, texts_of
 from mount_bringup.graph.order import launch_order
 from mount_bringup.graph.processes import QUIET_START
 from mount_bringup.graph.run import SUPERVISOR
-from mount_models.arithmetic.compiled import compilation_told
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.process import environment_of_children
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
@@ -46,11 +44,10 @@ def launch_description(graph: str) -> LaunchDescription:
 
 def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEntity]:
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments_of(graph)}
-    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
-        # Where another launch file includes ours, an argument may be for that one.
-        if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
-            texts_of([word for word in sys.argv if ':=' in word], graph)
-        launch_order(graph, given)
+    # Where another launch file includes ours, an argument may be for that one.
+    if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
+        texts_of([word for word in sys.argv if ':=' in word], graph)
+    launch_order(graph, given)
     inherited = drop_real_time()
     if inherited and given['priority'] == '0':
         given['priority'] = str(inherited)

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
 from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, arguments_of
 from mount_bringup.graph.nodes import (
@@ -23,14 +22,13 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import (
-    NODES,
     SettingError,
-    check_ranges,
     check_sample_rate,
     checked_settings,
     defaults_of_nodes,
     settings_of_mount,
 )
+from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_ros.nodes.real_time import HIGHEST
@@ -49,21 +47,22 @@ class LaunchOrder(NamedTuple):
 
     nodes: tuple[GraphNode, ...]
     settings: GraphSettings
-    scenario: str
     duration: float = float('inf')
 
 
 def launch_order(graph: str, given: Texts) -> LaunchOrder:
-    """Return the graph of a launch file; a `ValueError` says what cannot be."""
+    """Return the graph of a launch file; a `ValueError` says what cannot be.
+
+    Names, types and what must fit together are checked here; the range of a value is checked by its node.
+    """
     nodes, records = SIMULATED if graph == 'sim' else VEHICLE, _is_recorded(given)
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
     mounts, known = _mount_names(given['mounts']), _known_parameters(nodes)
-    scenario, duration = 'car', given['duration']
-    if SIM in nodes:
-        from mount_bringup.graph import simulation  # not in the car
+    if SIM in nodes:  # not in the car
+        from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
+        from mount_sim.plant.places import mount_names
 
-        simulation.mount_names(given['mounts'])
-        duration = ''  # the simulator ends the drive
+        mount_names(given['mounts'])
     settings: Settings = {}
     for node in of_mounts(nodes, mounts):
         space = name_in(namespace, node.mount)
@@ -78,12 +77,18 @@ def launch_order(graph: str, given: Texts) -> LaunchOrder:
     for mount in mounts or ('',):
         of_mount = settings_of_mount(settings, mount)
         if SIM in nodes:
-            of_mount = simulation.with_checked_mount(of_mount)
-            settings[name_in(mount, CONTROL.name)] = of_mount[CONTROL.name]
-        _check(of_mount, given, known)
-    if SIM in nodes:
-        scenario = simulation.checked_scenario(settings[SIM.name])
+            of_mount = with_control_of_mount(of_mount)
+            check_control_of_mount(of_mount)
+            settings[name_in(mount, CONTROL.name)] = of_mount.get(CONTROL.name, {})
+        check_sample_rate(of_mount, known)
+        policy = of_mount.get(CONTROL.name, {}).get('policy', DEFAULT)
+        if given['damper'] and policy != POLICY_OF_DAMPER:
+            raise SettingError(
+                f'damper:={given["damper"]} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
+                f'add policy:={POLICY_OF_DAMPER}'
+            )
     chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
+    duration = given['duration'] if SIM not in nodes else ''  # the simulator ends its drive itself
     return LaunchOrder(
         nodes=chosen,
         settings=GraphSettings(
@@ -96,7 +101,6 @@ def launch_order(graph: str, given: Texts) -> LaunchOrder:
             log_level=given['log_level'],
             log_to_screen=True,
         ),
-        scenario=scenario,
         duration=_number('duration', duration, 1e9) if duration else float('inf'),
     )
 
@@ -182,19 +186,6 @@ def _separate_buses(mounts: Sequence[str], settings: Settings, given: Texts) -> 
                 f'the mounts {other} and {mount} have one CAN bus, {driver["channel"]}: give each its own, '
                 'as in channels:=can0,can1, or as channel of its mount_driver in the config file'
             )
-
-
-def _check(settings: Settings, given: Texts, known: Settings) -> None:
-    """Raise the `ValueError` of the first parameter of a mount that a node would refuse."""
-    policy = control_parameters(settings).policy
-    if given['damper'] and policy != POLICY_OF_DAMPER:
-        raise SettingError(
-            f'damper:={given["damper"]} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
-            f'add policy:={POLICY_OF_DAMPER}'
-        )
-    check_ranges(settings)
-    check_sample_rate(settings, [name for name in NODES if name in known])
-    chosen_control(settings)
 
 
 def _number(name: str, text: str, highest: float, kind: type = float) -> Any:

@@ -79,12 +79,12 @@ class NodeProcess:
         return self._process.poll()
 
     def last_words(self) -> str:
-        """Return the last error line of the log, or its last line."""
+        """Return the last error line of the log, or its last line, and where the log is."""
         if self._settings.log_to_screen:
-            return '(see its log above)'
+            return 'see its log above'
         lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
         errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
-        return (errors or lines or ['(its log is empty)'])[-1]
+        return f'{(errors or lines or ["(its log is empty)"])[-1]} (log: {self.log_file})'
 
     def interrupt(self) -> None:
         """Send SIGINT: a node goes to 0 A and ends with code 0."""

@@ -12,7 +12,6 @@ from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from mount_bringup.graph.activation import Activation
 from mount_bringup.graph.graph import ANSWER_LIMIT, CONFIGURE, Graph
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, Figures, GraphError, GraphNode
 from mount_bringup.graph.processes import NodeProcess
@@ -102,15 +101,19 @@ def table_holds(driver: Figures, init: Figures) -> bool:
 class Recovery:
     """Recovers from failures and keeps each as a `Restart`.
 
-    More than `limit` failures of a node within a minute end the graph; 0: the first.
+    More failures of a node within a minute than `restart_limit` of the settings end the graph; 0: the first.
     """
 
-    def __init__(self, graph: Graph, processes: Sequence[NodeProcess], activation: Activation, limit: int):
+    def __init__(
+        self,
+        graph: Graph,
+        processes: Sequence[NodeProcess],
+        activate: Callable[[Sequence[GraphNode]], None],
+    ):
         self.restarts: list[Restart] = []
         self.report: Callable[[str], None] = lambda sentence: None
         """Takes the sentence about each failure at once."""
-        self._graph, self._processes, self._activation = graph, processes, activation
-        self._limit = limit
+        self._graph, self._processes, self._activate = graph, processes, activate
         self._times: dict[str, list[float]] = {}  # node -> of its failures, s on the steady clock
         self._celsius: dict[str, float] = {}  # driver -> coil temperature of its last report
 
@@ -147,13 +150,14 @@ class Recovery:
             graph.deactivate(node)
         graph.wait_for_matches()
         for node in nodes:
-            self._activation.activate([node])
+            self._activate([node])
         inits = [node for node in nodes if node.is_a(INIT)]
         return '; '.join(f'{node.full_name}: {graph.fresh_figures(node)["sentence"]}' for node in inits)
 
     def _count(self, failure: NodesFailedError) -> None:
         """Count a failure; raise `GraphError` where it ends the graph."""
-        if self._limit == 0:
+        limit = self._graph.settings.restart_limit
+        if limit == 0:
             raise failure
         if any(ACTIONS[node.name] is RecoveryAction.END for node in failure.nodes):
             raise GraphError(f'{failure}; without it there is no coil to drive: the graph ends')
@@ -161,10 +165,10 @@ class Recovery:
         for name in [node.full_name for node in failure.nodes] or ['electronics']:
             times = [at for at in self._times.get(name, ()) if now - at <= _WINDOW] + [now]
             self._times[name] = times
-            if len(times) > self._limit:
+            if len(times) > limit:
                 raise GraphError(
                     f'{failure}; {name} was lost {len(times)} times within {_WINDOW:g} s '
-                    f'(limit {self._limit}), so the graph is given up at 0 A: read the logs for the cause'
+                    f'(limit {limit}), so the graph is given up at 0 A: read the logs for the cause'
                 )
 
     def _bring_back(self, failed: Collection[GraphNode], active: set[GraphNode]) -> RecoveryAction:
@@ -195,7 +199,7 @@ class Recovery:
                 return self._bring_back(failed, active)
         for node in graph.nodes:
             if node in wanted:
-                self._activation.activate([node])
+                self._activate([node])
         return action
 
     def _action(self, failed: Collection[GraphNode]) -> RecoveryAction:

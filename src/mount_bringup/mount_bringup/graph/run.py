@@ -14,7 +14,7 @@ from rclpy.logging import get_logger
 
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.launch_arguments import GRAPHS, texts_of
-from mount_bringup.graph.nodes import GraphError
+from mount_bringup.graph.nodes import SIM, GraphError
 from mount_bringup.graph.order import LaunchOrder, launch_order
 from mount_bringup.graph.shutdown import Interrupted, ending_signals
 from mount_bringup.graph.supervisor import Parameters, Supervisor
@@ -67,7 +67,8 @@ def _supervise(order: LaunchOrder, folder: Path) -> int:
     logger = get_logger(SUPERVISOR)
 
     def session(parameters: Parameters) -> str:
-        content = {'scenario': order.scenario, 'mode': 'real time', 'parameters': parameters}
+        scenario = parameters[SIM.name]['scenario'] if SIM.name in parameters else 'car'
+        content = {'scenario': scenario, 'mode': 'real time', 'parameters': parameters}
         return session_text(new_session(content))
 
     graph = Supervisor(order.nodes, order.settings, folder)

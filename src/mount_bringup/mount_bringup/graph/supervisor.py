@@ -9,7 +9,7 @@ from pathlib import Path
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph.activation import Activation
+from mount_bringup.graph.activation import activate
 from mount_bringup.graph.graph import CONFIGURE, LONGEST_HANG, Graph
 from mount_bringup.graph.nodes import SIM, GraphError, GraphNode, GraphSettings, ending_order, groups, name_in
 from mount_bringup.graph.processes import NodeProcess, end_processes
@@ -36,8 +36,7 @@ class Supervisor(Graph):
         self._folder = folder
         self._starter = Starter()
         self.processes: list[NodeProcess] = []
-        self._activation = Activation(self)
-        self.recovery = Recovery(self, self.processes, self._activation, settings.restart_limit)
+        self.recovery = Recovery(self, self.processes, partial(activate, self))
         self._recovers = False
 
     def open(self) -> None:
@@ -74,7 +73,7 @@ class Supervisor(Graph):
             self.publish_session(mount, session(settings_of_mount(parameters, mount)))
         self.wait_for_matches()
         for _, of_mounts in groupby(self.nodes, lambda node: node.name):
-            self._activation.activate(list(of_mounts), report)
+            activate(self, list(of_mounts), report)
         self._recovers = not any(values.get('lockstep') for values in parameters.values())
         self.reports.pause_silence()
 
@@ -109,7 +108,9 @@ class Supervisor(Graph):
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
         self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
         complaints = end_processes(self.processes, at_once=all(resting))
-        self.notes += self._activation.notes
+        for reasons in self.repeats.values():
+            times = f', the last of {len(reasons)} times' if len(reasons) > 1 else ''
+            self.notes.append(f'{reasons[-1]}; it was activated again{times}')
         self.close()
         remove_abandoned()
         return complaints
@@ -122,11 +123,8 @@ class Supervisor(Graph):
             if process.exit_code is not None:
                 process.reported = True
                 words = process.last_words().split(']: ', 1)[-1]
-                raise NodesFailedError(
-                    process.nodes,
-                    f'{process.name} ended with code {process.exit_code}; last words: {words} '
-                    f'(log: {process.log_file})',
-                )
+                reason = f'{process.name} ended with code {process.exit_code}; last words: {words}'
+                raise NodesFailedError(process.nodes, reason)
         self.reports.check_fatal()
         if not self._recovers:
             return

@@ -16,7 +16,7 @@ from engine_mount.recordings.events.switching_changes import switching_times
 from engine_mount.recordings.run.screen import Screen, Table
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
-from mount_bringup.chosen import Parameters, policy_of
+from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
 from mount_recorder.parameters import RecorderParameters
 from mount_sim.mount_choice import seat_of
