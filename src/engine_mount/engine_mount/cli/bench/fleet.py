@@ -45,7 +45,9 @@ def fleet_figures(
         for order in islice(whole_fleet(Path(folder)), 0, _RECORDINGS * len(VARIATIONS), len(VARIATIONS)):
             make_one(replace(order, seconds=seconds))
         found = list(places([folder]).values())
-        recorded = sum(row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows)
+        recorded = sum(
+            row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows['result']
+        )
         times = [_stages(found) for _ in range(rounds)]
         workers = worker_figures(found, _CHANGE, say)
     whole, *stages = (statistics.median(each) / recorded for each in zip(*times, strict=True))

@@ -9,8 +9,9 @@ from typing import Any
 
 from engine_mount.cli.bench.comparison import Comparison
 from engine_mount.fleet.catalogue.places import Place
+from engine_mount.fleet.job import Answer
 from engine_mount.fleet.runner import run_tasks
-from engine_mount.fleet.what_if.one import Replayed, replay_one
+from engine_mount.fleet.what_if.one import replay_one
 
 _REPEATED = 160  # recordings in a run, chosen: several seconds, in which a start tells little
 _CORES = 2  # chosen: every machine that works on a fleet has them
@@ -54,21 +55,19 @@ def _comparison(what: str, ours: float, other_name: str, other: float) -> Compar
     return Comparison(f'{what}, in fleet replay', ours, other_name, other, _UNIT)
 
 
-def _recorded(replayed: Iterable[Replayed]) -> float:
+def _recorded(replayed: Iterable[Answer]) -> float:
     """Return the recorded time (s) in which the controller was at work."""
-    return sum(float(row['duration_s']) for each in replayed for row in each.rows)
+    return sum(float(row['duration_s']) for each in replayed for row in each.rows['result'])
 
 
-def _in_process(work: Callable[[Place], Replayed], items: Sequence[Place]) -> float:
+def _in_process(work: Callable[[Place], Answer], items: Sequence[Place]) -> float:
     work(items[0])
     begin = time.monotonic()
     recorded = _recorded(map(work, items))
     return recorded / (time.monotonic() - begin)
 
 
-def _by_workers(
-    work: Callable[[Place], Replayed], items: Sequence[Place], workers: int
-) -> tuple[float, float]:
+def _by_workers(work: Callable[[Place], Answer], items: Sequence[Place], workers: int) -> tuple[float, float]:
     """Return recorded over wall time without and with the start."""
     begin = warm = end = time.monotonic()
     known: set[str] = set()
@@ -84,7 +83,7 @@ def _by_workers(
     return behind / max(end - warm, 1e-9), all_of_it / (end - begin)
 
 
-def _by_plain_processes(work: Callable[[Place], Replayed], items: Sequence[Place]) -> tuple[float, float]:
+def _by_plain_processes(work: Callable[[Place], Answer], items: Sequence[Place]) -> tuple[float, float]:
     """Return as `_by_workers`, of processes that share nothing and are told all they do beforehand."""
     context = multiprocessing.get_context('spawn')
     barrier, told = context.Barrier(_CORES), context.Queue()
@@ -101,7 +100,7 @@ def _by_plain_processes(work: Callable[[Place], Replayed], items: Sequence[Place
     return recorded / max(seconds for _, seconds in results), recorded / (end - begin)
 
 
-def _replay(work: Callable[[Place], Replayed], items: Sequence[Place], barrier: Barrier, told: Any) -> None:
+def _replay(work: Callable[[Place], Answer], items: Sequence[Place], barrier: Barrier, told: Any) -> None:
     work(items[0])
     barrier.wait(_PATIENCE)
     begin = time.monotonic()
