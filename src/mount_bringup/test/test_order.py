@@ -122,7 +122,7 @@ def test_duration_place_and_processes_of_an_order(order):
         ({'mounts': 'left,top'}, "'top' is no place"),
         ({'mount': 'friction_always_on', 'policy': 'continuous_viscous'}, 'needs mount_control.policy'),
         ({'damper': 'viscous_2000', 'policy': 'continuous_viscous'}, 'add policy:=switched_viscous'),
-        ({'port': '['}, 'port:=[ is not valid YAML'),
+        ({'port': '['}, 'mount_driver.port must be a int'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
         ({'priority': '-1'}, 'priority:=-1 must be a number within 0 .. 98'),
         ({'config': '/nowhere/none.yaml'}, 'parameter file /nowhere/none.yaml cannot be read'),

@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from rclpy.client import Client
+from std_srvs.srv import Trigger
+
 from engine_mount.drives.brought import FOLDER, Brought, provenance, written
 from engine_mount.drives.happenings import Happenings, line
 from engine_mount.drives.keyboard import MARK_KEYS, Keyboard
@@ -150,16 +153,30 @@ def _watch_drive(
     with keyboard as keys, screen.bar(f'driving ({order.scenario})') as show:
         if order.mode == 'real time':
             _tell_where_to_look(order, screen, marks=keys is not None and keys.present)
+        mark = supervisor.client(Trigger, f'{RECORDER.name}/mark')  # found by the time it is wanted
         progress = DriveProgress(supervisor.figures(SIM), real_time=order.mode == 'real time')
 
         def finished() -> bool:
             show(progress.share(supervisor.figures(SIM)), detail=happenings.present)
             for key in keys.wait(0.0) if keys is not None else ():
                 if key in MARK_KEYS:
-                    supervisor.set_mark(screen.say)
+                    _set_mark(mark, screen)
             return supervisor.finished
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
+
+
+def _set_mark(client: Client, screen: Screen) -> None:
+    """Request a mark of the recorder."""
+
+    def answered(call: Any) -> None:
+        answer = call.result()
+        screen.say('marked' if answer.success else f'no mark was set: {answer.message}')
+
+    if client.service_is_ready():
+        client.call_async(Trigger.Request()).add_done_callback(answered)
+    else:
+        screen.say('no mark was set: the recorder is not there yet')
 
 
 def _tell_where_to_look(order: DriveOrder, screen: Screen, *, marks: bool) -> None:

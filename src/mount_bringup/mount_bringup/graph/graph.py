@@ -17,7 +17,6 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from mount_bringup.graph.nodes import DRIVER, RECORDER, GraphError, GraphNode, GraphSettings, name_in
 from mount_bringup.graph.reports import NodeReports
@@ -45,7 +44,6 @@ _DISCOVERY = 0.5  # s, chosen: discovery of a running graph takes less with the 
 LONGEST_HANG = 30.0
 """Seconds (chosen) until this process ends if it hangs; its nodes then go to 0 A by themselves."""
 _PERIOD = 0.05  # s, chosen
-_MARK = f'{RECORDER.name}/mark'
 
 
 class Graph:
@@ -90,7 +88,6 @@ class Graph:
             mount: self.node.create_publisher(String, name_in(mount, SESSION.name), publisher_qos(SESSION))
             for mount in self.mounts
         }
-        self.client(Trigger, _MARK)  # found by the time it is wanted
 
     def close(self) -> None:
         """Leave the middleware."""
@@ -215,19 +212,6 @@ class Graph:
     def publish_session(self, mount: str, text: str) -> None:
         """Publish the session of a mount."""
         self._sessions[mount].publish(String(data=text))
-
-    def set_mark(self, report: Callable[[str], None]) -> None:
-        """Request a mark of the recorder; `report` takes the result."""
-        client = self.client(Trigger, _MARK)
-
-        def answered(call: Any) -> None:
-            answer = call.result()
-            report('marked' if answer.success else f'no mark was set: {answer.message}')
-
-        if client.service_is_ready():
-            client.call_async(Trigger.Request()).add_done_callback(answered)
-        else:
-            report('no mark was set: the recorder is not there yet')
 
     def missing_topics(self, node: GraphNode) -> list[str]:
         """Return the topics that a node needs and that have no other side yet, by its own figures."""

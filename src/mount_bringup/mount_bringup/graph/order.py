@@ -30,7 +30,6 @@ from mount_bringup.settings import (
 )
 from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
-from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 
@@ -144,19 +143,18 @@ def _of_arguments(graph: str, given: Texts, node: GraphNode, known: Settings) ->
         for target in argument.sets.split() if text else ():
             owner, _, name = target.partition('.')
             if owner == node.name:
-                values[name] = _value(argument.name, text, known[owner][name])
+                values[name] = _value(text, known[owner][name])
     return values
 
 
-def _value(name: str, text: str, default: Any) -> Any:
-    if isinstance(default, str):
-        return text
+def _value(text: str, default: Any) -> Any:
+    """Return a text in the type of the default, or as it stands where it cannot be of that type."""
     if isinstance(default, tuple):
         return [part.strip() for part in text.split(',')]
     try:
-        return plain_yaml(text)
-    except YamlError as error:
-        raise SettingError(f'{name}:={text} {error}') from None
+        return type(default)(text)
+    except ValueError:
+        return text
 
 
 def _separate_buses(mounts: Sequence[str], settings: Settings, given: Texts) -> None:

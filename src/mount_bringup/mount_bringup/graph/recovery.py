@@ -20,7 +20,6 @@ from mount_recorder.folders import next_recording
 from mount_ros.messages.verdicts import flags_of
 
 _WINDOW = 60.0  # s, chosen: within which the failures of a node are counted
-_REQUEST_PERIOD = 0.5  # s, chosen: the middleware may still know the dead predecessor, and ask that one
 
 
 class RecoveryAction(Enum):
@@ -221,12 +220,10 @@ class Recovery:
         """Wait until the new node answers: not yet configured."""
         client = self._graph.client(GetState, f'{node.full_name}/get_state')
         answers: list[Any] = []
-        requested = 0.0
 
         def started() -> bool:
-            nonlocal requested
-            if time.monotonic() - requested > _REQUEST_PERIOD and client.service_is_ready():
-                requested = time.monotonic()
+            # Again and again: the middleware may still know the dead predecessor, and ask that one.
+            if client.service_is_ready():
                 answers.append(client.call_async(GetState.Request()))
             states = [answer.result().current_state.id for answer in answers if answer.done()]
             return State.PRIMARY_STATE_UNCONFIGURED in states
