@@ -15,12 +15,6 @@ from engine_mount.recordings.audit.losses import losses
 from mount_bringup.graph.nodes import SIMULATED
 from mount_ros.testing import wait_until
 
-# One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
-ENDLESS = (
-    '--lockstep', '--apart', '--scenario', 'bench', '--duration', '600',
-    '--set', 'mount_sim.timeline.start=2.9',
-)  # fmt: skip
-
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
 
@@ -35,15 +29,17 @@ def _nodes(parent: int) -> dict[str, Process]:
 
 
 @pytest.mark.slow
-def test_ctrl_c_during_the_start_ends_every_node(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_ctrl_c_during_the_start_ends_every_node(endless_drive, bus_listener):
+    process, out = endless_drive()
     wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the start of all nodes', LIMIT)
     _interrupt(process)
     assert not bus_listener or bus_listener[-1].current == 0.0
 
 
-def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(
+    endless_drive, bus_listener
+):
+    process, out = endless_drive()
     wait_until(lambda: any(setpoint.current > 1.0 for setpoint in bus_listener), 'the ramp', LIMIT)
     _interrupt(process)
     _expect_a_sound_end(bus_listener, out)
@@ -51,9 +47,9 @@ def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_rec
 
 @pytest.mark.slow
 def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while_it_damps(
-    command, bus_listener, domain
+    endless_drive, command, bus_listener, domain
 ):
-    first, out = command.start_drive(*ENDLESS)
+    first, out = endless_drive()
     wait_until(lambda: bus_listener, 'the first graph', LIMIT)
     second = command.drive('--scenario', 'bench', '--duration', '1')
     assert second.code == 1
@@ -64,8 +60,8 @@ def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while
 
 
 @pytest.mark.slow
-def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_death_of_the_control_node_ends_the_drive_and_names_it(endless_drive, bus_listener):
+    process, out = endless_drive()
     wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)
     os.kill(_nodes(process.pid)['mount_control'].pid, signal.SIGKILL)
     output, _ = process.communicate(timeout=LIMIT)
@@ -76,8 +72,8 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_list
 
 
 @pytest.mark.slow
-def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
-    process, _ = command.start_drive(*ENDLESS)
+def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
+    process, _ = endless_drive()
     wait_until(lambda: len(bus_listener) > 100, 'setpoints', LIMIT)
     nodes = _nodes(process.pid)
     assert len(nodes) == 5

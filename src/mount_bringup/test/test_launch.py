@@ -77,19 +77,13 @@ def test_the_real_time_priority_that_launch_runs_at_is_the_loops_and_not_that_of
     assert 'priority:=10' in Launched(launch, 'sim', recording='bags/none', priority='10').command
 
 
-@pytest.mark.parametrize('code', [0, -2])
-def test_the_end_of_the_supervisor_ends_launch_as_a_success(launch, code):
+def test_launch_ends_as_the_supervisor_does(launch):
     on_exit = Launched(launch, 'sim', recording='bags/none').process['on_exit']
-    assert on_exit(SimpleNamespace(returncode=code), None) is launch.EmitEvent.return_value
-
-
-@pytest.mark.parametrize(
-    ('code', 'sentence'), [(1, 'ended with code 1, for the reason'), (-9, 'ended with code -9')]
-)
-def test_a_failure_of_the_supervisor_ends_launch_as_a_failure(launch, code, sentence):
-    on_exit = Launched(launch, 'vehicle', recording='bags/none').process['on_exit']
-    with pytest.raises(RuntimeError, match=f'mount_supervisor {sentence}'):
-        on_exit(SimpleNamespace(returncode=code), None)
+    for code in (0, -2):
+        assert on_exit(SimpleNamespace(returncode=code), None) is launch.EmitEvent.return_value
+    for code, reason in ((1, ', for the reason'), (-9, '$')):
+        with pytest.raises(RuntimeError, match=f'mount_supervisor ended with code {code}{reason}'):
+            on_exit(SimpleNamespace(returncode=code), None)
 
 
 def test_an_unknown_argument_is_refused_but_not_where_another_launch_file_includes_ours(launch, monkeypatch):

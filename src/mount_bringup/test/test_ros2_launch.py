@@ -81,7 +81,7 @@ def test_show_args_tells_every_argument_with_its_meaning(run, name):
     ('name', 'argument', 'sentence'),
     [
         ('sim', 'config:=/nowhere/car.yaml', 'parameter file /nowhere/car.yaml'),
-        ('sim', 'mount:=rubber', 'rubber'),
+        ('sim', 'mont:=hydro', 'did you mean mount:=?'),
         ('vehicle', 'priority:=200', 'priority:=200 must be a number within 0 .. 98'),
     ],
 )
