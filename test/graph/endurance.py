@@ -4,7 +4,7 @@ Run by hand, on a machine with nothing else to do: python test/graph/endurance.p
 """
 
 import argparse
-import os
+import contextlib
 import random
 import shutil
 import signal
@@ -12,16 +12,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
+import psutil
+
 import engine_mount
-from engine_mount.faults.processes import (
-    SHARED_MEMORY,
-    Process,
-    descendants,
-    process_of,
-    shared_memory_of_others,
-)
 from mount_bringup.graph.domain import DomainError, domain_lock
 from mount_recorder.folders import recordings_of
 
@@ -29,6 +25,7 @@ EARLIEST, LATEST = 0.5, 15.0  # s, chosen: when the signal comes; Python itself 
 PATIENCE = 60.0  # s, chosen: until a graph that was told to end counts as hanging
 OWN_FILES = ('engine_mount_p*', 'mount_parameters_*')  # names of temporary files
 LOOK_PERIOD = 0.1  # s, chosen
+SHARED_MEMORY = '/dev/shm/'
 
 
 def main() -> int:
@@ -65,12 +62,14 @@ def attempt(number: signal.Signals, at: float, domain: int, options: list[str]) 
         graph = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
         )
-    processes, shared = {process_of(graph.pid)}, set[str]()
+    starter = psutil.Process(graph.pid)
+    processes, shared = {starter}, set[Path]()
     end = time.monotonic() + at
     while graph.poll() is None and time.monotonic() < end:
         time.sleep(LOOK_PERIOD)
-        processes |= {*descendants(graph.pid)}
-        shared |= set().union(*(process.shared_memory() for process in processes))
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            processes |= {*starter.children(recursive=True)}
+        shared |= shared_memory(processes)
     by_itself = graph.poll() is not None
     graph.send_signal(number)
     faults = wrong_end(graph, number, by_itself, log)
@@ -101,18 +100,27 @@ def wrong_end(
     return [*faults, *(['traceback'] if 'Traceback' in said else [])]
 
 
-def remains(processes: set[Process], shared: set[str], domain: int, before: set[Path]) -> list[str]:
+def remains(processes: set[psutil.Process], shared: set[Path], domain: int, before: set[Path]) -> list[str]:
     """Return what there still is of a graph at this moment, in words."""
-    left = [f'process {process.pid}' for process in processes if process.alive]
-    held = shared_memory_of_others(os.getpid())
-    left += [f'file {name}' for name in sorted(shared - held) if (SHARED_MEMORY / name).exists()]
-    left += [f'file {path}' for path in sorted(own_files() - before)]
+    left = [f'process {process.pid}' for process in processes if process.is_running()]
+    files = {path for path in shared - shared_memory(psutil.process_iter()) if path.exists()}
+    left += [f'file {path}' for path in sorted(files | own_files() - before)]
     try:
         with domain_lock(domain, ''):
             pass
     except DomainError as error:
         left.append(str(error))
     return left
+
+
+def shared_memory(processes: Iterable[psutil.Process]) -> set[Path]:
+    """Return the files of shared memory that processes have mapped."""
+    found = set[Path]()
+    for process in processes:
+        with contextlib.suppress(psutil.Error):  # it has just ended, or is of another user
+            paths = [each.path.removesuffix(' (deleted)') for each in process.memory_maps()]
+            found |= {Path(path) for path in paths if path.startswith(SHARED_MEMORY)}
+    return found
 
 
 def own_files() -> set[Path]:

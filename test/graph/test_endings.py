@@ -1,31 +1,33 @@
 """Whatever ends a drive, the coil is at 0 A, the recording is closed and the exit code tells the reason."""
 
+import contextlib
 import itertools
 import json
 import os
 import re
 import signal
 
+import psutil
 import pytest
+from ros_testing import wait_until
 
 import engine_mount
-from engine_mount.faults.processes import Process, descendants
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
 from mount_bringup.graph.nodes import SIMULATED
-from mount_ros.testing import wait_until
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
 
-def _nodes(parent: int) -> dict[str, Process]:
-    """Return {node: process} of the children of the command."""
-    return {
-        node.name: process
-        for process in descendants(parent)
-        for node in SIMULATED
-        if f'from {node.name}.node' in process.command
-    }
+def _nodes(parent: int) -> dict[str, psutil.Process]:
+    """Return {node: process} of those that the command has started and that still run."""
+    children = psutil.Process(parent).children() if psutil.pid_exists(parent) else ()
+    found = {}
+    for child in children:
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            command = ' '.join(child.cmdline())
+            found |= {node.name: child for node in SIMULATED if f'from {node.name}.node' in command}
+    return found
 
 
 @pytest.mark.slow
@@ -79,7 +81,7 @@ def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
     assert len(nodes) == 5
     process.kill()
     process.communicate(timeout=LIMIT)
-    wait_until(lambda: not any(node.alive for node in nodes.values()), 'the end of all nodes', LIMIT)
+    wait_until(lambda: not any(node.is_running() for node in nodes.values()), 'the end of all nodes', LIMIT)
     assert bus_listener[-1].current == 0.0
 
 

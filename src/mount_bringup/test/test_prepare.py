@@ -1,5 +1,6 @@
 """What is compiled ahead is what the nodes would compile."""
 
+import os
 import subprocess
 import sys
 
@@ -8,7 +9,7 @@ from mount_bringup.prepare import prepare
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros.nodes.process import ros_context, transition
-from mount_ros.testing import compiled_so_far
+from ros_testing import compiled_so_far
 from mount_sim.node import MountSim
 
 prepare(scenarios=['motorway'], policies=['continuous_viscous'])
@@ -29,6 +30,7 @@ def test_a_node_finds_everything_compiled_that_it_needs(domain):
         capture_output=True,
         text=True,
         check=True,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)},
     )
     count, _, missing = run.stdout.strip().partition(' ')
     assert int(count) > 0

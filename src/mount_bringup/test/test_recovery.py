@@ -11,6 +11,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
+from ros_testing import LIMIT
 from std_srvs.srv import Trigger
 
 from mount_bringup.graph.graph import CONFIGURE
@@ -34,7 +35,6 @@ from mount_bringup.graph.recovery import (
     table_holds,
 )
 from mount_bringup.graph.supervisor import Supervisor
-from mount_ros.testing import LIMIT
 
 MEASURING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '5',
              'last_stamp': '10000000000', 'sample_rate': '1000.0'}  # fmt: skip

@@ -94,7 +94,13 @@ _OWN = {
         ('duration', 's after which the graph ends; empty: at Ctrl-C'),
     ),
     'sim': (
-        ('scenario', 'what is driven: motorway, bench, sweep, recorded', 'mount_sim.scenario'),
+        ('scenario', 'what is driven: motorway, bench, sweep, recorded, road', 'mount_sim.scenario'),
+        (
+            'excitation',
+            'array of a recording or road at the step of the plant, as in given/ of a drive; '
+            'with scenario:=recorded or road',
+            'mount_sim.recorded.file mount_sim.road.file',
+        ),
         (
             'mount',
             'between engine and chassis: friction, friction_off, friction_always_on, hydro, elastomer',
