@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from read_back import loss_statement, read_back
+from ros_testing import wait_until
 from samples import PERIOD, START, sample
 from small_disk import small_disk
 
@@ -19,7 +20,6 @@ from mount_recorder.event_window import ITEM_OVERHEAD
 from mount_recorder.recorder import Recorder, Unobserved, free_space
 from mount_recorder.watching import SampleWatch
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
-from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
