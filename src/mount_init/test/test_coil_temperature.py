@@ -32,6 +32,9 @@ def test_the_newest_reading_up_to_then_counts():
     assert at(made, 1.15) == 31.0
     assert at(made, 1.2) == 32.0
     assert math.isnan(at(made, 0.9))
+    assert at(readings((1.0, 30.0), (1.1, math.nan)), 1.2) == 30.0  # NaN is no reading
+    made = readings(*((0.1 * k, 20.0 + 0.1 * k) for k in range(340)))  # 10 Hz over the longest ramp
+    assert at(made, 17.0) == pytest.approx(37.0)
 
 
 def test_a_reading_that_is_too_old_does_not_count():

@@ -73,6 +73,8 @@ def test_every_sample_of_the_ramp_is_answered_once_with_its_own_stamp(bench):
     assert [stamp for stamp, _ in bench.setpoints] == [n * STEP for n in range(1, bench.ramp.length + 1)]
     assert [current for _, current in bench.setpoints] == bench.ramp.ramp.setpoints.tolist()
     assert bench.ramp.last_stamp == bench.ramp.length * STEP
+    bench.sample(bench.ramp.length + 1)
+    assert len(bench.setpoints) == bench.ramp.length
 
 
 def test_without_a_ramp_nothing_is_answered(bench):
@@ -160,6 +162,29 @@ def test_silence_ends_the_ramp_with_zero_current(bench):
     assert bench.setpoints[-1] == (37 * STEP, 0.0)
 
 
+@pytest.mark.parametrize('number', [0, 1])
+def test_silence_from_the_start_and_a_sample_that_only_comes_again_end_the_ramp(bench, number):
+    bench.start(silence=0.1)
+    for _ in range(1000):
+        if number:
+            bench.sample(number)
+        bench._thread.join(0.005)
+        if not bench._thread.is_alive():
+            break
+    assert f'{number} of 275 ripple samples, none in the last 0.1 s' in str(bench.join())
+    assert [current for _, current in bench.setpoints if current > 0.01] == []
+    assert number or bench.setpoints == []
+
+
+def test_a_late_setpoint_of_another_node_for_a_sample_before_the_ramp_ends_no_ramp(bench):
+    bench.start()
+    bench.sample(10)
+    bench.dialogue.take_setpoint(9 * STEP, 0.0)
+    for number in range(11, 10 + bench.ramp.length):
+        bench.sample(number)
+    assert bench.join() is None
+
+
 def test_a_ramp_that_takes_too_long_is_given_up(bench):
     bench.start(total=0.1)
     number = 0
@@ -207,6 +232,7 @@ def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
         bench.dialogue.await_quiet(0.1, bench.ending)
     stop.set()
     other.join()
+    bench.dialogue.await_quiet(0.1, bench.ending)  # it has just fallen silent
 
 
 def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample_is_answered(bench):

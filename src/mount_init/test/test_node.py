@@ -326,6 +326,18 @@ def test_in_real_time_the_node_hears_the_streams_only_while_it_measures(graph, s
         assert g.change(Transition.TRANSITION_DEACTIVATE)
 
 
+def test_a_refused_estimate_leaves_no_result_and_zero_current(graph, simulated_actuator):
+    g = graph(simulated_actuator(contact_gap=230e-6))
+    g.configure()
+    g.electronics.send_sample()
+    assert not g.change(Transition.TRANSITION_ACTIVATE)
+    assert g.state() == State.PRIMARY_STATE_INACTIVE
+    assert 'contact gap not estimated' in g.refusal()
+    wait_until(lambda: len(g.electronics.setpoints) == RAMP_LENGTH, 'the end of the ramp')
+    assert g.electronics.setpoints[-1][1] == 0.0
+    assert (g.electronics.results, g.electronics.tables) == ([], [])
+
+
 def test_samples_that_stop_end_in_a_refusal_with_zero_current(graph):
     g = graph(silence_timeout=0.1)
     g.electronics.silent_after = 1000
@@ -483,11 +495,21 @@ def test_the_end_of_the_process_ends_a_ramp_with_zero_current(graph):
     assert g.electronics.setpoints[-1] == (1000 * STEP, 0.0)
 
 
-def test_a_specimen_that_cannot_be_read_is_refused_at_configure(graph):
-    g = graph(parameters_file='/nowhere/specimen.yaml')
+@pytest.mark.parametrize(
+    ('parameters', 'sentence'),
+    [
+        (
+            {'parameters_file': '/nowhere/specimen.yaml'},
+            'specimen file /nowhere/specimen.yaml cannot be read',
+        ),
+        ({'settle_duration': 0.4}, 'settle_duration (0.4 s) must lie below dwell_duration (0.3 s)'),
+    ],
+)
+def test_a_specimen_or_parameters_that_cannot_be_used_are_refused_at_configure(graph, parameters, sentence):
+    g = graph(**parameters)
     assert not g.change(Transition.TRANSITION_CONFIGURE)
     assert g.state() == State.PRIMARY_STATE_UNCONFIGURED
-    assert 'specimen file /nowhere/specimen.yaml cannot be read' in g.refusal()
+    assert sentence in g.refusal()
 
 
 def test_malformed_messages_are_counted_and_not_answered(graph):

@@ -87,6 +87,7 @@ FAULTS = {
     'reversed dB/dt': ({'distort': lambda _, s: (s[0], s[1], -s[2])}, f'{DB} {REVERSED}'),
     'stuck di/dt': ({'distort': stuck(1, 900)}, f'{DI} stayed at'),
     'stuck dB/dt': ({'distort': stuck(2, 0)}, f'{DB} stayed at'),
+    'dB/dt stuck in the ramp': ({'distort': stuck(2, 900)}, f'{DB} stayed at'),
     'outliers': (
         {'noise': 0.01, 'distort': inductance_times(lambda n, _: 2.0 if n % 5 == 0 else 1.0)},
         '50 of 250 inductances at rest are outliers, more than 10%',

@@ -134,6 +134,20 @@ def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware(make_path, c
     wait_until(lambda: (send(sample(9)), taken.stamps)[1], 'the message')
 
 
+def test_an_exception_of_the_receiver_is_not_that_of_the_sender(make_path, context):
+    thread = DataThread(context)
+    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
+    send = sender.sender(DISPLACEMENT)
+
+    def take(raw):
+        raise ZeroDivisionError('no')
+
+    receiver.subscribe(DISPLACEMENT, take, directly=True)
+    send(sample(1))
+    assert receiver.refused == 1
+    assert 'ZeroDivisionError: no' in receiver.refusal
+
+
 def test_one_function_hands_a_message_over_and_a_lone_sender_publishes_without_any(make_path, context):
     thread, calls = DataThread(context), []
     sender, receiver = make_path('sender', thread), make_path('receiver', thread)

@@ -126,6 +126,7 @@ def test_a_node_goes_through_its_steps_and_says_so(probe, operator, capfd):
     ] * 4
     assert probe.steps == ['configure', 'activate', 'deactivate', 'cleanup']
     assert operator.state == UNCONFIGURED
+    assert probe.data_path is None
     told = [line for line in capfd.readouterr().err.splitlines() if line.startswith('[INFO]')]
     assert told == [
         '[INFO] [mount_right.probe]: configured; its topics are those of the node /mount_right/probe_io',
@@ -144,7 +145,10 @@ def test_a_transition_that_is_not_valid_is_answered_with_no_and_the_node_lives(
     assert probe.steps == []
     assert operator.change(CONFIGURE)
     assert operator.change(ACTIVATE)
+    assert not operator.change(ACTIVATE)
     assert operator.state == ACTIVE
+    assert probe.active
+    assert probe.steps == ['configure', 'activate']
 
 
 def test_state_and_parameters_are_told_amid_a_transition_and_nothing_can_be_set(probe, operator):

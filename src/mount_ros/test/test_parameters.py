@@ -89,7 +89,7 @@ def test_only_the_chosen_fields_of_a_set_are_declared(context):
     node.destroy_node()
 
 
-@pytest.mark.parametrize('value', [0.0005, 0.02])
+@pytest.mark.parametrize('value', [0.0005, 0.02, float('nan')])
 def test_a_value_outside_its_range_is_refused_when_it_is_declared(make_node, value):
     with pytest.raises(InvalidParameterValueException, match='level'):
         make_node(level=value)
@@ -188,6 +188,8 @@ def test_what_does_not_fit_is_refused_in_words(make_declaring, atomically):
 
     assert refusal('cuont', 3) == "'cuont' is no parameter of subject; did you mean count?"
     assert refusal('level', 'high') == "Wrong parameter type, expected 'Type.DOUBLE' got 'Type.STRING'"
+    assert 'out of range' in refusal('level', 0.02)
+    assert 'out of range' in refusal('count', 0)
     assert refusal('count', 2.5) == "Wrong parameter type, expected 'Type.INTEGER' got 'Type.DOUBLE'"
     assert read(node, Settings()) == Settings()
 

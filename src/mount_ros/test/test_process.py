@@ -111,14 +111,15 @@ def start():
             process.kill()
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_nodes_of_one_process_are_closed_in_reverse_order(start, number):
-    process = start(2)
-    process.wait_for('one served', 'two served')
+@pytest.mark.parametrize(('number', 'nodes'), [(signal.SIGINT, 2), (signal.SIGTERM, 2), (signal.SIGTERM, 1)])
+def test_nodes_of_one_process_are_closed_in_reverse_order_with_exit_code_0(start, number, nodes):
+    process = start(nodes)
+    names = ['one', 'two'][:nodes]
+    process.wait_for(*(f'{name} served' for name in names))
     code, errors = process.end(number)
     assert (code, errors) == (0, '')
     said = [line for line in process.lines if 'served' not in line]
-    assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup', 'over']
+    assert said == [f'{name} {step}' for name in names[::-1] for step in ('deactivate', 'cleanup')] + ['over']
 
 
 @pytest.mark.parametrize('ends_before', [True, False])
@@ -153,6 +154,14 @@ def test_signals_until_the_process_has_ended_change_nothing(start):
     process = start(1)
     process.wait_for('one served')
     code, errors = process.end(signal.SIGINT, until_the_end=True)
+    assert (code, errors) == (0, '')
+    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
+
+
+def test_a_signal_that_another_thread_takes_wakes_the_sleeping_main_thread(start):
+    kill = 'signal.pthread_kill(threading.get_ident(), signal.SIGTERM)'
+    process = start(1, in_creation=f'import signal; threading.Timer(0.5, lambda: {kill}).start()')
+    code, errors = process.end()
     assert (code, errors) == (0, '')
     assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
