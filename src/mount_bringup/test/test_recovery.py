@@ -81,6 +81,8 @@ def test_a_table_holds_only_while_the_driver_has_measured_without_a_break_since_
     driver, init, expected
 ):
     assert table_holds({**MEASURING, **driver}, {**LATCHED, **init}) is expected
+    assert not table_holds({}, {**LATCHED, **init})
+    assert not table_holds({**MEASURING, **driver}, {})
 
 
 class Answer:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.law import ForceOutsideLaw, GapOutsideLaw, force
+from mount_models.actuator.law import ForceOutsideLaw, GapOutsideLaw, OutsideLawError, force
 from mount_models.arithmetic.interpolation import interpolated
 from mount_models.force_table import (
     ForceTableError,
@@ -74,6 +74,10 @@ def test_a_table_can_be_built_for_every_gap_of_new_and_worn_pads(contact, openin
 def test_a_contact_gap_beyond_the_law_is_refused():
     with pytest.raises(GapOutsideLaw, match=r'air gap \(260\.0 um\)'):
         current_force_table(LAW, SPRING, PADS, REST, 260e-6)
+    with pytest.raises(GapOutsideLaw, match='air gap'):  # of the pads compressed at full current
+        current_force_table(LAW, SPRING, PADS, REST, 275e-6)
+    with pytest.raises(OutsideLawError, match='coil current'):
+        current_force_table(LAW, SPRING, PADS, REST, CONTACT, current_high=3.5)
 
 
 def test_a_contact_gap_above_the_rest_gap_is_refused():

@@ -204,7 +204,7 @@ class BagWriter:
         try:
             self._finish()
         except OSError as error:
-            self._fail(f'{_reason_of(error)}; the file ends without its summary but with whole chunks')
+            self._fail_at_end(error, 'the file')
 
     def stop(self, why: str) -> None:
         """Close the recording before its time and raise `RecordingError` with the sentence `why`."""
@@ -295,10 +295,18 @@ class BagWriter:
     def _end_early(self, error: OSError) -> None:
         try:
             self._finish()
-            state = 'is closed and readable'
+            cut = ''
         except OSError:
-            state = 'ends without its summary but with whole chunks'
-        self._fail(f'{_reason_of(error)}; the file {state}')
+            cut = 'the file'
+        self._fail_at_end(error, cut)
+
+    def _fail_at_end(self, error: OSError, cut: str) -> None:
+        """Raise what `error` says and which files have no end; `cut` where none of the MCAP files has not."""
+        cut = ', '.join(writer.file.path.name for writer in self._files if not writer.finished) or cut
+        state = 'the file is closed and readable'
+        if cut:
+            state = f'{cut} ends without its summary but with whole chunks'
+        self._fail(f'{_reason_of(error)}; {state}')
 
     def _fail(self, why: str) -> None:
         self._refuse_writes()

@@ -76,6 +76,8 @@ class McapWriter:
         self._chunk_of: dict[int, _FillingChunk] = {}  # by channel
         self._data_crc = 0
         self._room = _ROOM_AT_LEAST
+        self.finished = False
+        """Whether the file has its summary and end."""
         self.file = open_file(path)
         try:
             self._append(MCAP0_MAGIC + _packed(Header('ros2', library)))
@@ -194,6 +196,7 @@ class McapWriter:
                 self.add_metadata(name, values)
             self._append(_packed(DataEnd(self._data_crc)))
             self.file.append(self._summary(self.file.size))
+            self.finished = True
         finally:
             self.file.close()
 

@@ -20,6 +20,7 @@ from mount_recorder.bag_writer import (
     SplitRule,
     checked_rule,
 )
+from mount_recorder.record_file import RecordFile
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -124,6 +125,42 @@ def test_disk_too_full_for_the_next_file_ends_the_recording_with_all_before_it(t
     with pytest.raises(RecordingError, match='closed and readable'):
         writer.write('/text', string('y'), 10)
     assert len(read_back(tmp_path / 'bag', '/text')) == 1
+
+
+def test_a_file_whose_end_cannot_be_written_at_a_split_is_named_and_keeps_its_messages(tmp_path):
+    class BrokenFirst(RecordFile):
+        broken = False
+
+        def _write_some(self, data):
+            if self.broken:
+                raise OSError(errno.EIO, 'broken')
+            return super()._write_some(data)
+
+        def release_room(self):  # before the end is written
+            self.broken = self.path.name == 'bag_0.mcap'
+            super().release_room()
+
+    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=10), open_file=BrokenFirst)
+    writer.add_topic('/text', STRING)
+    writer.write('/text', string('x'), 0)
+    named = r'broken\); bag_0\.mcap ends without its summary but with whole chunks'
+    with pytest.raises(RecordingError, match=named):
+        writer.write('/text', string('y'), 10)
+    with pytest.raises(RecordingError, match=named):
+        writer.write('/text', string('z'), 11)
+    assert [text_in(kept.raw) for kept in read_back(tmp_path / 'bag', '/text')] == ['x']
+
+
+@pytest.mark.parametrize('step', [3600, -3600])
+def test_a_step_of_the_log_times_neither_loses_nor_doubles_a_message(tmp_path, step):
+    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=100 * PERIOD))
+    writer.add_topic('/displacement', DISPLACEMENT.type)
+    for index in range(350):
+        ahead = round(1e9 * step) if 50 <= index < 250 else 0
+        writer.write('/displacement', sample(DISPLACEMENT, index), START + index * PERIOD + ahead)
+    writer.close()
+    found = sorted(kept.raw for kept in read_back(tmp_path / 'bag', '/displacement'))
+    assert found == sorted(sample(DISPLACEMENT, index) for index in range(350))
 
 
 def test_rule_given_as_numbers_is_checked_too():

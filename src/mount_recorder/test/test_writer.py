@@ -1,7 +1,11 @@
 """The recording on the disk, held against independent readers and against what can go wrong."""
 
 import contextlib
+import os
 import struct
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from mcap.records import Channel, Chunk, Header, Message, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap_ros2.reader import read_ros2_messages
 from read_back import description, read_back
+from ros_testing import LIMIT
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 from samples import PERIOD, RECORDED, START, sample
@@ -279,6 +284,33 @@ def test_broken_disk_leaves_whole_chunks(tmp_path):
         writer.close()
     with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
         assert sum(isinstance(record, Message) for record in records_until_cut(file)) == kept > 0
+
+
+_LIMITED = """
+import resource, signal, sys
+sys.path[:0] = [{place!r}]
+from test_writer import fill
+from mount_recorder.bag_writer import BagWriter
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
+writer = BagWriter({folder!r})
+_, sentence = fill(writer)
+print(writer.kept, sentence)
+"""
+
+
+def test_a_limit_on_the_size_of_files_ends_the_recording_with_whole_chunks(tmp_path):
+    """On a real file: the system refuses what lies beyond it, and the reserve cannot help."""
+    program = _LIMITED.format(place=str(Path(__file__).parent), folder=str(tmp_path / 'bag'))
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    ended = subprocess.run(
+        [sys.executable, '-c', program], env=environment, capture_output=True, text=True, timeout=LIMIT
+    )
+    assert ended.returncode == 0, ended.stderr
+    kept, _, sentence = ended.stdout.partition(' ')
+    assert 'no space left' in sentence
+    with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
+        assert sum(isinstance(record, Message) for record in records_until_cut(file)) == int(kept) > 1000
 
 
 def test_disk_too_small_to_begin_leaves_nothing_behind(tmp_path):

@@ -26,6 +26,7 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.hydromount import decoupler_overrun, upper_pressure
+from mount_sim.plant.plant import PLANT, STATE, advance
 
 _VEHICLE = int(Seat.VEHICLE)
 
@@ -70,6 +71,20 @@ def imbalance(account: Any) -> float:
     lost = sum(float(account[name]) for name in LOSSES)
     put_in = float(account['road_work'] + account['engine_work'])
     return put_in - lost - float(account['stored'] - account['first_stored'])
+
+
+@compiled
+def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
+    """Advance a plant in a vehicle as `advance` does and book each step in `account`, (1,)."""
+    law = plant.view(PLANT)[0]
+    before = state.copy()
+    for k in range(len(values)):
+        before[:] = state
+        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
+        was, now = before.view(STATE)[0], state.view(STATE)[0]
+        book_step(
+            account[0], law.vehicle, law.hydromount, law.contact, was, now, values[k], engine_forces[k], dt
+        )
 
 
 @compiled

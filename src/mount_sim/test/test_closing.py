@@ -17,7 +17,7 @@ from mount_sim.plant.closing import (
     contact_force,
 )
 from mount_sim.plant.reluctance import ReluctanceActuator, force
-from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
 MAGNET, COIL, MOUNT = ReluctanceActuator(), RippleCoil(), ClosingMechanics()
 WIDE = with_values(MOUNT, contact_gap=250e-6)
@@ -52,9 +52,14 @@ def imbalance(mechanics, current, gap, normal_force):
     return force(MAGNET, current, gap) - spring - normal_force
 
 
-def test_the_gap_path_meets_the_published_one():
+def test_the_gap_path_and_the_inductance_along_it_meet_the_published_ones():
     gaps, _ = settled(MOUNT, [current for current, _, _ in PATH], MOUNT.rest_gap)
     assert 1e6 * gaps == pytest.approx([gap for _, gap, _ in PATH], abs=0.051)
+    found = [
+        1e3 * incremental_inductance(COIL, MAGNET, current, gap)
+        for gap, (current, *_) in zip(gaps, PATH, strict=True)
+    ]
+    assert found == pytest.approx([inductance_mh for *_, inductance_mh in PATH], abs=0.051)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from energy import book_step, imbalance, new_account
+from energy import LOSSES, book_step, imbalance, new_account
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
@@ -103,3 +103,4 @@ def test_what_is_put_in_is_stored_or_dissipated_to_a_thousandth_of_what_the_moun
     taken = sum(account[name] for name in MOUNT_LOSSES[mount])
     assert 0.0 < taken < 0.1 * account['road_work']
     assert abs(imbalance(account)) <= 1e-3 * taken
+    assert all(account[name] >= 0.0 for name in LOSSES)

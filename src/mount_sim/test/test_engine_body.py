@@ -137,6 +137,37 @@ def test_default_engine_has_heave_pitch_and_roll_between_7_and_11_hz():
     assert engine_modes(ENGINE, supports) == pytest.approx([heave, pitch, roll], rel=1e-12)
 
 
+def test_the_energy_of_an_engine_on_several_mounts_is_kept_where_nothing_damps():
+    """Of motion between the times of the step, as in `energy.py`: then exactly."""
+    vehicle, engine = VEHICLE._replace(suspension_damping=0.0), ENGINE._replace(rod=SPRING)
+    supports = [support(x, y, SPRING)._replace(chassis_damping=0.0) for x, y in PLACES]
+    records, beside = support_records(supports), np.zeros(len(supports))
+    now, states = np.zeros(1, BODY_STATE), np.zeros(len(supports), SUPPORT_STATE)
+    now[0]['engine_velocity'], now[0]['roll_rate'], now[0]['pitch_rate'] = 0.1, 0.3, -0.2
+    masses = {
+        'wheel_velocity': 2.0 * vehicle.wheel_mass,
+        'body_velocity': 2.0 * vehicle.body_mass,
+        'engine_velocity': engine.mass,
+        'roll_rate': engine.roll_inertia,
+        'pitch_rate': engine.pitch_inertia,
+    }
+    energies = []
+    for _ in range(4000):
+        was, states_before = now.copy()[0], states.copy()
+        car_step(record(vehicle)[0], 2.0, record(engine)[0], records, now[0], states, 0.0, 0.0, beside, DT)
+        twice = sum(mass * was[name] * now[0][name] for name, mass in masses.items())
+        twice += 2.0 * vehicle.tyre_stiffness * was['wheel_height'] ** 2
+        twice += 2.0 * vehicle.suspension_stiffness * (was['wheel_height'] - was['body_height']) ** 2
+        twice += SPRING.static_stiffness * (engine.rod_lever * was['pitch_angle']) ** 2
+        for each, old, new in zip(supports, states_before, states, strict=True):
+            twice += each.chassis_mass * old['chassis_velocity'] * new['chassis_velocity']
+            twice += each.chassis_stiffness * (was['body_height'] - old['chassis_height']) ** 2
+            twice += SPRING.static_stiffness * old['displacement'] ** 2
+        energies.append(0.5 * twice)
+    assert abs(now[0]['pitch_angle']) > 1e-6
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-9)
+
+
 def test_a_motion_without_stiffness_has_no_frequency():
     free = ENGINE._replace(rod_lever=0.0)
     assert engine_modes(free, [support(0.0, 0.45), support(0.0, -0.45)])[0] == pytest.approx(0.0, abs=1e-6)

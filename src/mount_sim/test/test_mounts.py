@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
+from energy import LOSSES, advance_with_books, imbalance, new_account
 from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
+from mount_sim.electronics.electronics import Noise
 from mount_sim.excitation.array_file import write_excitation
 from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.plant.mounts import MOUNTS, seated_mount
+from mount_sim.plant.plant import PlantSimulation
 from mount_sim.plant.vehicle import Elastomer, Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
@@ -123,4 +126,28 @@ def test_an_unknown_mount_is_refused_with_the_known_ones(parameters):
         _ = parameters(mount='rubber').plant
 
 
-# Energy
+@pytest.mark.parametrize('mount', ['friction', 'hydro'])
+def test_what_road_and_engine_put_into_the_whole_plant_is_stored_or_dissipated(parameters, mount):
+    """To a thousandth of what the mount takes; the current follows the speed as a damper would have it."""
+    settings = parameters(
+        scenario='motorway', mount=mount, timeline__duration=3.0, motorway__gap_depth=0.03,
+        idle__amplitude=200.0,
+    )  # fmt: skip
+    excitation = build_excitation(settings)
+    plant = PlantSimulation(settings.plant, excitation.seat, excitation.step_time)
+    memory, account = plant.memory, new_account()
+    values, forces = excitation.values[:], excitation.engine_forces[:]
+    for first in range(0, len(values), 20):
+        part = slice(first, first + 20)
+        plant.read(np.zeros(Noise.NUMBERS))
+        current = min(0.48 + 8.0 * abs(plant.truth['velocity']), 3.0)
+        advance_with_books(
+            memory.plant, memory.state, account, values[part], forces[part], current, memory.step_time
+        )
+    lost = {name: account[0][name] for name in LOSSES}
+    taken = sum(lost.values()) - lost['suspension_loss'] - lost['chassis_loss']
+    assert account[0]['road_work'] > 20.0
+    assert taken > 0.5
+    assert abs(imbalance(account[0])) <= 1e-3 * taken
+    assert min(lost.values()) >= 0.0
+    assert (lost['sliding_loss'] > 0.0, lost['track_loss'] > 0.0) == (mount == 'friction', mount == 'hydro')
