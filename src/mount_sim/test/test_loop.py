@@ -12,13 +12,13 @@ import pytest
 
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
-from mount_driver.quantisation import quantised_displacement
 from mount_ros.testing import LIMIT
 from mount_sim.car_loop import CarLoop, until_ending
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
 from mount_sim.loop import ElectronicsLoop, NoAnswerError
 from mount_sim.plant.simulated_mount import DivergedError
+from mount_sim.quantisation import quantised_displacement
 
 CODEC = MountCodec()
 _channels = itertools.count()

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults.schedule import Faults
 from mount_sim.excitation.shaking import Shaking
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
+from mount_sim.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 
 FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
 """Range of the displacement sensor to either side, m: that of its signal on the bus."""

@@ -12,7 +12,6 @@ from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns
 from mount_bringup.chosen import Parameters
 from mount_bringup.settings import check_sample_rate
-from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.electronics import Reading, status_every
@@ -23,6 +22,7 @@ from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import ALONE
 from mount_sim.plant.simulated_car import SimulatedCar
 from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.quantisation import quantised_coil_temperature, quantised_setpoint_current
 
 BLOCK = 1000
 """Samples, chosen: packed and written together."""
