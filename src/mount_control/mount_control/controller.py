@@ -56,7 +56,8 @@ class ControlLaw:
     def __init__(self, settings: ControlSettings, table: force_maker.CurrentTable):
         self.compiled = compiled_with(settings.policy)
         sample_time = 1.0 / settings.parameters.sample_rate
-        maker = force_maker.design(settings.friction, settings.contact, table.limits, sample_time)
+        fade = round(force_maker.FADE_TIME / sample_time)
+        maker = force_maker.Law(settings.friction, settings.contact, table.limits, sample_time, fade)
         self.record = record_bytes(self.compiled.law(settings.design.law, maker))
         self.tables = Tables(settings.design.table, table.currents)
         self.window = np.zeros(settings.design.window)

@@ -10,7 +10,7 @@ from mount_control.controller import ControlLaw, Controller
 from mount_control.policy import continuous_viscous
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_control.settings import check_effect, control_settings, defaults, run_time_parameters
+from mount_control.settings import control_settings, defaults, run_time_parameters
 from mount_models.quantity import ParameterError, quantities
 from mount_models.specimen import default_specimen
 
@@ -137,17 +137,3 @@ def test_a_force_that_would_drive_is_no_force(make, sine, monkeypatch, table_row
 
 def test_the_continuous_law_is_the_default():
     assert control_settings({}, default_specimen()).policy is continuous_viscous
-
-
-def test_a_parameter_of_another_policy_is_told_with_both_names_and_the_remedy():
-    check_effect({'policy': 'switched_viscous', 'damper': 'degressive', 'highest_current': 2.0})
-    check_effect({'damper': 'degressive'}, 'switched_viscous')
-    check_effect({'continuous_viscous.quality': 0.7, 'longest_bridge': 0.01})
-    check_effect({'policy': 'switched_viscous', 'quality': 0.7}, 'continuous_viscous')
-    with pytest.raises(ParameterError, match='damper, quality of the policy switched_viscous would'):
-        check_effect({'quality': 0.7, 'damper': 'degressive'})
-    told = (
-        'the chosen policy is switched_viscous; set mount_control.policy to continuous_viscous, or leave it'
-    )
-    with pytest.raises(ParameterError, match=told):
-        check_effect({'continuous_viscous.quality': 0.7}, 'switched_viscous')
