@@ -7,7 +7,7 @@ from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import POLICIES
 from mount_control.settings import control_settings
 from mount_init.initialisation import load_compiled_laws
-from mount_models.arithmetic.compiled import compilation_told
+from mount_models.arithmetic.compiled import log_compilation
 from mount_models.specimen import chosen_specimen
 from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
@@ -32,7 +32,7 @@ def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tup
 
 def main() -> None:
     """Compile the laws for this machine, so that the first start of the graph need not."""
-    with compilation_told(_say):
+    with log_compilation(_say):
         prepare()
     _say('the laws are compiled for this machine')
 

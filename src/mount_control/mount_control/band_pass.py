@@ -3,8 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import sine_and_cosine
 from mount_models.arithmetic.record import record_type
@@ -78,13 +76,6 @@ def transfer(old, new, state):
 
 
 @compiled
-def _filter(band_pass, z1, z2, value):
-    """Return the band-passed value and the next state (transposed direct form II)."""
-    banded = band_pass.gain * value + z1
-    return banded, z2 - band_pass.a1 * banded, -band_pass.gain * value - band_pass.a2 * banded
-
-
-@compiled
 def step(band_pass, state, displacement):
     """Take one sample; return (band displacement m, band velocity m/s, predicted velocity m/s).
 
@@ -92,19 +83,11 @@ def step(band_pass, state, displacement):
     displacement is the filtered velocity (Fig. 12), with one filter instead of two.
     """
     before = state.displacement
-    banded, state.z1, state.z2 = _filter(band_pass, state.z1, state.z2, displacement)
+    banded = band_pass.gain * displacement + state.z1  # transposed direct form II
+    state.z1 = state.z2 - band_pass.a1 * banded
+    state.z2 = -band_pass.gain * displacement - band_pass.a2 * banded
     state.displacement = banded
     state.earlier = before
     velocity = (banded - before) / band_pass.sample_time
     predicted = band_pass.from_velocity * velocity + band_pass.from_displacement * banded
     return banded, velocity, predicted
-
-
-@compiled
-def filtered(band_pass, signal):
-    """Return all samples (n,) of a signal that was 0 before, band-passed; of any unit."""
-    banded = np.empty_like(signal)
-    z1 = z2 = 0.0
-    for place, value in enumerate(signal):
-        banded[place], z1, z2 = _filter(band_pass, z1, z2, value)
-    return banded

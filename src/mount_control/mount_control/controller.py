@@ -1,7 +1,7 @@
 """From a displacement sample to a coil current: a policy says which force, the force maker makes it.
 
-The step in reading order is `_step`; the policy has its place in `_decide`. All of it is compiled
-once for each policy, with its functions and records in it: written out for two policies it would stand twice.
+The step in reading order is `_step`; policy and force maker have their place in `_advance`. All of it is
+compiled once for each policy, with its functions and records in it: written out it would stand twice.
 """
 
 import functools
@@ -20,7 +20,6 @@ from mount_models.arithmetic.record import record_bytes, record_dtype, record_ty
 
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 _EXPONENT = 0x7FF0000000000000  # bits that are all set where a float64 is no finite number
-_AHEAD = 64  # samples, chosen: so far the policy is ahead of the force maker in a run
 
 
 class Tables(NamedTuple):
@@ -57,7 +56,8 @@ class ControlLaw:
     def __init__(self, settings: ControlSettings, table: force_maker.CurrentTable):
         self.compiled = compiled_with(settings.policy)
         sample_time = 1.0 / settings.parameters.sample_rate
-        maker = force_maker.design(settings.friction, settings.contact, table.limits, sample_time)
+        fade = round(force_maker.FADE_TIME / sample_time)
+        maker = force_maker.Law(settings.friction, settings.contact, table.limits, sample_time, fade)
         self.record = record_bytes(self.compiled.law(settings.design.law, maker))
         self.tables = Tables(settings.design.table, table.currents)
         self.window = np.zeros(settings.design.window)
@@ -144,8 +144,8 @@ def compiled_with(policy: Policy) -> Compiled:
     )
     trace = trace_dtype(policy)
     bound: dict[str, Any] = {'policy': policy, 'LAW': record_dtype(law), 'STATE': state, 'TRACE': trace}
-    bound['OF_POLICY'], bound['OF_TRACE'] = policy.STATE.itemsize // 8, len(trace)
-    for function in (_rest, _refuse, _clear, _decide, _make, _step, _decide_ahead, _make_behind):
+    bound['OF_TRACE'] = len(trace)
+    for function in (_rest, _refuse, _clear, _advance, _step):
         bound[function.__name__] = specialised(function, policy.__name__, bound)
     interface = (specialised(each, policy.__name__, bound) for each in (_start, _transfer, _single, _run))
     return Compiled(law, state, trace, *interface)
@@ -156,7 +156,6 @@ def compiled_with(policy: Policy) -> Compiled:
 
 policy: Any = None
 LAW = STATE = TRACE = np.dtype([])
-OF_POLICY = 0  # numbers of its state, with which that of the controller begins
 OF_TRACE = 0  # numbers
 
 
@@ -183,49 +182,14 @@ def _single(law, tables, state, window, trace, displacement, bridged_samples):
 
 
 def _run(law, tables, state, window, traces, displacements):
-    """Fill `traces` with one step for each displacement; arguments as for `_single`.
-
-    In blocks first all by the policy, then all by the force maker: the processor overlaps the steps of
-    either, but not of both in turn (a third faster). A policy that is ahead when the memory of the force
-    maker is spoiled needs no way back, for then both are cleared.
-    """
+    """Fill `traces` with one step for each displacement; arguments as for `_single`."""
     mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
     sound = _all_finite(mount[3])
-    records, numbers, place = traces.view(TRACE), traces.view(np.float64), 0
-    wanted = np.empty((_AHEAD, 3))
-    while place < len(displacements):
-        end = min(place + _AHEAD, len(displacements))
-        if sound:
-            decided = _decide_ahead(mount, records[place:end], displacements[place:end], wanted)
-            place += _make_behind(mount, records[place : place + decided], wanted)
-        if place < end:  # too far, or the memory is spoiled
-            of_sample = numbers[place * OF_TRACE : (place + 1) * OF_TRACE]
-            _step(mount, False, of_sample, records[place], displacements[place], 0)
-            sound = sound or abs(displacements[place]) <= FARTHEST_DISPLACEMENT
-            place += 1
-
-
-def _decide_ahead(mount, traces, displacements, wanted):
-    """Let the policy take samples and fill `wanted`; return how many before one that is too far or spoils."""
-    _, _, _, bits, _ = mount
-    for index in range(len(displacements)):
-        if not abs(displacements[index]) <= FARTHEST_DISPLACEMENT:  # also NaN
-            return index
-        wanted[index] = _decide(mount, traces[index], displacements[index])
-        if not _all_finite(bits[:OF_POLICY]):
-            return index
-    return len(displacements)
-
-
-def _make_behind(mount, traces, wanted):
-    """Let the force maker take what the policy wants; return how many samples before one that spoils."""
-    _, _, _, bits, _ = mount
-    for index in range(len(traces)):
-        traces[index].bridged_samples = 0
-        sound = _make(mount, traces[index], wanted[index])
-        if not (sound and _all_finite(bits[OF_POLICY:])):
-            return index
-    return len(traces)
+    records, numbers = traces.view(TRACE), traces.view(np.float64)
+    for place in range(len(displacements)):
+        of_sample = numbers[place * OF_TRACE : (place + 1) * OF_TRACE]
+        _step(mount, sound, of_sample, records[place], displacements[place], 0)
+        sound = sound or abs(displacements[place]) <= FARTHEST_DISPLACEMENT
 
 
 def _step(mount, sound, numbers, trace, displacement, bridged_samples):
@@ -237,27 +201,22 @@ def _step(mount, sound, numbers, trace, displacement, bridged_samples):
         return _clear(mount, numbers, trace, displacement)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
-        _make(mount, trace, _decide(mount, trace, state.displacement + rise))
+        _advance(mount, trace, state.displacement + rise)
     trace.bridged_samples = bridged_samples
-    sound = _make(mount, trace, _decide(mount, trace, displacement))
-    if not (sound and _all_finite(bits)):
+    if not (_advance(mount, trace, displacement) and _all_finite(bits)):
         return _clear(mount, numbers, trace, displacement)
     return trace.current
 
 
-def _decide(mount, trace, displacement):
-    """Let the policy take one sample; return the force (N), velocity (m/s) and activity that it wants."""
+def _advance(mount, trace, displacement):
+    """Let policy and force maker take one sample; return whether all results are finite numbers."""
     law, tables, state, _, window = mount
     trace.displacement = displacement
     trace.velocity = (displacement - state.displacement) / law.maker.sample_time
     state.displacement = displacement
-    return policy.step(law.policy, tables.policy, state.policy, window, trace, displacement)
-
-
-def _make(mount, trace, wanted):
-    """Let the force maker make what the policy wants; return whether all results are finite numbers."""
-    law, tables, state, _, _ = mount
-    force, velocity, active = wanted[0], wanted[1], wanted[2]
+    force, velocity, active = policy.step(
+        law.policy, tables.policy, state.policy, window, trace, displacement
+    )
     normal_force, coefficient, current = force_maker.make(
         law.maker, tables.current, state.maker, force, velocity, active
     )

@@ -104,16 +104,6 @@ def resample(
     )
 
 
-def design(
-    friction: FrictionCoefficients,
-    contact: FrictionContact,
-    limits: CurrentLimits,
-    sample_time: float,
-) -> Law:
-    """Return the law for samples that come `sample_time` s apart."""
-    return Law(friction, contact, limits, sample_time, round(FADE_TIME / sample_time))
-
-
 @compiled
 def begin_fade(law, state):
     """Let the current go over to a new law from where it is; off, the new law acts at once."""

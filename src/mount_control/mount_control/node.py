@@ -26,7 +26,7 @@ from mount_control.settings import (
     run_time_parameters,
     without_effect,
 )
-from mount_models.arithmetic.compiled import compilation_told
+from mount_models.arithmetic.compiled import log_compilation
 from mount_models.damper import DamperError, damper_text
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
@@ -91,7 +91,7 @@ class MountControl(SafeLifecycleNode):
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
         self._trace = ScalarsLayout(self.trace_topic)
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
-        with compilation_told(self.get_logger().info):
+        with log_compilation(self.get_logger().info):
             load_compiled_law(self._settings)
         self.loop.measured_before = bool(self.get_parameter(_MEASURED_BEFORE[0]).value)
         path = self.open_data_path()

@@ -165,9 +165,8 @@ def _reason(law, now, displacement, missing):
 def _believed(limits, memory, displacements):
     before = memory.copy()
     for index in range(len(displacements)):
+        before[:] = memory
         if doubt_of(limits, memory, displacements[index], 0):
             memory[:] = before
-            for earlier in range(index):  # a copy at each sample would cost more
-                doubt_of(limits, memory, displacements[earlier], 0)
             return index
     return len(displacements)

@@ -11,7 +11,7 @@ from mount_control.policy.contract import Design, Policy
 from mount_control.policy.registry import DEFAULT, POLICIES, chosen_policy, prefix_of
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact, check_friction
-from mount_models.quantity import ParameterError, Quantity, flattened, with_flattened, with_values
+from mount_models.quantity import Quantity, flattened, with_flattened, with_values
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SampleRate, sample_time_ns
 from mount_models.specimen import Specimen, SpecimenError
 from mount_models.specimen_choice import SpecimenChoice
@@ -48,10 +48,6 @@ class ControlParameters(NamedTuple):
     highest_current: Annotated[
         float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
     ] = HIGHEST_CURRENT
-
-
-class NoEffectError(ParameterError):
-    """A parameter belongs to another policy than the chosen one; the text names both."""
 
 
 class ControlSettings(NamedTuple):
@@ -132,16 +128,6 @@ def without_effect(names: Iterable[str], chosen: str) -> str:
                 f'{"it" if len(idle) == 1 else "them"} out'
             )
     return ''
-
-
-def check_effect(values: Mapping[str, Any], chosen: str = '') -> None:
-    """Raise `NoEffectError` if {parameter: value} name one of another policy than the chosen one.
-
-    That is the one that they name, else `chosen`, else the default.
-    """
-    policy = values.get('policy') or chosen or ControlParameters().policy
-    if sentence := without_effect(values, policy):
-        raise NoEffectError(sentence)
 
 
 def check_fits(parameters: ControlParameters, specimen: Specimen) -> None:

@@ -89,16 +89,6 @@ def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_lo
     assert max(expected[3100:]) > 0.4
 
 
-def test_two_parts_are_the_whole(make_loop, sine):
-    stamps, displacements = START + MS * np.arange(1, 601), sine(8.0, 1e-3, 0.6)
-    parts, whole = make_loop(), make_loop()
-    found = [parts.step_many(stamps[part], displacements[part]) for part in (slice(250), slice(250, 600))]
-    expected = whole.step_many(stamps, displacements)
-    assert np.concatenate([answers.traces for answers in found]).tobytes() == expected.traces.tobytes()
-    assert parts.counts == whole.counts
-    assert expected.currents.max() > 0.5
-
-
 def test_the_answer_is_the_controller_s(make_loop, make_settings, table_rows, sine):
     loop, chosen = make_loop(), make_settings(switching='always')
     controller = Controller(ControlLaw(chosen, chosen.table(*table_rows)))
@@ -202,13 +192,6 @@ def test_each_sample_has_its_judgement(make_loop):
     assert loop.last == START + 1005 * MS
 
 
-def test_samples_in_time_are_used(loop):
-    assert judged(loop, 401, 402, 403) == [(Judgement.USE, 0)] * 3
-    assert loop.counts == SampleCounts(samples=4, restarts=1)
-    assert loop.expects(START + 404 * MS)
-    assert not loop.expects(START + 405 * MS)
-
-
 @pytest.mark.parametrize('jitter', [-0.49, -0.1, 0.1, 0.49])
 def test_a_stamp_a_little_early_or_late_is_no_missing_sample(loop, jitter):
     assert judged(loop, 401 + jitter) == [(Judgement.USE, 0)]
@@ -231,18 +214,6 @@ def test_repeated_and_overtaken_samples_are_ignored(loop, late_by):
     assert judged(loop, 402 - late_by) == [(Judgement.IGNORE, 0)]
     assert loop.counts.ignored == 1
     assert judged(loop, 403) == [(Judgement.USE, 0)]
-
-
-@pytest.mark.parametrize('displacement', [math.nan, math.inf, -math.inf, 0.020001, -0.020001])
-def test_what_no_sensor_can_mean_is_invalid(loop, displacement):
-    assert judged(loop, 401, displacement=displacement) == [(Judgement.INVALID, 0)]
-    assert (loop.counts.invalid, loop.counts.samples) == (1, 1)
-
-
-@pytest.mark.parametrize('displacement', [0.020, -0.020])
-def test_the_end_of_the_range_still_counts(loop, displacement):
-    judged(loop, *range(401, 420), displacement=math.nan)  # so that it can have moved there
-    assert judged(loop, 420, displacement=displacement) == [(Judgement.USE, 19)]
 
 
 def test_invalid_samples_are_bridged_like_missing_ones(loop):
@@ -321,14 +292,6 @@ def test_a_sender_noticed_by_its_stamps_is_told_by_its_name_as_soon_as_discovery
     chosen = make_settings()
     loop.begin(chosen, chosen.table(*table_rows), START)
     assert (loop.foreign, loop.nameless) == ('', False)
-
-
-def test_repeated_samples_now_and_then_are_no_second_sender(loop):
-    for second in range(5):
-        begin = 400 + 800 * second
-        assert judged(loop, begin + 1, begin + 1)[1] == (Judgement.IGNORE, 0)
-        judged(loop, *range(begin + 2, begin + 800))
-    assert loop.foreign == ''
 
 
 def test_another_writer_is_heeded_from_the_next_usual_sample_on(loop):

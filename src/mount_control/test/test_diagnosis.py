@@ -43,11 +43,6 @@ def _judged(**changes):
     return judged.level, judged.sentence
 
 
-def test_all_is_well():
-    assert _judged() == (Level.OK, 'damping off')
-    assert _judged(damping_active=True) == (Level.OK, 'damping on')
-
-
 def test_an_outdated_table_is_an_error_with_its_reason():
     level, sentence = _judged(refusal='the measurements were interrupted', silence=9.0)
     assert (level, sentence) == (Level.ERROR, '0 A: the measurements were interrupted')

@@ -96,26 +96,6 @@ def test_missing_samples_make_no_noise_and_no_velocity(lost):
     assert not any(found)
 
 
-@pytest.mark.parametrize('fault', ['none', 'step', 'stuck', 'noisy'])
-def test_many_samples_at_once_are_those_taken_one_by_one(fault):
-    motion = moving(4000)
-    if fault == 'step':
-        motion[1000:] += 2e-3
-    elif fault == 'stuck':
-        motion[1000:1200] = motion[1000]
-    elif fault == 'noisy':
-        motion[1000:1500] += np.random.default_rng(8).normal(0.0, 1e-4, 500)
-    expected, single = doubted(motion)
-    many, found = Plausibility(ControlParameters()), []
-    while len(found) < len(motion):
-        believed = many.believed(motion[len(found) :])
-        found += [False] * believed
-        if len(found) < len(motion):
-            found.append(doubt(many, motion[len(found)]))
-    assert found == expected
-    assert many.memory.tobytes() == single.memory.tobytes()
-
-
 def test_limits_can_be_chosen():
     motion = moving(3000)
     motion[1000:] += 2e-3

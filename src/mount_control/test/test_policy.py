@@ -7,10 +7,10 @@ import pytest
 import viscous_example
 
 from mount_control.controller import ControlLaw, Controller
-from mount_control.policy import continuous_viscous, switched_viscous
+from mount_control.policy import continuous_viscous
 from mount_control.policy.contract import trace_fields
-from mount_control.policy.registry import POLICIES, chosen_policy
-from mount_control.settings import check_effect, control_settings, defaults, run_time_parameters
+from mount_control.policy.registry import POLICIES
+from mount_control.settings import control_settings, defaults, run_time_parameters
 from mount_models.quantity import ParameterError, quantities
 from mount_models.specimen import default_specimen
 
@@ -42,11 +42,6 @@ def test_a_policy_has_parameters_of_its_own_under_its_name():
     assert known['damper'] == 'viscous_2000'  # the first has no prefix
     assert {'viscous_example.damping_coefficient', 'damper', 'quality'} <= run_time_parameters()
     assert 'policy' not in run_time_parameters()
-
-
-def test_an_unknown_policy_is_refused_with_the_known_ones():
-    with pytest.raises(ParameterError, match="policy 'soft' is unknown; known are switched_viscous"):
-        chosen_policy('soft')
 
 
 def test_a_parameter_out_of_range_is_refused_by_its_full_name():
@@ -89,16 +84,6 @@ def test_a_policy_begins_at_rest(make, policy):
     own = [name for name, unit in POLICIES[policy].TRACE.items() if unit in LENGTHS]
     assert 'predicted_velocity' in own
     assert [trace[name] for name in (*own, 'velocity', 'bridged_samples')] == [0.0] * (len(own) + 2)
-
-
-@pytest.mark.parametrize('policy', ALL)
-def test_single_steps_are_a_run_to_the_bit(make, sine, policy):
-    displacement = sine(8.0, 1.3e-3, 0.5) + sine(21.0, 0.2e-3, 0.5)
-    single, whole = make(policy=policy), make(policy=policy)
-    traces = whole.run(displacement)
-    for number, x in enumerate(displacement):
-        assert single.step(x) == traces['current'][number]
-        assert single.trace_record.tobytes() == traces[number].tobytes()
 
 
 @pytest.mark.parametrize('policy', ALL)
@@ -152,25 +137,3 @@ def test_a_force_that_would_drive_is_no_force(make, sine, monkeypatch, table_row
 
 def test_the_continuous_law_is_the_default():
     assert control_settings({}, default_specimen()).policy is continuous_viscous
-
-
-def test_a_parameter_of_another_policy_is_told_with_both_names_and_the_remedy():
-    check_effect({'policy': 'switched_viscous', 'damper': 'degressive', 'highest_current': 2.0})
-    check_effect({'damper': 'degressive'}, 'switched_viscous')
-    check_effect({'continuous_viscous.quality': 0.7, 'longest_bridge': 0.01})
-    check_effect({'policy': 'switched_viscous', 'quality': 0.7}, 'continuous_viscous')
-    with pytest.raises(ParameterError, match='damper, quality of the policy switched_viscous would'):
-        check_effect({'quality': 0.7, 'damper': 'degressive'})
-    told = (
-        'the chosen policy is switched_viscous; set mount_control.policy to continuous_viscous, or leave it'
-    )
-    with pytest.raises(ParameterError, match=told):
-        check_effect({'continuous_viscous.quality': 0.7}, 'switched_viscous')
-
-
-def test_what_a_policy_says_for_reports():
-    own = switched_viscous.Parameters(damper='viscous_1000')
-    assert switched_viscous.levels(own) == {'switch-on level': 0.0008, 'switch-off level': 0.00035}
-    time = 1e-3 * np.arange(4000)
-    force = switched_viscous.wanted_force(own, 0.05 * np.sin(2.0 * np.pi * 8.0 * time))
-    assert force[2000:].max() == pytest.approx(46.0, rel=0.01)  # N: 1000 N s/m beyond the 4 mm/s

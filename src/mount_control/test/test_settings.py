@@ -13,13 +13,6 @@ from mount_models.specimen import default_specimen
 PAPER = {'policy': 'switched_viscous'}
 
 
-def test_the_defaults_are_settings():
-    settings = control_settings({**defaults(), **PAPER}, default_specimen())
-    assert settings.parameters.displacement_range == 0.02
-    assert settings.friction == FrictionCoefficients()
-    assert settings.design.window == 125
-
-
 def test_what_is_not_named_is_the_specimen_s():
     specimen = replace(default_specimen(), friction={'a_p1': 0.4, 'a_p2': 0.05})
     settings = control_settings({**PAPER, 'friction.a_p2': 0.06, 'quality': 0.7}, specimen)

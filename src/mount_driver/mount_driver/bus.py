@@ -80,18 +80,22 @@ def open_bus(
     """
     filters = [{'can_id': number, 'can_mask': 0x7FF, 'extended': False} for number in receive] or None
     tried = f'CAN interface {interface!r}, channel {channel!r}'
+    options: dict[str, Any] = {}
+    if interface == 'udp_multicast':
+        tried += f', port {port}'
+    elif interface == 'virtual':
+        options['protocol'] = can.CanProtocol.CAN_FD
+    elif interface != 'socketcan':
+        tried += f', {bitrate} and {data_bitrate} bit/s'
+        options |= {'bitrate': bitrate, 'data_bitrate': data_bitrate}
     try:
-        if interface == 'udp_multicast':
-            tried += f', port {port}'
-            bus: can.BusABC = LoopbackMulticastBus(channel, port, can_filters=filters)
-        elif interface == 'socketcan':
+        if interface == 'socketcan':
             _check_socketcan(channel)
-            bus = _python_can_bus(interface, channel, filters)
-        elif interface == 'virtual':
-            bus = _python_can_bus(interface, channel, filters, protocol=can.CanProtocol.CAN_FD)
-        else:
-            tried += f', {bitrate} and {data_bitrate} bit/s'
-            bus = _python_can_bus(interface, channel, filters, bitrate=bitrate, data_bitrate=data_bitrate)
+        if interface == 'udp_multicast':
+            bus: can.BusABC = LoopbackMulticastBus(channel, port, can_filters=filters)
+        else:  # without python-can's configuration files: only our own parameters decide
+            options |= {'can_filters': filters, 'fd': True, 'ignore_config': True}
+            bus = can.Bus(interface=interface, channel=channel, **options)
     except Exception as error:
         # The adapters of python-can raise whatever they like, even NameError where a driver is missing.
         remedy = _remedy(interface, channel, error, bitrate, data_bitrate)
@@ -175,13 +179,6 @@ class LoopbackMulticastBus(can.BusABC):
 
     def _apply_filters(self, filters: Any) -> None:
         self._received = {entry['can_id'] for entry in filters or ()}  # what is not here python-can looks at
-
-
-def _python_can_bus(interface: str, channel: str, filters: Any, **options: Any) -> can.BusABC:
-    # Without python-can's configuration files: only our own parameters decide.
-    return can.Bus(
-        interface=interface, channel=channel, can_filters=filters, fd=True, ignore_config=True, **options
-    )
 
 
 def _check_socketcan(channel: str, interfaces: Path = Path('/sys/class/net')) -> None:

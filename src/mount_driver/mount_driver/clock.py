@@ -4,7 +4,6 @@
 """
 
 import math
-from typing import Protocol
 
 from mount_models.sampling import SAMPLE_TIME_NS
 
@@ -25,25 +24,11 @@ _TRUSTED_NS = 5_000_000  # ns, chosen: of a block without any frame in time the 
 _BLOCKS_TO_BELIEVE = 8  # chosen: 4 s in which every frame is late are no pause but an error of the mapping
 
 
-class Clock(Protocol):
-    """Gives samples their stamps and counts what interrupted the electronics' counter."""
-
-    lockstep: bool
-    """Whether ages are judged by the stamps."""
-    restarts: int
-    gaps: int
-
-    def stamp(self, microseconds: int, received_monotonic_ns: int) -> int:
-        """Return the ROS time (ns) of the sample taken at `microseconds` and received at the steady time."""
-
-    def now(self, monotonic_ns: int) -> int:
-        """Return the time (ns) by which ages are judged at the steady time."""
-
-
 class CounterClock:
     """Stamps are the electronics' own counter from zero, unwrapped: for lock-step, where no other time is."""
 
     lockstep = True
+    """Whether ages are judged by the stamps."""
 
     def __init__(self, sample_time: int = SAMPLE_TIME_NS) -> None:
         """`sample_time` in ns."""
@@ -176,3 +161,7 @@ class ElectronicsClock:
             self.gaps += 1
         else:
             self.restarts += 1
+
+
+Clock = CounterClock | ElectronicsClock
+"""Gives samples their stamps and counts what interrupted the electronics' counter."""

@@ -8,8 +8,6 @@ call of a compiled bit field does the work. A test holds the result against cant
 import math
 from collections.abc import Sequence
 from decimal import Decimal
-from operator import itemgetter
-from typing import Any
 
 import bitstruct.c
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
@@ -18,10 +16,7 @@ from mount_driver.can_library import Message, Signal
 
 # Steps from the DBC's units to SI; other units are kept and appear in the name of the field.
 _SI_FACTORS = {'mm': Decimal('0.001')}
-
-
-class DatabaseError(ValueError):
-    """The DBC does not describe what this driver needs; the text says what is missing."""
+_E2E_ATTRIBUTES = 'E2EDataId', 'E2EMaxDeltaCounter', 'E2ESyncFrames'
 
 
 class OutOfRangeError(ValueError):
@@ -36,16 +31,12 @@ class Scaling:
     """One signal between its SI value and its raw whole number, with the limits of the DBC."""
 
     def __init__(self, signal: Signal):
-        scale = Decimal(str(signal.scale)) * _SI_FACTORS.get(signal.unit or '', Decimal(1))
-        self.steps = float(1 / scale)  # raw steps per SI unit
-        if signal.offset or not self.steps.is_integer():
-            raise DatabaseError(
-                f'{signal.name}: factor {signal.scale} and offset {signal.offset} are not usable; '
-                f'needed are offset 0 and a whole number of steps per unit'
-            )
+        scale = Decimal(str(signal.scale))
+        self.steps = float(1 / (scale * _SI_FACTORS.get(signal.unit or '', Decimal(1))))  # raw per SI unit
         self.name = signal.name
         self.unit = 'm' if signal.unit == 'mm' else (signal.unit or '1')
-        self.raw_low, self.raw_high = (_raw_limit(signal, limit) for limit in ('minimum', 'maximum'))
+        limits = signal.minimum, signal.maximum
+        self.raw_low, self.raw_high = (round(Decimal(str(limit)) / scale) for limit in limits)
         self.low, self.high = self.to_si(self.raw_low), self.to_si(self.raw_high)
 
     def to_raw(self, value: float) -> int:
@@ -68,33 +59,26 @@ class Scaling:
 
 
 class MessageLayout:
-    """Packs and unpacks the raw numbers of one message, in the order of `names`."""
+    """Packs and unpacks the raw numbers of one message, in the order of the wire."""
 
-    def __init__(self, message: Message, names: Sequence[str]):
+    def __init__(self, message: Message):
         signals = sorted(message.signals, key=lambda signal: signal.start)
-        known = [signal.name for signal in signals]
-        if sorted(known) != sorted(names):
-            raise DatabaseError(f'{message.name} has the signals {known}; this driver needs {list(names)}')
         self.name = message.name
-        self.names = tuple(names)
+        self.names = tuple(signal.name for signal in signals)
         self.frame_id = message.frame_id
         self.length = message.length
-        self.data_id = _attribute(message, 'E2EDataId')
-        self.max_delta_counter = _attribute(message, 'E2EMaxDeltaCounter')
-        self.sync_frames = _attribute(message, 'E2ESyncFrames')
-        bits = bitstruct.c.compile(_reversed_bit_format(message, signals))
+        attributes = message.dbc.attributes
+        self.data_id, self.max_delta_counter, self.sync_frames = (
+            attributes[name].value for name in _E2E_ATTRIBUTES
+        )
+        bits = bitstruct.c.compile(_reversed_bit_format(message.length, signals))
         self.pack_bits, self.unpack_bits = bits.pack, bits.unpack
-        """Between the raw numbers in the order of the wire and the reversed bytes of a message."""
-        # The bit format runs from the last bit to the first.
-        known.reverse()
-        self.to_wire = itemgetter(*(list(names).index(name) for name in known))
-        self.from_wire = itemgetter(*(known.index(name) for name in names))
-        """Returns the raw numbers in the order of `names`, from those that `unpack_bits` returns."""
+        """Between the raw numbers, the last one first, and the reversed bytes of a message."""
 
     def pack(self, raw: Sequence[int]) -> bytearray:
         """Return the message with these raw numbers and its CRC; raises `OutOfRangeError`."""
         try:
-            data = bytearray(self.pack_bits(*self.to_wire(raw)))
+            data = bytearray(self.pack_bits(*raw[::-1]))
         except OverflowError:
             numbers = ', '.join(f'{name} {number}' for name, number in zip(self.names, raw, strict=True))
             raise OutOfRangeError(f'{self.name}: a number does not fit its bits: {numbers}') from None
@@ -108,35 +92,14 @@ class MessageLayout:
             raise FrameError(f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC has {self.length}')
         if not e2e_p05_check(data, self.data_id):
             raise FrameError(f'frame 0x{self.frame_id:X} fails its CRC; the frame is not used')
-        return self.from_wire(self.unpack_bits(data[::-1]))
+        return self.unpack_bits(data[::-1])[::-1]
 
 
-def _raw_limit(signal: Signal, limit: str) -> int:
-    value = getattr(signal, limit)
-    if value is None:
-        raise DatabaseError(f'{signal.name} has no {limit} in the DBC; every signal needs its limits')
-    return round(Decimal(str(value)) / Decimal(str(signal.scale)))
-
-
-def _attribute(message: Message, name: str) -> Any:
-    attributes = message.dbc.attributes if message.dbc else {}
-    if name not in attributes:
-        raise DatabaseError(f'{message.name} has no attribute {name} in the DBC')
-    return attributes[name].value
-
-
-def _reversed_bit_format(message: Message, signals: list[Signal]) -> str:
+def _reversed_bit_format(length: int, signals: Sequence[Signal]) -> str:
     # Little-endian signals are contiguous bit fields once the order of the bytes is reversed.
-    fields: list[str] = []
-    position = 0
+    fields, position = '', 0
     for signal in signals:
-        if signal.byte_order != 'little_endian' or signal.start < position or signal.is_float:
-            raise DatabaseError(
-                f'{signal.name} must be a little-endian whole number apart from other signals'
-            )
-        fields.append(f'p{signal.start - position}' if signal.start > position else '')
-        fields.append(f'{"s" if signal.is_signed else "u"}{signal.length}')
+        gap = f'p{signal.start - position}' if signal.start > position else ''
+        fields = f'{"s" if signal.is_signed else "u"}{signal.length}{gap}{fields}'
         position = signal.start + signal.length
-    rest = message.length * 8 - position
-    fields.append(f'p{rest}' if rest else '')
-    return ''.join(reversed(fields))
+    return f'p{8 * length - position}{fields}' if 8 * length > position else fields

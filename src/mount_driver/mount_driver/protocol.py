@@ -19,34 +19,6 @@ M = TypeVar('M')
 
 DATABASE_FILE = Path(__file__).parent / 'dbc' / 'mount.dbc'
 
-_HEADER = ('Crc', 'AliveCounter')
-_MEASUREMENT = (
-    *_HEADER,
-    'DisplacementValid',
-    'CurrentValid',
-    'RippleValid',
-    'Enabled',
-    'SetpointTimeout',
-    'CurrentLimited',
-    'SampleCounter',
-    'Microseconds',
-    'Displacement',
-    'CoilCurrent',
-    'CurrentRate',
-    'FluxRate',
-)
-_SETPOINT = (*_HEADER, 'Current', 'AnsweredCounter', 'Enable')
-_STATUS = (
-    *_HEADER,
-    'SupplyVoltage',
-    'CoilTemperature',
-    'OverTemperature',
-    'OverCurrent',
-    'UnderVoltage',
-    'SetpointTimeout',
-    'DisplacementSensor',
-    'E2EError',
-)
 _VOLTAGE_NOT_AVAILABLE = 65535  # value tables of the DBC
 _TEMPERATURE_NOT_AVAILABLE = -32768
 _LOOK_BACK = 16  # frames, chosen: a sequence that goes on so soon after it was left still has its sender
@@ -114,19 +86,14 @@ class MountCodec:
     def __init__(self, database_file: Path = DATABASE_FILE):
         database = Database()
         database.add_dbc_file(database_file)
-        measurement = database.get_message_by_name('MountMeasurement')
-        setpoint = database.get_message_by_name('MountSetpoint')
-        status = database.get_message_by_name('MountStatus')
-        self.measurement = MessageLayout(measurement, _MEASUREMENT)
-        self.setpoint = MessageLayout(setpoint, _SETPOINT)
-        self.status = MessageLayout(status, _STATUS)
-        self.displacement = Scaling(measurement.get_signal_by_name('Displacement'))
-        self.coil_current = Scaling(measurement.get_signal_by_name('CoilCurrent'))
-        self.current_rate = Scaling(measurement.get_signal_by_name('CurrentRate'))
-        self.flux_rate = Scaling(measurement.get_signal_by_name('FluxRate'))
-        self.current = Scaling(setpoint.get_signal_by_name('Current'))
-        self.supply_voltage = Scaling(status.get_signal_by_name('SupplyVoltage'))
-        self.coil_temperature = Scaling(status.get_signal_by_name('CoilTemperature'))
+        names = 'MountMeasurement', 'MountSetpoint', 'MountStatus'
+        messages = [database.get_message_by_name(name) for name in names]
+        self.measurement, self.setpoint, self.status = map(MessageLayout, messages)
+        scalings = {signal.name: Scaling(signal) for message in messages for signal in message.signals}
+        self.displacement, self.coil_current = scalings['Displacement'], scalings['CoilCurrent']
+        self.current_rate, self.flux_rate = scalings['CurrentRate'], scalings['FluxRate']
+        self.current = scalings['Current']
+        self.supply_voltage, self.coil_temperature = scalings['SupplyVoltage'], scalings['CoilTemperature']
 
     def encode_measurement(self, measurement: Measurement, alive_counter: int) -> bytearray:
         """Return the 24 bytes of a sample; NaN is sent as not valid. Raises `OutOfRangeError`.
@@ -210,7 +177,7 @@ class MountCodec:
         raw = round(min(max(current, limits.low), limits.high) * limits.steps)
         layout, numbers = self.setpoint, (0, alive_counter, raw, answered_counter, enable)
         try:
-            data = bytearray(layout.pack_bits(*layout.to_wire(numbers)))
+            data = bytearray(layout.pack_bits(*numbers[::-1]))
         except OverflowError:
             return layout.pack(numbers)  # raises, with all the numbers
         data.reverse()
@@ -316,7 +283,7 @@ class E2EReceiver(Generic[M]):
         elif not e2e_p05_check(data, layout.data_id):
             outcome = Outcome.WRONG_CRC
         else:
-            raw = layout.from_wire(layout.unpack_bits(data[::-1]))
+            raw = layout.unpack_bits(data[::-1])[::-1]
             if (raw[1] - self._last) & 0xFF == 1 and not self._awaited:
                 outcome = _OK
             else:

@@ -40,11 +40,6 @@ def usual_delays(count, seed=1):
     return delays
 
 
-def test_a_stamp_is_the_time_of_the_sample_and_not_of_its_arrival():
-    errors, _ = run(usual_delays(20_000))
-    assert np.all(np.abs(errors[5000:]) < 70_000)
-
-
 def test_stamps_are_evenly_spaced_however_late_the_frames_are():
     _, stamps = run(usual_delays(20_000))
     assert np.all(np.abs(np.diff(stamps) - 1_000_000) <= 1_000)
@@ -86,15 +81,6 @@ def test_a_late_first_frame_is_made_good_without_a_step_back():
     assert np.all(np.diff(stamps) >= 899_000)
     assert np.all(np.abs(errors[20_000:]) < 100_000)
     assert clock.remappings == 0
-
-
-def test_a_first_frame_that_is_a_little_late_leaves_the_stamps_evenly_spaced():
-    delays = usual_delays(20_000)
-    delays[0] = 3_000_000
-    errors, stamps = run(delays)
-    assert errors[0] == 3_000_000
-    assert np.all(np.abs(np.diff(stamps) - 1_000_000) <= 1_000)
-    assert np.all(np.abs(errors[15_000:]) < 100_000)
 
 
 def test_a_path_that_becomes_slower_for_good_is_believed_after_a_while():
@@ -184,12 +170,6 @@ def test_stamps_settle_on_the_fastest_frames(drift, first, fastest, seed):
 def test_in_lock_step_stamps_are_the_counter():
     clock = CounterClock()
     assert [clock.stamp(us) for us in (0, 1000, 2000)] == [0, 1_000_000, 2_000_000]
-
-
-def test_in_lock_step_the_time_of_arrival_has_no_say():
-    left, right = CounterClock(), CounterClock()
-    for us in range(500, 100_000, 1000):
-        assert left.stamp(us, 0) == right.stamp(us, us * 77_777) == us * 1000
 
 
 def test_in_lock_step_the_counter_is_unwrapped():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mount_driver.protocol import Measurement, Setpoint
-from mount_driver.quantisation import quantised_coil_current
 from mount_driver.watches.coil_watch import CoilWatch, CoilWatchParameters
 
 COUNTERS = 1 << 16
@@ -29,7 +28,7 @@ def watched(
     for k, setpoint in enumerate(setpoints):
         heard = k not in missing
         if heard:
-            measured = current if math.isnan(current) else quantised_coil_current(current)
+            measured = current if math.isnan(current) else round(5000.0 * current) / 5000.0
             if sentence := watch.judge(sampled(k, measured, enabled(k)), sent):
                 return k, sentence
             sent = [Setpoint(setpoint, k % COUNTERS)] if answered(k) else []
@@ -83,10 +82,6 @@ STRICT = LIMITS._replace(duration=0.002)
 def slowest(_, current, wanted):
     """A coil at the least supply."""
     return current + float(np.clip(wanted - current, -0.15, 0.05))
-
-
-def test_the_bounds_move_no_faster_than_the_slowest_coil():
-    assert watched(SETPOINTS['steps'], slowest, limits=STRICT) is None
 
 
 @pytest.mark.parametrize('heard', [True, False])
@@ -149,10 +144,6 @@ def test_a_current_that_flows_at_0_ampere_is_doubted_whether_or_not_the_electron
 def test_electronics_that_say_to_be_off_and_carry_nothing_are_safe():
     off = watched(np.full(SAMPLES, 1.0), lambda k, current, wanted: 0.0, enabled=lambda k: False)
     assert off is None
-
-
-def test_a_current_that_nobody_sent_is_doubted():
-    assert watched(np.zeros(SAMPLES), lambda k, current, wanted: 3.0)[0] <= 41
 
 
 def test_a_current_that_is_not_valid_at_0_ampere_is_no_doubt():

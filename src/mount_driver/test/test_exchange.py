@@ -15,7 +15,7 @@ from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import Setpoint, Status
+from mount_driver.protocol import Setpoint
 
 OFF = Setpoint(0.0, 0xFFFF, False)
 MS = 1_000_000
@@ -78,40 +78,6 @@ def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activat
     assert len(setpoints) < 20
 
 
-def test_without_a_thread_each_poll_handles_one_frame(make, samples):
-    exchange, far = make(interface='virtual', threaded=False)
-    assert not exchange.poll()
-    far.send(sample(7))
-    far.send(sample(8))
-    assert exchange.poll()
-    assert samples == [(7 * MS, sample(7))]
-    assert exchange.poll()
-    assert not exchange.poll()
-    assert samples == [(7 * MS, sample(7)), (8 * MS, sample(8))]
-
-
-def test_what_goes_wrong_in_a_poll_ends_the_exchange_at_0_ampere(make):
-    def choke(stamped):
-        raise RuntimeError('nobody foresaw this')
-
-    exchange, far = make(interface='virtual', threaded=False, take=choke)
-    far.send(sample(7))
-    assert not exchange.poll()
-    assert exchange.failure == 'RuntimeError: nobody foresaw this'
-    assert far.setpoint() == OFF
-    far.send(sample(8))
-    assert not exchange.poll()
-
-
-def test_a_setpoint_leaves_as_the_answer_to_its_sample(make, samples):
-    exchange, far = make()
-    for index in range(5):
-        far.send(sample(index))
-    samples.wait_for(5)
-    assert exchange.send_setpoint(3 * MS, 1.25)
-    assert far.setpoint() == Setpoint(1.25, 3, True)
-
-
 def test_a_refused_setpoint_does_not_leave(make, samples):
     exchange, far = make()
     far.send(sample(0))
@@ -120,15 +86,6 @@ def test_a_refused_setpoint_does_not_leave(make, samples):
     assert not exchange.send_setpoint(12345, 1.0)
     assert exchange.send_setpoint(0, 0.75)
     assert far.setpoint().current == 0.75
-
-
-def test_a_corrupt_frame_is_counted_and_not_handed_out(make, samples):
-    exchange, far = make()
-    far.send(sample(0), damage=0x10)
-    far.send(sample(1))
-    samples.wait_for(1)
-    assert [measurement.sample_counter for _, measurement in samples] == [1]
-    assert exchange.link.counts.corrupt == 1
 
 
 @pytest.mark.parametrize('interface', ['udp_multicast', 'virtual'])
@@ -152,22 +109,6 @@ def test_a_frame_of_another_form_costs_itself_alone(make, samples, interface, od
     assert [measurement.sample_counter for _, measurement in samples] == [1]
     assert exchange.failure == exchange.trouble == ''
     assert exchange.link.counts.recoveries == 0
-
-
-def test_what_python_can_cannot_read_costs_itself_alone(make, samples):
-    exchange, far = make()
-    far.bus._sender.sendto(b'\x93\x01\x02\x03', far.bus._destination)
-    far.send(sample(1))
-    samples.wait_for(1)
-    assert exchange.reception.unreadable == 1
-    assert exchange.failure == ''
-
-
-def test_a_status_is_kept(make):
-    exchange, far = make()
-    far.send_status(Status(13.5, 41.0, over_current=True))
-    wait_until(lambda: exchange.link.status is not None, 'a status')
-    assert exchange.link.status.over_current
 
 
 def test_when_setpoints_stop_0_ampere_is_sent_while_samples_go_on(make, samples):

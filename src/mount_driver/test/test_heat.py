@@ -71,12 +71,6 @@ def heated(current, seconds):
     return watch
 
 
-def test_an_hour_of_3_ampere_by_the_shipped_specimen():
-    assert heated(3.0, 230).current_limit == 3.0
-    assert heated(3.0, 240).current_limit < 3.0
-    assert heated(1.0, 3600).current_limit == 3.0
-
-
 @pytest.mark.parametrize(('measured', 'sent'), [(2.0, 0.0), (0.0, 2.0), (math.nan, 2.0), (-0.1, 2.0)])
 def test_the_greater_of_measured_and_sent_current_heats(car, measured, sent):
     guard = car.exchange.guard

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_driver.can_library import cantools
-from mount_driver.layout import DatabaseError, FrameError, OutOfRangeError
+from mount_driver.layout import FrameError, OutOfRangeError
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import DATABASE_FILE, Measurement, MountCodec, Setpoint, Status
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
@@ -113,10 +113,6 @@ def test_status_that_is_not_available_is_nan_and_says_so_in_the_value_table():
     assert str(values['SupplyVoltage']) == str(values['CoilTemperature']) == 'not available'
 
 
-def test_decimal_numbers_come_back_exactly():
-    assert CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE, 0))[1] == SAMPLE
-
-
 @pytest.mark.parametrize('slope', ['current_rate', 'flux_rate'])
 def test_one_missing_slope_makes_both_unknown(slope):
     decoded = CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE._replace(**{slope: math.nan}), 0))[1]
@@ -180,11 +176,6 @@ def test_every_single_flipped_bit_is_noticed(data, decode):
             decode(damaged)
 
 
-def test_a_frame_of_another_message_with_the_same_length_is_noticed():
-    with pytest.raises(FrameError, match='fails its CRC'):
-        CODEC.decode_status(CODEC.encode_setpoint(Setpoint(1.0, 3), 7))
-
-
 @pytest.mark.parametrize('length', [0, 2, 23, 25, 64])
 def test_a_frame_of_the_wrong_length_is_noticed(length):
     with pytest.raises(FrameError, match=f'has {length} bytes'):
@@ -229,13 +220,6 @@ def test_the_dbc_agrees_with_what_both_ends_know_of_current_time_and_rate():
     assert f'Without a valid frame for {limit}' in SETPOINT.comment
     assert f'answers one of the last {round(SETPOINT_TIMEOUT / SAMPLE_TIME)} samples' in SETPOINT.comment
     assert DriverParameters().setpoint_timeout == SETPOINT_TIMEOUT
-
-
-def test_a_dbc_without_a_needed_signal_is_refused(tmp_path):
-    text = DATABASE_FILE.read_text(encoding='utf-8').replace('DisplacementValid', 'Renamed')
-    (tmp_path / 'other.dbc').write_text(text, encoding='utf-8')
-    with pytest.raises(DatabaseError, match='MountMeasurement has the signals'):
-        MountCodec(tmp_path / 'other.dbc')
 
 
 def test_scales_and_places_come_from_the_dbc(tmp_path):

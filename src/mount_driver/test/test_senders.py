@@ -5,7 +5,7 @@ import random
 
 import pytest
 from car import GOOD, MS, Car
-from far_end import CODEC, FarEnd, sample
+from far_end import CODEC, sample
 
 from mount_driver.bus import Frame, open_bus
 from mount_driver.protocol import AliveCounter, Setpoint, Status
@@ -177,18 +177,6 @@ def test_a_damaged_setpoint_of_another_node_is_no_setpoint(car, other):
     other.send(Frame(CODEC.setpoint.frame_id, bytes(3)))
     assert [car.exchange.poll(), car.exchange.poll(), car.exchange.poll()] == [True, True, False]
     assert car.exchange.link.fault == ''
-
-
-@pytest.mark.parametrize('interface', ['virtual', 'udp_multicast'])
-def test_our_own_setpoints_are_not_another_sender(multicast, interface):
-    channel, port = (multicast[0] if interface == 'udp_multicast' else 'own_frames'), multicast[1]
-    near = open_bus(interface, channel, port=port, receive=(CODEC.setpoint.frame_id,))
-    far = FarEnd(interface, channel, port)
-    near.send(Frame(CODEC.setpoint.frame_id, CODEC.encode_setpoint(Setpoint(1.0, 0, True), 0)))
-    assert far.setpoint().current == 1.0
-    assert near.recv(0.0) is None
-    near.shutdown()
-    far.close()
 
 
 @pytest.mark.parametrize('lost', [0.05, 0.5, 0.9])

@@ -9,7 +9,7 @@ from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
-from mount_models.arithmetic.compiled import compilation_told
+from mount_models.arithmetic.compiled import log_compilation
 from mount_models.specimen import Specimen, chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
@@ -48,7 +48,7 @@ class MountInit(SafeLifecycleNode):
             str(self.get_parameter('parameters_file').value), str(self.get_parameter('specimen').value)
         )
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
-        with compilation_told(self.get_logger().info):
+        with log_compilation(self.get_logger().info):
             load_compiled_laws(self._specimen)
         self._temperatures = TemperatureReadings()
         self._driver = DriverReport(self._init_parameters.peak_current)

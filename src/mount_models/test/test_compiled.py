@@ -55,7 +55,7 @@ def test_a_compilation_is_told_once_and_not_where_its_result_is_on_disk(tmp_path
     def told():
         sentences = []
         first, second = (compiled.specialised(scaled, name, {'FACTOR': 2.0}) for name in ('first', 'second'))
-        with compiled.compilation_told(sentences.append):
+        with compiled.log_compilation(sentences.append):
             first(5.0)
             second(5.0)
         return sentences

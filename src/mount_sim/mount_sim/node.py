@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool
 from mount_driver.bus import open_bus
 from mount_driver.can_library import can
 from mount_driver.parameters import DriverParameters
-from mount_models.arithmetic.compiled import compilation_told
+from mount_models.arithmetic.compiled import log_compilation
 from mount_models.quantity import ParameterError, flattened
 from mount_ros import topics
 from mount_ros.data_path import DataPath
@@ -64,7 +64,7 @@ class MountSim(SafeLifecycleNode):
         other = {name: self.get_parameter(name).value for name in ('channel', 'port', *self._own)}
         self._values = flattened(self._settings) | other
         self._names = mount_names(self._settings.mounts) or (ALONE,)
-        with compilation_told(self.get_logger().info):
+        with log_compilation(self.get_logger().info):
             self._excitation = build_excitation(self._settings)
             self._prepare_mounts()
         path = self.open_data_path()

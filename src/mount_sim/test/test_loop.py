@@ -14,10 +14,10 @@ from ros_testing import LIMIT
 
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
-from mount_driver.quantisation import quantised_displacement
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.electronics import ElectronicsParameters, Reading
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError, until_ending
+from mount_sim.quantisation import quantised_displacement
 
 CODEC = MountCodec()
 _channels = itertools.count()

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from mount_driver.quantisation import quantised_current_rate, quantised_flux_rate
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
 from mount_models.coil.heating import CoilHeating
@@ -13,6 +12,7 @@ from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
+from mount_sim.quantisation import quantised_current_rate, quantised_flux_rate
 
 MS = 1_000_000
 ACTUATOR, COIL, MECHANICS = ReluctanceActuator(), RippleCoil(), ClosingMechanics()

@@ -11,6 +11,7 @@ from engine_mount.drives.core import Progress, Replayed, replay_in_core
 from engine_mount.drives.inputs.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input
 from engine_mount.drives.inputs.input import ReplayError, ReplayInput, replay_input
 from engine_mount.drives.inputs.parameter_changes import without
+from engine_mount.drives.other_policy import check_effect
 from engine_mount.drives.output import write_replay
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.run.folder import RunFolder, make_run_folder
@@ -33,7 +34,6 @@ from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT
-from mount_control.settings import check_effect
 from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact

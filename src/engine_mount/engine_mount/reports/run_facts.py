@@ -13,6 +13,7 @@ from engine_mount.reports.sections.charts import Levels
 from engine_mount.reports.sections.subject import RunFacts, Tracking, WithoutDamping
 from engine_mount.reports.signals import Signals
 from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
+from mount_control.policy import switched_viscous
 from mount_control.policy.contract import Policy
 from mount_models.quantity import with_flattened
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
@@ -109,7 +110,7 @@ def _tracking(signals: Signals, parameters: Parameters) -> tuple[Tracking | None
 
 
 def _wanted_words(policy: Policy, own: Any, sample_time: float) -> str:
-    if not hasattr(policy, 'wanted_force'):
+    if policy is not switched_viscous:
         later = f'{1e3 * acts_after(sample_time):g} ms later'
         return f'wanted is the force that the policy asked for, {later}, when it acts'
     return f'wanted is the force of damper {own.damper} at the true velocity in the band, without delay'

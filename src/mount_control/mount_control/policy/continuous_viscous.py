@@ -147,11 +147,6 @@ def design(parameters: Parameters, sample_time: float) -> Design:
     )
 
 
-def levels(parameters: Parameters) -> dict[str, float]:
-    """Return the amplitudes (m) in the band between which damping opens, for pictures."""
-    return {'damping begins': parameters.lowest_amplitude, 'damping is full': parameters.full_amplitude}
-
-
 def _check(parameters: Parameters) -> None:
     if not parameters.lowest_amplitude < parameters.full_amplitude:
         raise ParameterError(

@@ -31,15 +31,6 @@ and compiled, with the records of `Law` and `STATE`:
 `step(law, table, state, window, trace, displacement) -> (force, velocity, active)`
     Take one sample (m) and fill the own fields of `trace`. `force` (N) is the wanted friction force, signed
     like `velocity` (m/s); `active` lies within 0 .. 1, and at exactly 0 the current is exactly 0 A.
-
-What a report says about a policy beyond that, each may be left out:
-
-`levels(parameters) -> {label: m}`
-    Displacements at which something changes, drawn as lines in pictures.
-`wanted_force(parameters, velocity, sample_time) -> force`
-    The friction force (N, (n,)) that would be ideal at the true velocity of the mount (m/s, (n,), samples
-    `sample_time` s apart), without any delay. Without it a report takes `desired_force` of the trace,
-    when it acts.
 """
 
 from collections.abc import Callable, Mapping

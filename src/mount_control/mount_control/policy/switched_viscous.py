@@ -6,9 +6,6 @@ velocity in the band, turned ahead by the delay of the loop.
 
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mount_control import band_pass, switching
 from mount_control.delay import LOOP_DELAY, check_lead, delay_at
 from mount_control.policy.contract import Design
@@ -16,7 +13,6 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_models.damper import damper_curve, damper_force
 from mount_models.quantity import ParameterError, Quantity
-from mount_models.sampling import SAMPLE_TIME
 
 DEFAULT_DAMPER = 'viscous_2000'
 SWITCHING = {
@@ -74,22 +70,6 @@ class Parameters(NamedTuple):
     def period_samples(self, sample_time: float) -> int:
         """Return the samples in one period of the eigenfrequency, `sample_time` s apart."""
         return max(1, round(1.0 / (self.eigenfrequency * sample_time)))
-
-
-def levels(parameters: Parameters) -> dict[str, float]:
-    """Return the magnitudes (m) at which damping is switched, for pictures."""
-    return {
-        'switch-on level': parameters.switch_on_level,
-        'switch-off level': parameters.switch_off_level,
-    }
-
-
-def wanted_force(
-    parameters: Parameters, velocity: NDArray[np.float64], sample_time: float = SAMPLE_TIME
-) -> NDArray[np.float64]:
-    """Return the force (N) of the characteristic at the true velocity (m/s, (n,)) in the band, undelayed."""
-    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time)
-    return damper_curve(parameters.damper).force(band_pass.filtered(band, velocity))
 
 
 _ANY_MAGNITUDE = -1.0  # m: each one lies above, none below

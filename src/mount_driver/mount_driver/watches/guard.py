@@ -1,4 +1,4 @@
-"""All watches of the link in one place: what they say of a sample, a status, a frame of another sender.
+"""All watches of the link in one place: their verdicts on a sample, a status, a frame of another sender.
 
 No bus here, and nothing is written to the link: each judgement is returned.
 """

@@ -43,12 +43,10 @@ class RippleLaw(NamedTuple):
 def ripple_law(specimen: 'Specimen') -> RippleLaw:
     """Return the law of the ripple of a specimen; without a temperature compensation it holds at any."""
     curves, temperature = specimen.gap_curves, specimen.temperature
-    low, high = curves.crossing_current_of_gap.low, curves.crossing_current_of_gap.high
+    calibrated = curves.crossing_current_of_gap
+    low, high = calibrated.low, calibrated.high
     middle = 0.5 * (low + high)
-
-    def crossing(gap: float) -> float:
-        return float(evaluate(curves.crossing_current_of_gap, gap))
-
+    crossing = [float(evaluate(calibrated, gap)) for gap in (low, middle, high)]
     law = RippleLaw(
         turns_area=specimen.turns_area,
         rest_current=specimen.rest_current,
@@ -57,7 +55,7 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
         rest_inductance_high=curves.gap_of_inductance.high,
         gap_low=low,
         gap_high=high,
-        crossing=(crossing(low), crossing(middle), crossing(high)),
+        crossing=(crossing[0], crossing[1], crossing[2]),
         warm_rise=0.0,
         bridge=specimen.bridge,
         gap_reluctance=_HALF / float(evaluate(curves.inductance_of_gap, middle)),
@@ -97,12 +95,9 @@ def skin_table(law: RippleLaw) -> list[float]:
 def gap_of_crossing(law: RippleLaw, current: float) -> float:
     """Return the gap (m) at the crossing current (A): the parabola through the three that are known."""
     low, middle, high = law.crossing
-    centre = 0.5 * (law.gap_low + law.gap_high)
-    return (
-        law.gap_low * (current - middle) * (current - high) / ((low - middle) * (low - high))
-        + centre * (current - low) * (current - high) / ((middle - low) * (middle - high))
-        + law.gap_high * (current - low) * (current - middle) / ((high - low) * (high - middle))
-    )
+    step = 0.5 * (law.gap_high - law.gap_low)
+    first, second = step / (middle - low), step / (high - middle)
+    return law.gap_low + (current - low) * (first + (current - middle) * (second - first) / (high - low))
 
 
 def crossing_per_gap(law: RippleLaw) -> float:

@@ -53,7 +53,7 @@ def specialised(function: F, name: str, bound: Mapping[str, Any]) -> F:
 
 
 @contextlib.contextmanager
-def compilation_told(tell: Callable[[str], object]) -> Iterator[None]:
+def log_compilation(tell: Callable[[str], object]) -> Iterator[None]:
     """Call `tell` with a sentence before the first compilation within the block; not where all is on disk."""
     with numba_event.install_listener('numba:compile', _Teller(tell)):
         yield

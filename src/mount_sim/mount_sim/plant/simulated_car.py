@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.quantity import checked, with_flattened
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
@@ -29,6 +28,7 @@ from mount_sim.plant.places import (
     values_of_mount,
 )
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
+from mount_sim.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 
 FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
 """Range of the displacement sensor to either side, m: that of its signal on the bus."""

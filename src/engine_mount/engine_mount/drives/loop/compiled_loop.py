@@ -12,15 +12,15 @@ from typing import Any
 from mount_control.controller import compiled_with
 from mount_control.plausibility import doubt_of
 from mount_control.policy.contract import Policy
-from mount_driver.quantisation import (
+from mount_models.arithmetic.compiled import compiled, specialised
+from mount_sim.plant import plant
+from mount_sim.quantisation import (
     quantised_coil_current,
     quantised_current_rate,
     quantised_displacement,
     quantised_flux_rate,
     quantised_setpoint_current,
 )
-from mount_models.arithmetic.compiled import compiled, specialised
-from mount_sim.plant import plant
 
 
 @compiled

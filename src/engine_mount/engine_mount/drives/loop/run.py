@@ -13,7 +13,6 @@ from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, Writ
 from engine_mount.settings.chosen import Parameters
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.settings import check_sample_rate
-from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.electronics import Reading, status_every
@@ -22,6 +21,7 @@ from mount_sim.excitation.excitation import Excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import ALONE
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount
+from mount_sim.quantisation import quantised_coil_temperature, quantised_setpoint_current
 
 BLOCK = 1000
 """Samples, chosen: packed and written together."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from engine_mount.drives.other_policy import NoEffectError
 from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from engine_mount.fleet.job import Answer, Row
@@ -23,7 +24,6 @@ from engine_mount.recordings.bag.recording import open_recording
 from engine_mount.recordings.run.place import recording_hash, recording_place
 from engine_mount.signals.sources.source import StoreAwayError
 from engine_mount.signals.sources.stores import local_copy
-from mount_control.settings import NoEffectError
 from mount_recorder.versions import versions
 
 Changes = Mapping[str, Mapping[str, Any]]

@@ -11,8 +11,11 @@ from engine_mount.recordings.audit.audit import TopicAudit
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.switching_changes import Switching, switching_times
 from engine_mount.reports.drive.signals import DriveSignals, Seen
+from mount_control import band_pass
 from mount_control.delay import LOOP_DELAY, delay_at
+from mount_control.policy import continuous_viscous, switched_viscous
 from mount_control.policy.contract import Policy
+from mount_models.damper import damper_curve
 
 _MEASURED = ('displacement', 'coil_ripple', 'sim/truth', 'sim/chassis_acceleration', 'sim/mount_force')
 
@@ -39,9 +42,14 @@ def samples_at_the_ends(recording: Recording, topics: Mapping[str, TopicAudit], 
 
 
 def levels_of(policy: Policy, parameters: Any) -> dict[str, float]:
-    """Return the displacements (m) that a policy wants drawn as lines, {} where it names none."""
-    levels = getattr(policy, 'levels', None)
-    return levels(parameters) if levels else {}
+    """Return the displacements (m) at which a policy changes something, drawn as lines; {} where unknown."""
+    if policy is switched_viscous:
+        on, off = parameters.switch_on_level, parameters.switch_off_level
+        return {'switch-on level': on, 'switch-off level': off}
+    if policy is continuous_viscous:
+        lowest, full = parameters.lowest_amplitude, parameters.full_amplitude
+        return {'damping begins': lowest, 'damping is full': full}
+    return {}
 
 
 def switching(seen: Seen) -> Switching:
@@ -68,12 +76,12 @@ def wanted_force(
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the wanted friction force (N) at the true times, and which of them belongs to each sample.
 
-    Wanted is what the policy says by its `wanted_force`, for the true velocity of the mount at that very
-    moment; so an error against it holds phase and delay as well as force. Of a policy without one it is the
-    force that it asked for, at the time at which its setpoint acts, so an error holds no error of prediction.
+    Of `switched_viscous` it is the force of the characteristic at the true velocity of the mount at that
+    moment; so an error against it holds phase and delay as well as force. Of another policy it is the force
+    that it asked for, at the time at which its setpoint acts, so an error holds no error of prediction.
     """
-    if ideal := getattr(policy, 'wanted_force', None):
-        wanted = ideal(parameters, drive.truth.velocity, drive.sample_time)
+    if policy is switched_viscous:
+        wanted = force_of_damper(parameters, drive.truth.velocity, drive.sample_time)
     else:
         wanted = np.interp(
             drive.truth.time, drive.seen.time + acts_after(drive.sample_time), drive.seen.desired_force
@@ -82,3 +90,14 @@ def wanted_force(
         np.searchsorted(drive.truth.time, drive.seen.time - 0.5 * drive.sample_time), 0, len(wanted) - 1
     )
     return wanted, places
+
+
+def force_of_damper(
+    parameters: switched_viscous.Parameters, velocity: NDArray[np.float64], sample_time: float
+) -> NDArray[np.float64]:
+    """Return the force (N) of the characteristic at the true velocity (m/s, (n,)) in the band, undelayed."""
+    from scipy.signal import lfilter  # loads long
+
+    band = band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time)
+    banded = lfilter([band.gain, 0.0, -band.gain], [1.0, band.a1, band.a2], velocity)
+    return damper_curve(parameters.damper).force(banded)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mount_driver import quantisation
 from mount_driver.layout import OutOfRangeError
 from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
 from mount_models.sampling import HIGHEST_CURRENT
+from mount_sim import quantisation
 
 CODEC = MountCodec()
 SAMPLE = Measurement(0, 0, 0.0, 0.0, 0.0, 0.0)
