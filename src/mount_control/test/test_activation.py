@@ -40,6 +40,7 @@ def test_without_table_or_air_gap_it_is_refused():
         == 'no air_gap was received (0 messages, needed is 1); activate mount_init (again)'
     )
     assert 'no current_force_table' in _refusal(None, None, stream)
+    assert _refusal(S, S, _stream()) == 'no displacement was received; activate mount_driver first'
 
 
 def test_table_and_air_gap_of_different_activations_are_refused():
@@ -74,6 +75,8 @@ def test_a_table_from_before_the_time_went_back_is_refused():
 def test_a_repeated_or_overtaken_sample_is_no_break():
     stream = _stream(10 * S, 10 * S + 2 * MS, 10 * S + MS, 10 * S + MS)
     assert (stream.first, stream.last) == (10 * S, 10 * S + 2 * MS)
+    assert _stream(S, 2 * S).first == S  # nor is a second of silence
+    assert _stream(S, 2 * S + 1).first == 2 * S + 1
 
 
 def test_a_controller_made_for_another_rate_is_not_activated():

@@ -192,6 +192,12 @@ def test_each_sample_has_its_judgement(make_loop):
     assert loop.last == START + 1005 * MS
 
 
+@pytest.mark.parametrize('displacement', [math.nan, math.inf, -math.inf, 0.020001, -0.020001])
+def test_what_no_sensor_can_mean_is_invalid(loop, displacement):
+    assert judged(loop, 401, displacement=displacement) == [(Judgement.INVALID, 0)]
+    assert (loop.counts.invalid, loop.counts.samples) == (1, 1)
+
+
 @pytest.mark.parametrize('jitter', [-0.49, -0.1, 0.1, 0.49])
 def test_a_stamp_a_little_early_or_late_is_no_missing_sample(loop, jitter):
     assert judged(loop, 401 + jitter) == [(Judgement.USE, 0)]

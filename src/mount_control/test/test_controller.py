@@ -38,11 +38,16 @@ def test_traces_have_the_names_and_units_of_their_topic():
     assert {PAPER.trace[name] for name in PAPER.trace.names} == {np.dtype('f8')}
 
 
-def test_single_steps_equal_a_run_to_the_bit(make_controller, sine):
+@pytest.mark.parametrize('spoiled', [False, True])
+def test_single_steps_equal_a_run_to_the_bit(make_controller, sine, spoiled):
     displacement = sine(8.0, 1.3e-3, 0.7) + sine(21.0, 0.2e-3, 0.7)
     displacement[400] = math.nan
     single, whole = make_controller(), make_controller()
+    for controller in (single, whole) if spoiled else ():
+        currents = controller.memory.tables.current
+        currents[len(currents) // 4 :] = math.nan  # met within the run, again and again
     traces = whole.run(displacement)
+    assert (whole.faults > 0) == spoiled
     for number, x in enumerate(displacement):
         current = single.step(x)
         assert current == traces['current'][number]

@@ -250,6 +250,21 @@ def test_in_lock_step_the_sample_that_waits_is_answered_at_activation(configured
     assert _answers(around, 1) == [(1.0, 0.0)]
 
 
+def test_parameters_that_cannot_work_are_refused_at_configure(make_control):
+    control = make_control(switch_off_level=0.0009)
+    assert control.trigger_configure() == FAILURE
+    assert 'switch_off_level (0.9 mm) must lie below switch_on_level (0.8 mm)' in control.sentence
+    assert control.data_path is None
+
+
+def test_silence_in_real_time_is_an_error(active, around):
+    control = active(lockstep=False)
+    around.send(1.0)
+    _answers(around, 1)
+    wait_until(lambda: control.judge().level is Level.ERROR, 'the verdict on silence')
+    assert '0 A: no displacement for' in control.judge().sentence
+
+
 def test_an_invalid_displacement_is_answered_with_0_ampere_and_no_trace(active, around, sine):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4

@@ -27,6 +27,11 @@ def test_what_is_not_named_is_the_specimen_s():
         ({'quality': 50.0}, 'must lie within 0.3 .. 5'),
         ({'damper': 'soft'}, "no damper curve is called 'soft'"),
         ({'friction.a_p1': 100.0}, '.'),
+        ({'policy': 'soft'}, "policy 'soft' is unknown; known are switched_viscous"),
+        (
+            {'policy': 'continuous_viscous', 'continuous_viscous.lowest_amplitude': 0.5e-3},
+            r'lowest_amplitude \(0.5 mm\) must lie below full_amplitude',
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(values, reason):

@@ -202,15 +202,19 @@ def test_stopping_twice_does_nothing(make):
     assert far.nothing_for(0.0)
 
 
-def test_an_error_in_the_receiving_thread_sends_0_ampere_and_is_kept(make):
+@pytest.mark.parametrize('threaded', [True, False])
+def test_an_error_where_samples_are_received_sends_0_ampere_and_is_kept(make, threaded):
     def fail(stamped):
         raise RuntimeError('the middleware is gone')
 
-    exchange, far = make(take=fail)
+    exchange, far = make(interface='virtual', take=fail, threaded=threaded)
     far.send(sample(0))
+    assert threaded or not exchange.poll()
     assert far.setpoint() == OFF
     wait_until(lambda: exchange.failure, 'a failure')
     assert exchange.failure == 'RuntimeError: the middleware is gone'
+    far.send(sample(1))
+    assert threaded or not exchange.poll()
     assert not exchange.send_setpoint(0, 1.0)
 
 

@@ -59,6 +59,13 @@ def test_a_frozen_sample_in_frames_that_live_feeds_nothing(car):
     assert not car.on_bus().enable
 
 
+def test_a_node_that_comes_to_itself_is_obeyed_again(car):
+    car.drive(100, nothing)
+    assert not car.on_bus().enable
+    car.drive(1, car.answer)
+    assert car.on_bus() == Setpoint(3.0, GOOD + 101, True)
+
+
 @pytest.mark.parametrize('late', [21, 30, 60])
 def test_answers_that_come_too_late_move_nothing(car, late):
     car.drive(1000, lambda: car.exchange.send_setpoint(car.stamps[-1 - late], 3.0))

@@ -159,10 +159,13 @@ def test_a_setpoint_20_ms_old_is_still_sent(link):
 
 
 def test_age_is_that_of_the_clock_and_not_that_of_the_newest_sample(link):
+    assert link.answer(0, 1.0, now=0) is None
+    assert link.last_refusal is Refusal.UNKNOWN_SAMPLE  # before the first one
     feed(link, [0])
     assert link.answer(0, 1.0, now=20 * MS + 1) is None
     assert link.answer(0, 1.0, now=60_000 * MS) is None
-    assert (link.counts.refused, link.last_refusal) == (2, Refusal.STALE)
+    assert (link.counts.refused, link.last_refusal) == (3, Refusal.STALE)
+    assert not link.driving
 
 
 def test_a_setpoint_for_an_older_sample_than_the_last_answered_is_refused(link):
@@ -276,7 +279,7 @@ events = st.lists(
     st.one_of(
         st.tuples(st.just('wait'), st.integers(0, 30 * MS)),
         st.tuples(st.just('sample')),
-        st.tuples(st.just('answer'), st.integers(-3, 30), st.floats(0.0, 3.0)),  # samples ago
+        st.tuples(st.just('answer'), st.integers(-3, 30), st.floats(0.0, 3.0) | st.just(math.nan)),  # ago
         st.tuples(st.just('again')),
     ),
     max_size=80,

@@ -176,6 +176,11 @@ def test_every_single_flipped_bit_is_noticed(data, decode):
             decode(damaged)
 
 
+def test_a_frame_of_another_message_with_the_same_length_is_noticed():
+    with pytest.raises(FrameError, match='fails its CRC'):
+        CODEC.decode_status(CODEC.encode_setpoint(Setpoint(1.0, 3), 7))
+
+
 @pytest.mark.parametrize('length', [0, 2, 23, 25, 64])
 def test_a_frame_of_the_wrong_length_is_noticed(length):
     with pytest.raises(FrameError, match=f'has {length} bytes'):
