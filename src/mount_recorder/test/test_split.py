@@ -12,14 +12,8 @@ from rosbags.highlevel import AnyReader
 from samples import PERIOD, START, sample
 from small_disk import small_disk
 
-from mount_recorder.bag_writer import (
-    PIECE_RECORD,
-    BagWriter,
-    RecordingError,
-    SplitError,
-    SplitRule,
-    checked_rule,
-)
+from mount_models.quantity import ParameterError
+from mount_recorder.bag_writer import PIECE_RECORD, BagWriter, RecordingError, SplitRule, checked_rule
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -127,7 +121,7 @@ def test_disk_too_full_for_the_next_file_ends_the_recording_with_all_before_it(t
 
 
 def test_rule_given_as_numbers_is_checked_too():
-    with pytest.raises(SplitError, match='at least'):
+    with pytest.raises(ParameterError, match='at least'):
         checked_rule(SplitRule(size=1))
 
 

@@ -11,7 +11,7 @@ from mount_recorder.parameters import RecorderParameters, split_of
 
 
 def recorder_options(split: Sequence[str], snapshot: str, snapshot_after: str = '') -> dict[str, Any]:
-    """Return {parameter: value} of texts such as `500MB`, `60s`; raises `SplitError`."""
+    """Return {parameter: value} of texts such as `500MB`, `60s`; raises `ParameterError`."""
     options: dict[str, Any] = {}
     if split:
         rule = split_rule(split)

@@ -21,10 +21,10 @@ from engine_mount.experiments.check.telling import Told, figures_of, table_of
 from engine_mount.experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.signals import Truth
-from mount_bringup.graph.domain import DomainError
 from mount_bringup.graph.nodes import GraphError
 from mount_bringup.graph.shutdown import Interrupted
 from mount_models.plain_yaml import plain_yaml
+from mount_models.quantity import ParameterError
 
 PAGE = Path(__file__).resolve().parents[4] / 'docs' / 'how-to' / 'check_a_change.md'
 LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
@@ -166,7 +166,7 @@ def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
         trials_of(CheckOrder(late), tmp_path)
 
 
-@pytest.mark.parametrize('error', [GraphError('no gap'), DomainError('a graph already runs')])
+@pytest.mark.parametrize('error', [GraphError('no gap'), ParameterError('a graph already runs')])
 def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
     monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
     made = trials(tmp_path, through=GRAPH)[0]

@@ -3,7 +3,8 @@
 import pytest
 
 from engine_mount.recordings.run.amounts import duration_in_nanoseconds, split_rule
-from mount_recorder.bag_writer import SplitError, SplitRule
+from mount_models.quantity import ParameterError
+from mount_recorder.bag_writer import SplitRule
 
 
 @pytest.mark.parametrize(
@@ -31,10 +32,10 @@ def test_sizes_and_durations_are_told_apart_by_their_units(texts, rule):
     ],
 )
 def test_limit_that_makes_no_sense_is_refused(texts, word):
-    with pytest.raises(SplitError, match=word):
+    with pytest.raises(ParameterError, match=word):
         split_rule(texts)
 
 
 def test_a_size_is_no_duration():
-    with pytest.raises(SplitError, match='duration such as 30s'):
+    with pytest.raises(ParameterError, match='duration such as 30s'):
         duration_in_nanoseconds('30MB')

@@ -18,8 +18,8 @@ from engine_mount.experiments.harness.contract import (
 )
 from engine_mount.experiments.harness.drawing import GREY, family, finish, new_figure
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, RigNoise, measure_actuator
-from mount_models.actuator.law import TABLE_1, GapOutsideLaw, check_gap, checked_force
-from mount_models.quantity import Quantity
+from mount_models.actuator.law import TABLE_1, check_gap, checked_force
+from mount_models.quantity import OutsideLawError, Quantity
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import Specimen, default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, core_flux_density
@@ -163,7 +163,7 @@ def _within_table_1(gap: float) -> bool:
     """Return whether Table 1 holds at `gap` (m), and the specimen's fit was far from its ends."""
     try:
         check_gap(TABLE_1, gap)
-    except GapOutsideLaw:
+    except OutsideLawError:
         return False
     return gap >= 300e-6 - 1e-12
 

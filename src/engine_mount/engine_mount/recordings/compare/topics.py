@@ -20,7 +20,8 @@ from engine_mount.recordings.compare.signals import Column, Quantity, SignalDiff
 from engine_mount.recordings.compare.tolerances import Tolerances
 from engine_mount.recordings.messages.layout import OPTIONS, Layout, Numbers
 from engine_mount.recordings.messages.series import STAMP, STAMP_BYTES, Series, SeriesError
-from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
+from mount_ros.messages.force_table import ForceTable, from_message
+from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import CONTROL_TRACE, CURRENT_FORCE_TABLE, JOINT_STATE
 
 Places = NDArray[np.int64]
@@ -263,7 +264,7 @@ class MatchedTopic:
             return None
         try:
             a, b = (from_message(series.message(len(series) - 1)) for series in (self.a, self.b))
-        except (ForceTableMessageError, SeriesError):
+        except (MessageError, SeriesError):
             return None
         return (a, b) if a.current.shape == b.current.shape else None
 

@@ -48,7 +48,7 @@ def default_folder() -> Path:
 
 
 def default_limit() -> int:
-    """Return how many bytes all copies may have; raises `SplitError` where the variable holds no size."""
+    """Return how many bytes all copies may have; raises `ParameterError` where the variable holds no size."""
     return size_in_bytes(os.environ.get(LIMIT_VARIABLE) or LIMIT)
 
 
