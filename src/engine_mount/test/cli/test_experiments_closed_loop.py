@@ -8,15 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from engine_mount.experiments import page
-from engine_mount.experiments.bench import experiment as bench
+from engine_mount.experiments import bench, motorway_gap, page, sensitivity, sweep
 from engine_mount.experiments.harness.contract import Experiment, ExperimentError, Holds, Order, Outcome
-from engine_mount.experiments.motorway_gap import experiment as motorway_gap
+from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
 from engine_mount.experiments.registry import NAMES, experiment_named
-from engine_mount.experiments.sensitivity import experiment as sensitivity
-from engine_mount.experiments.sensitivity.grid import Job, run_all, run_job
-from engine_mount.experiments.sweep import experiment as sweep
-from engine_mount.experiments.sweep.evaluation import defined_peak
+from engine_mount.experiments.sweep import defined_peak
 from engine_mount.recordings.bag.recording import open_recording
 from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError

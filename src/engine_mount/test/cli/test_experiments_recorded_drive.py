@@ -9,10 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
-from engine_mount.experiments import page
+from engine_mount.experiments import page, recorded_drive
 from engine_mount.experiments.harness.contract import ExperimentError, Holds, Order
-from engine_mount.experiments.recorded_drive import experiment as recorded_drive
-from engine_mount.experiments.recorded_drive.evaluation import (
+from engine_mount.experiments.recorded_drive import (
     ELASTOMER,
     FRICTION,
     HYDRO,

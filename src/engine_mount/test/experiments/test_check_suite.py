@@ -11,14 +11,39 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.experiments.check import session, trial
-from engine_mount.experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
-from engine_mount.experiments.check.measures import MEASURES
-from engine_mount.experiments.check.page import write_page
-from engine_mount.experiments.check.session import CheckError, CheckOrder, run_trials, trials_of
-from engine_mount.experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
-from engine_mount.experiments.check.telling import Told, figures_of, table_of
-from engine_mount.experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
+from engine_mount.experiments.check import run
+from engine_mount.experiments.check.report import (
+    Judged,
+    Told,
+    all_verdicts,
+    figures_of,
+    passed,
+    table_of,
+    verdicts_of,
+    worst_first,
+    write_page,
+)
+from engine_mount.experiments.check.run import (
+    CORE,
+    GRAPH,
+    LOCKSTEP,
+    CheckError,
+    CheckOrder,
+    Result,
+    Shown,
+    at_samples,
+    broken_down,
+    run_trials,
+    trials_of,
+)
+from engine_mount.experiments.check.suite import (
+    MEASURES,
+    SuiteError,
+    chosen_of,
+    shipped_suite,
+    suite_in_file,
+    suite_of,
+)
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.signals import Truth
 from mount_bringup.graph.domain import DomainError
@@ -168,13 +193,13 @@ def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
 
 @pytest.mark.parametrize('error', [GraphError('no gap'), DomainError('a graph already runs')])
 def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
-    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
+    monkeypatch.setattr(run, 'record_drive', lambda *_: raise_(error))
     made = trials(tmp_path, through=GRAPH)[0]
-    broken = trial.run_trial(made)
+    broken = run.run_trial(made)
     assert (broken.figures, broken.broke_down) == ({}, str(error))
-    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(Interrupted()))
+    monkeypatch.setattr(run, 'record_drive', lambda *_: raise_(Interrupted()))
     with pytest.raises(Interrupted):
-        trial.run_trial(made)
+        run.run_trial(made)
 
 
 def raise_(error):
@@ -205,7 +230,7 @@ def test_each_manoeuvre_is_told_when_it_is_done_and_the_bar_goes_on_within_it(tm
         screen.say('of the drive alone')
         return result(peak_over_undamped=0.9) if made.manoeuvre.name == 'first' else result()
 
-    monkeypatch.setattr(session, 'run_trial', drive)
+    monkeypatch.setattr(run, 'run_trial', drive)
     made = trials_of(CheckOrder(suite_of(given), GRAPH), tmp_path)
     first = made[0].seconds / (made[0].seconds + made[1].seconds)
     screen, seen = Seen(), []

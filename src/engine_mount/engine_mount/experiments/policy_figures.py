@@ -1,0 +1,319 @@
+"""The figures of the comparison, from those of the runs."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine_mount.drives.bands import BELOW_ISOLATION
+from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE, first_extremum, peak_in
+from engine_mount.experiments.policy_cases import (
+    ABLATIONS,
+    AMPLITUDES,
+    COMPARED,
+    CONTINUOUS,
+    DAMPINGS,
+    DISTURBANCES,
+    HYDRO,
+    LEARNT_ROADS,
+    LEARNT_SCALES,
+    NAMED,
+    OFF,
+    PAPER,
+    POLICIES,
+    ROADS,
+    SPEED,
+    Axes,
+    PolicyParameters,
+)
+from engine_mount.reports.drive.signals import FloatArray
+from mount_models.arithmetic.compiled import compiled
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
+from mount_sim.excitation.scenario import STEP_TIME, SweepScenario
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, vehicle_step
+
+_STEPS = round(SAMPLE_TIME / STEP_TIME)
+_SPEED, _GAP_LENGTH, _GAP_SECONDS = 33.0, 1.0, 1.0  # m/s, m, s
+_SWEEP_SECONDS = (BELOW_ISOLATION[1] - FIRST_FREQUENCY) / RATE
+
+
+class GapLimit(NamedTuple):
+    """Largest displacement and first extremum (m) over a gap."""
+
+    peak_m: float
+    first_m: float
+
+
+@compiled
+def _damped(vehicle, state, road, damping, first, dt, displacement, every):
+    """Fill `displacement` (m) at each `every`-th step; the damper (N s/m) is on from step `first` on."""
+    velocity = 0.0
+    for k in range(road.size):
+        force = damping * velocity if k >= first else 0.0
+        motion = vehicle_step(vehicle, state[0], road[k], 0.0, force, dt)
+        velocity = motion.velocity
+        if k % every == 0:
+            displacement[k // every] = motion.displacement
+
+
+def damped(road: FloatArray, damping: float, first: int = 0) -> FloatArray:
+    """Return the displacement (m) at 1 kHz over a road (m) at the plant's step."""
+    displacement = np.zeros(-(-road.size // _STEPS))
+    _damped(Vehicle(), resting_vehicle(), road, damping, first, STEP_TIME, displacement, _STEPS)
+    return displacement
+
+
+def sweep_limit(level: float, damping: float) -> float:
+    """Return the largest displacement (m) from 3 to 14 Hz with an ideal damper always on."""
+    time = STEP_TIME * np.arange(round(_SWEEP_SECONDS / STEP_TIME))
+    displacement = damped(sweep_road(time, SweepScenario(velocity_amplitude=level)), damping)
+    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
+    return peak_in(frequency, displacement, BELOW_ISOLATION) or float('nan')
+
+
+def gap_limit(depth: float, damping: float, delay: float) -> GapLimit:
+    """Return what a damper leaves that is on `delay` s after the wheel meets the gap, on a smooth road."""
+    time = STEP_TIME * np.arange(round(_GAP_SECONDS / STEP_TIME))
+    road = gap_in_road(time, Gap(depth=depth, position=0.0, length=_GAP_LENGTH, speed=_SPEED))
+    displacement = damped(road, damping, round(delay / STEP_TIME))
+    return GapLimit(float(np.abs(displacement).max()), first_extremum(displacement))
+
+
+Found = dict[tuple[Any, ...], Any]
+_LIMIT_DAMPINGS = (910.0, 1100.0, 2000.0, 2600.0, 3000.0)  # N s/m
+_LIMIT_DELAYS = (0.0, 0.04, 0.065, 0.1, 0.15)  # s
+_LIMIT_DEPTH, _LIMIT_DAMPING = 0.02, 2000.0
+_SUPPORTED = (*POLICIES, OFF)
+
+
+def figures_of(found: Found, parameters: PolicyParameters, axes: Axes) -> dict[str, Any]:
+    """Return all figures: plain numbers, texts, lists and mappings."""
+    told = {
+        'sweep_ratio': _by_level(found, axes, 0.0),
+        'gap_peak_ratio': _of_gaps(found, parameters, axes, 'peak_m'),
+        'gap_first_extremum_ratio': _of_gaps(found, parameters, axes, 'first_m'),
+        'thd': _of_rack(found, axes, 'thd', (*POLICIES, HYDRO)),
+        'tracking': _of_rack(found, axes, 'tracking', POLICIES),
+        'high_frequency_ratio': _high(found, axes, 0.0),
+        'high_frequency_ratio_idling': _high(found, axes, parameters.idle_amplitude),
+        'roads': _of_roads(found, parameters),
+        'tip_in': {
+            who: {
+                'peak': found['tip-in', who]['peak_m'] / found['tip-in', HYDRO]['peak_m'],
+                'acceleration': found['tip-in', who]['acceleration'] / found['tip-in', OFF]['acceleration'],
+            }
+            for who in _SUPPORTED
+        },
+        'limits': _limits(found, axes),
+        'idle_amplitude_n': parameters.idle_amplitude,
+    }
+    road = 'recorded' if parameters.recorded is not None else 'random'
+    told['energy_road'] = road
+    told['energy_j_per_km'] = {who: told['roads'][road][who]['j_per_km'] for who in POLICIES}
+    if parameters.thorough:
+        told['robustness'] = _robustness(found, axes)
+        told['idling'] = _idling(found, axes)
+        told['learnt'] = _learnt(found, parameters, axes)
+        told['ablation'] = {name: _variant(found, ('ablation', name), axes) for name in ABLATIONS}
+        told['front'] = _front(found, axes)
+    return told
+
+
+def number(value: float) -> str:
+    """Return a number as the key of a mapping."""
+    return f'{value:g}'
+
+
+def _by_level(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
+    return {
+        who: {
+            number(level): found['sweep', who, level, idle]['peak_m']
+            / found['sweep', HYDRO, level, idle]['peak_m']
+            for level in axes.levels
+        }
+        for who in _SUPPORTED
+    }
+
+
+def _of_gaps(found: Found, parameters: PolicyParameters, axes: Axes, what: str) -> dict[str, Any]:
+    seeds = range(1, parameters.gap_seeds + 1)
+    return {
+        who: {
+            number(1e3 * depth): [
+                found['gap', who, depth, seed][what] / found['gap', HYDRO, depth, seed][what]
+                for seed in seeds
+            ]
+            for depth in axes.depths
+        }
+        for who in _SUPPORTED
+    }
+
+
+def _of_rack(found: Found, axes: Axes, what: str, who: tuple[str, ...]) -> dict[str, dict[str, float]]:
+    return {
+        each: {number(frequency): found['rack', each, frequency][what] for frequency in axes.frequencies}
+        for each in who
+    }
+
+
+def _high(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
+    """Return the rms of the acceleration in the bands above 14 Hz together, over that without current."""
+
+    def rms(who: str, level: float) -> float:
+        bands = [each for each in found['sweep', who, level, idle]['rms'] if each is not None]
+        return float(np.sqrt(np.sum(np.square(bands)))) if bands else float('nan')
+
+    return {
+        who: {
+            number(level): rms(who, level) / rms(OFF, level)
+            for level in axes.levels
+            if not np.isnan(rms(OFF, level))
+        }
+        for who in (*POLICIES, HYDRO)
+    }
+
+
+def _of_roads(found: Found, parameters: PolicyParameters) -> dict[str, Any]:
+    roads = dict.fromkeys(ROADS, SPEED)
+    if parameters.recorded is not None:
+        roads['recorded'] = parameters.recorded_speed
+    return {
+        road: {
+            who: {
+                'acceleration': _over(found, 'acceleration', road, who, 0.0, OFF),
+                'acceleration_idling': _over(
+                    found, 'acceleration', road, who, parameters.idle_amplitude, OFF
+                ),
+                'displacement': _over(found, 'peak_m', road, who, 0.0, HYDRO),
+                'j_per_km': 1e3 * found['road', who, road, 0.0]['power_w'] / speed,
+                'heat_w': found['road', who, road, 0.0]['heat_w'],
+            }
+            for who in COMPARED
+        }
+        for road, speed in roads.items()
+    }
+
+
+def _over(found: Found, what: str, road: str, who: str, idle: float, other: str) -> float:
+    return float(found['road', who, road, idle][what] / found['road', other, road, idle][what])
+
+
+def _robustness(found: Found, axes: Axes) -> dict[str, Any]:
+    """Return the highest ratio over the levels, by engine and disturbance; that of the paper's policy too."""
+
+    def worst(who: str, plant: tuple[str, float], name: str) -> float:
+        return max(
+            found['robust', who, *plant, name, level]['peak_m']
+            / found['robust', HYDRO, *plant, level]['peak_m']
+            for level in axes.engine_levels
+        )
+
+    return {
+        f'{frequency:g} Hz by {how}': {
+            **{name: worst(CONTINUOUS, (how, frequency), name) for name in DISTURBANCES},
+            PAPER: worst(PAPER, (how, frequency), 'nominal'),
+        }
+        for how, frequency in axes.plants
+    }
+
+
+def _idling(found: Found, axes: Axes) -> dict[str, Any]:
+    """Return acceleration over that without current, and displacement over the hydromount's, rms."""
+    return {
+        f'{1e6 * roughness:g}': {
+            who: {
+                f'{frequency:g} Hz, {force:g} N': [
+                    found['idle', who, roughness, frequency, force]['acceleration']
+                    / found['idle', OFF, roughness, frequency, force]['acceleration'],
+                    found['idle', who, roughness, frequency, force]['rms_m']
+                    / found['idle', HYDRO, roughness, frequency, force]['rms_m'],
+                ]
+                for frequency in axes.idle_frequencies
+                for force in axes.idle_forces
+            }
+            for who in COMPARED
+        }
+        for roughness in sorted({key[2] for key in found if key[0] == 'idle'})
+    }
+
+
+def _learnt(found: Found, parameters: PolicyParameters, axes: Axes) -> dict[str, Any]:
+    """Return what estimators from displacement alone say of engines and pads that are known here."""
+    seeds = range(1, parameters.gap_seeds + 1)
+    return {
+        'frequency_hz': {
+            f'{frequency:g} Hz by {how}': {
+                f'{1e6 * roughness:g}': found['learn', CONTINUOUS, how, frequency, roughness]['frequency_hz']
+                for roughness in LEARNT_ROADS
+            }
+            for how, frequency in axes.plants
+        },
+        'friction_scale': {
+            number(scale): {
+                f'{1e6 * roughness:g}': [
+                    found['learn', CONTINUOUS, scale, roughness, seed]['friction_scale'] for seed in seeds
+                ]
+                for roughness in LEARNT_ROADS
+            }
+            for scale in LEARNT_SCALES
+        },
+    }
+
+
+def _variant(found: Found, key: tuple[Any, ...], axes: Axes) -> dict[str, float]:
+    idle = max(each[-1] for each in found if each[: len(key)] == key and each[-2] == 'road')
+    low, high = axes.levels[0], axes.levels[-1]
+    road = found[*key, CONTINUOUS, 'road', 0.0]
+    idling = found[*key, CONTINUOUS, 'road', idle]
+    return {
+        'light_road': found[*key, CONTINUOUS, low]['peak_m'] / found['sweep', HYDRO, low, 0.0]['peak_m'],
+        'strong_road': found[*key, CONTINUOUS, high]['peak_m'] / found['sweep', HYDRO, high, 0.0]['peak_m'],
+        'acceleration': road['acceleration'] / found['road', OFF, 'random', 0.0]['acceleration'],
+        'acceleration_idling': idling['acceleration'] / found['road', OFF, 'random', idle]['acceleration'],
+        'j_per_km': 1e3 * road['power_w'] / SPEED,
+    }
+
+
+def _front(found: Found, axes: Axes) -> list[dict[str, Any]]:
+    """Return all points, each with whether another one is better in ratio, wear and both accelerations."""
+    points = []
+    names = {point: name for name, point in NAMED.items()}
+    for lowest, full in AMPLITUDES:
+        for damping in DAMPINGS:
+            figures = _variant(found, ('front', lowest, full, damping), axes)
+            points.append(
+                {
+                    'name': names.get((lowest, full, damping), ''),
+                    'lowest_amplitude_m': lowest,
+                    'full_amplitude_m': full,
+                    'damping_coefficient': damping,
+                    **figures,
+                }
+            )
+    costs = ('light_road', 'acceleration', 'acceleration_idling', 'j_per_km')
+    for point in points:
+        point['on_front'] = not any(
+            other is not point and all(other[cost] <= point[cost] for cost in costs) for other in points
+        )
+    return points
+
+
+def _limits(found: Found, axes: Axes) -> dict[str, Any]:
+    """Return what an ideal damper leaves: always on in the sweep, on after some delay over a gap."""
+    always, free = gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, 0.0), gap_limit(_LIMIT_DEPTH, 0.0, 0.0)
+    return {
+        'sweep_always_on': {
+            number(damping): {
+                number(level): sweep_limit(level, damping) / found['sweep', HYDRO, level, 0.0]['peak_m']
+                for level in axes.levels
+            }
+            for damping in _LIMIT_DAMPINGS
+        },
+        'gap_after_delay': {
+            number(1e3 * delay): gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, delay).peak_m / free.peak_m
+            for delay in _LIMIT_DELAYS
+        },
+        'gap_first_extremum_always_on': always.first_m / free.first_m,
+        'gap_damping': _LIMIT_DAMPING,
+        'gap_depth_m': _LIMIT_DEPTH,
+    }
