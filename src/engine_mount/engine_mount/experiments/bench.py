@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from engine_mount.experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Settings,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, family, finish, new_figure
@@ -55,7 +57,7 @@ class Loop:
     force: FloatArray
     friction_force: FloatArray
     wanted_force: FloatArray
-    figures: dict[str, Any]
+    figures: Values
 
 
 def loop_of(drive: DriveSignals, parameters: BenchParameters, damper: str) -> Loop:
@@ -113,7 +115,7 @@ def _mean_sign(velocity: FloatArray) -> FloatArray:
 
 def _figures_of(
     time: FloatArray, displacement: FloatArray, force: FloatArray, parameters: BenchParameters
-) -> dict[str, Any]:
+) -> Values:
     amplitudes = harmonics(time, force, parameters.frequency, ORDERS)
     loss = cycle_work(displacement, force, parameters.periods)
     return {
@@ -167,10 +169,10 @@ def dampers_of(parameters: BenchParameters) -> list[str]:
     return [*FAMILY, *([] if parameters.damper in FAMILY else [parameters.damper])]
 
 
-def _own(parameters: BenchParameters, mount: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def _own(parameters: BenchParameters, mount: Mapping[str, str]) -> Settings:
     # one period more: the window must not begin with the last settling sample
     seconds = parameters.settling + (parameters.periods + 1) / parameters.frequency
-    own: dict[str, dict[str, Any]] = {
+    own: dict[str, Values] = {
         'mount_sim': {
             'scenario': 'bench',
             'mount': mount['mount'],
@@ -187,7 +189,7 @@ def _own(parameters: BenchParameters, mount: Mapping[str, str]) -> dict[str, dic
 
 def _figures(
     loops: dict[str, Loop], drives: dict[str, DriveSignals], parameters: BenchParameters, mode: str
-) -> dict[str, Any]:
+) -> Values:
     hydro = np.array(loops[HYDRO].figures['harmonics_n'])
     runs = {name: loop.figures for name, loop in loops.items()}
     for name in dampers_of(parameters):
@@ -206,7 +208,7 @@ def _figures(
     }
 
 
-def _statements(figures: dict[str, Any]) -> list[Statement]:
+def _statements(figures: Values) -> list[Statement]:
     runs, damper = figures['runs'], figures['damper']
     family = [name for name in runs if 'lower_than_hydromount' in runs[name]]
     return [
@@ -218,7 +220,7 @@ def _statements(figures: dict[str, Any]) -> list[Statement]:
     ]
 
 
-def _on_active(figures: dict[str, Any], family: list[str]) -> Statement:
+def _on_active(figures: Values, family: list[str]) -> Statement:
     least = min(figures['runs'][name]['damping_active_share'] for name in family)
     return Statement(
         'Sec. 6',
@@ -230,7 +232,7 @@ def _on_active(figures: dict[str, Any], family: list[str]) -> Statement:
     )
 
 
-def _on_loss(runs: dict[str, Any], family: list[str]) -> Statement:
+def _on_loss(runs: Values, family: list[str]) -> Statement:
     losses = {name: runs[name]['loss_energy_j'] for name in family}
     least, hydro = runs[OFF]['loss_energy_j'], runs[HYDRO]['loss_energy_j']
     above = [name for name, loss in losses.items() if loss > hydro]
@@ -246,7 +248,7 @@ def _on_loss(runs: dict[str, Any], family: list[str]) -> Statement:
     )
 
 
-def _on_smoothness(figures: dict[str, Any], chosen: dict[str, Any]) -> Statement:
+def _on_smoothness(figures: Values, chosen: Values) -> Statement:
     steep, sine = chosen['steepest_share'], figures['sine_steepest_share']
     coulomb = figures['runs'][COULOMB]['steepest_share']
     told = 'no friction force' if steep is None else f'at most {100 * steep:.1f} % of its peak'
@@ -260,7 +262,7 @@ def _on_smoothness(figures: dict[str, Any], chosen: dict[str, Any]) -> Statement
     )
 
 
-def _on_harmonics(runs: dict[str, Any], family: list[str]) -> Statement:
+def _on_harmonics(runs: Values, family: list[str]) -> Statement:
     lower = {name: runs[name]['lower_than_hydromount'] for name in family}
     count = {name: len(orders) for name, orders in lower.items()}
     missing = {name: [k for k in range(1, ORDERS + 1) if k not in orders] for name, orders in lower.items()}
@@ -278,7 +280,7 @@ def _on_harmonics(runs: dict[str, Any], family: list[str]) -> Statement:
     )
 
 
-def _on_chosen(runs: dict[str, Any], damper: str) -> Statement:
+def _on_chosen(runs: Values, damper: str) -> Statement:
     chosen, hydro, coulomb = runs[damper], runs[HYDRO], runs[COULOMB]
     wanted = chosen['wanted_harmonics_n']
     found = chosen['friction_harmonics_n']

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from engine_mount.experiments.harness.contract import (
     Outcome,
     Progress,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, RED, family, finish, new_figure
@@ -135,7 +136,7 @@ def _at_current(current: float, parameters: PenetrationParameters) -> AtCurrent:
     )
 
 
-def _figures(cases: list[AtCurrent]) -> dict[str, Any]:
+def _figures(cases: list[AtCurrent]) -> Values:
     return {
         'currents_a': [case.current for case in cases],
         'relative_permeability': [case.permeability for case in cases],
@@ -218,7 +219,7 @@ def _draw_maps(case: AtCurrent, parameters: PenetrationParameters, file: Path) -
     return finish(figure, file)
 
 
-def _statements(results: dict[str, Any]) -> list[Statement]:
+def _statements(results: Values) -> list[Statement]:
     depth, other = results['equivalent_depth_m'], results['equivalent_depth_2d_m']
     middle, along = results['difference_in_middle'], results['difference_along_plate']
     currents = results['currents_a']

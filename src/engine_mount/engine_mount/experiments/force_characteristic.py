@@ -13,6 +13,7 @@ from engine_mount.experiments.harness.contract import (
     Progress,
     Seed,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import GREY, family, finish, new_figure
@@ -54,7 +55,7 @@ def run(order: Order, progress: Progress) -> Outcome:
     return Outcome(results, [picture], [], _statements(results))
 
 
-def _figures(measured: RigMeasurements, specimen: Specimen, parameters: ForceParameters) -> dict[str, Any]:
+def _figures(measured: RigMeasurements, specimen: Specimen, parameters: ForceParameters) -> Values:
     true = measure_actuator(parameters.actuator, RippleCoil(), measured.gaps, measured.currents)
     counted = measured.currents >= 0.1 - 1e-9
     law = checked_force(specimen.force_law, measured.currents, measured.gaps[:, np.newaxis])
@@ -113,7 +114,7 @@ def _draw(measured: RigMeasurements, specimen: Specimen, file: Path) -> Path:
     return finish(figure, file)
 
 
-def _statements(results: dict[str, Any]) -> list[Statement]:
+def _statements(results: Values) -> list[Statement]:
     forces = list(results['force_at_1_a_n'].items())
     exponent, bend = results['exponent_at_low_current'], results['bend_of_upper_part']
     return [

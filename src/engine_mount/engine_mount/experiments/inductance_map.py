@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from engine_mount.experiments.harness.contract import (
     Progress,
     Seed,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, RED, family, finish, new_figure
@@ -106,7 +107,7 @@ def read_ramp(recording: Recording, specimen: Specimen) -> Ramp:
 
 
 def _record_ramp(order: Order, parameters: InductanceParameters, progress: Progress) -> Path:
-    sim: dict[str, Any] = {
+    sim: Values = {
         'scenario': 'bench',
         'bench.amplitude': 0.0,
         'timeline.start': 3.0,
@@ -133,7 +134,7 @@ def _record_ramp(order: Order, parameters: InductanceParameters, progress: Progr
 
 def _figures(
     held: RigMeasurements, ramp: Ramp, specimen: Specimen, parameters: InductanceParameters
-) -> dict[str, Any]:
+) -> Values:
     rest, level = specimen.rest_current, specimen.crossing_inductance
     at_rest = [float(np.interp(rest, held.currents, row)) for row in held.inductance]
     crossings = [find_crossing(held.currents, row, level).current for row in held.inductance]
@@ -182,7 +183,7 @@ def _ranges(x: FloatArray, inside: npt.NDArray[np.bool_]) -> list[list[float]]:
     ]
 
 
-def _draw(held: RigMeasurements, ramp: Ramp, specimen: Specimen, results: dict[str, Any], file: Path) -> Path:
+def _draw(held: RigMeasurements, ramp: Ramp, specimen: Specimen, results: Values, file: Path) -> Path:
     figure = new_figure('Incremental inductance at held gaps and on the assembled actuator (Fig. 4)', 6.0)
     panels = figure.subplot_mosaic([['map', 'crossing'], ['map', 'rest']], width_ratios=(3, 2))
     axes = panels['map']
@@ -231,7 +232,7 @@ def _averaged(ramp: Ramp) -> tuple[FloatArray, FloatArray]:
     return current, inductance
 
 
-def _statements(results: dict[str, Any], parameters: InductanceParameters) -> list[Statement]:
+def _statements(results: Values, parameters: InductanceParameters) -> list[Statement]:
     rest, level = results['largest_gap_error_at_rest_m'], results['largest_gap_error_at_crossing_m']
     found = results['initialisation']
     at_rest, at_crossing = results['ramp_gap_at_rest_m'], results['ramp_gap_at_crossing_m']

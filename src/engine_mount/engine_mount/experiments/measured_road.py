@@ -1,7 +1,6 @@
 """A measured road under the whole vehicle: each policy, the hydromount and no current, at several speeds."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -16,11 +15,12 @@ from engine_mount.experiments.harness.contract import (
     Outcome,
     Progress,
     Statement,
+    Values,
     holds_if_lower,
     numbers_of,
     parameters_of,
 )
-from engine_mount.experiments.harness.many_runs import TruthOnly, run_all
+from engine_mount.experiments.harness.many_runs import Found, Job, TruthOnly, run_all
 from engine_mount.experiments.harness.measures import rms_in_bands
 from engine_mount.experiments.registry import NAMES
 from engine_mount.signals.roads.driving import CONTACT_LENGTH, wheel_height
@@ -38,15 +38,7 @@ _FIELDS = ('displacement', 'velocity', 'friction_force', 'chassis_acceleration')
 _SETTLING = 1.0  # s: a road fades in for so long
 
 
-@dataclass(frozen=True)
-class RoadJob:
-    """One drive: its key (speed in km/h, mount) and the parameters of the nodes."""
-
-    key: tuple[float, str]
-    parameters: Mapping[str, Mapping[str, Any]]
-
-
-def run_road_job(job: RoadJob) -> tuple[tuple[float, str], dict[str, Any]]:
+def run_road_job(job: Job) -> tuple[tuple[Any, ...], Values]:
     """Drive through the same closed loop as every drive in core; return key and figures."""
     truth = TruthOnly(_FIELDS)
     outcome = run_core_into(truth, job.parameters)
@@ -116,7 +108,7 @@ def run(order: Order, progress: Progress) -> Outcome:
 
 def _jobs(
     order: Order, parameters: MeasuredRoadParameters, profile: RoadProfile, speeds: list[float]
-) -> list[RoadJob]:
+) -> list[Job]:
     jobs = []
     for speed in speeds:
         folder = order.out / f'{speed:g}_km_h'
@@ -132,7 +124,7 @@ def _jobs(
                 'mount_sim': {'scenario': 'road', 'mount': _mount(who), **road},
                 'mount_control': {'policy': who} if who in POLICIES else {},
             }
-            jobs.append(RoadJob((speed, who), settings_of_run(order, own, NAME)))
+            jobs.append(Job((speed, who), settings_of_run(order, own, NAME)))
     return jobs
 
 
@@ -144,8 +136,8 @@ def _figures(
     profile: RoadProfile,
     parameters: MeasuredRoadParameters,
     speeds: list[float],
-    found: dict[tuple[Any, ...], Any],
-) -> dict[str, Any]:
+    found: Found,
+) -> Values:
     road = unevenness(profile)
     return {
         'source': Path(parameters.road).name,
@@ -160,7 +152,7 @@ def _figures(
     }
 
 
-def statements(figures: dict[str, Any]) -> list[Statement]:
+def statements(figures: Values) -> list[Statement]:
     """Return what the paper says of friction mount and hydromount, each with what came out here."""
     return [
         _statement(
@@ -178,7 +170,7 @@ def statements(figures: dict[str, Any]) -> list[Statement]:
     ]
 
 
-def _statement(figures: dict[str, Any], paper: str, what: str, value: Any) -> Statement:
+def _statement(figures: Values, paper: str, what: str, value: Any) -> Statement:
     ratios = {
         f'{who} at {speed} km/h': value(runs[who]) / value(runs[HYDRO])
         for speed, runs in figures['runs'].items()
@@ -210,7 +202,7 @@ _LIMITS = """## Limits of this comparison
 """
 
 
-def write_measured_road(figures: dict[str, Any], pictures: Sequence[Path], file: Path) -> Path:
+def write_measured_road(figures: Values, pictures: Sequence[Path], file: Path) -> Path:
     """Write the page to `file` and return it; its pictures are expected in `figures/`."""
     parts = [_HEAD, _road(figures), f'![The road](figures/{pictures[0].name})\n']
     parts += [_table(speed, runs, figures['bands_hz']) for speed, runs in figures['runs'].items()]
@@ -220,7 +212,7 @@ def write_measured_road(figures: dict[str, Any], pictures: Sequence[Path], file:
     return file
 
 
-def _road(figures: dict[str, Any]) -> str:
+def _road(figures: Values) -> str:
     told = '. '.join(sentence[0].upper() + sentence[1:] for sentence in figures['road'])
     command = f'engine-mount experiment measured_road --set measured_road.road={figures["source"]}'
     lateral = f' --set measured_road.lateral={figures["lateral_m"]:g}' if figures['lateral_m'] else ''
@@ -230,7 +222,7 @@ def _road(figures: dict[str, Any]) -> str:
     )
 
 
-def _table(speed: str, runs: dict[str, Any], bands: list[list[float]]) -> str:
+def _table(speed: str, runs: Values, bands: list[list[float]]) -> str:
     seconds = next(iter(runs.values()))['seconds']
     heads = [f'{low:g} to {high:g} Hz' for low, high in bands]
     lines = [
@@ -249,7 +241,7 @@ def _table(speed: str, runs: dict[str, Any], bands: list[list[float]]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _in_words(figures: dict[str, Any]) -> str:
+def _in_words(figures: Values) -> str:
     """Return who has the least of what, at each speed, as it came out."""
     lines = ['## In words\n']
     bands = figures['bands_hz']
@@ -262,7 +254,7 @@ def _in_words(figures: dict[str, Any]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _least(runs: dict[str, Any], value: Any) -> str:
+def _least(runs: Values, value: Any) -> str:
     """Return who has the least, and by how much less than the next."""
     first, second = sorted(runs, key=lambda who: value(runs[who]))[:2]
     share = 100.0 * (1.0 - value(runs[first]) / value(runs[second])) if value(runs[second]) else 0.0

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from engine_mount.experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Settings,
     Statement,
+    Values,
     holds_if,
     numbers_of,
     parameters_of,
@@ -39,9 +41,9 @@ class Crossing:
     exceeded: float | None
 
 
-def figures_of(crossing: Crossing, control: switched_viscous.Parameters) -> dict[str, Any]:
+def figures_of(crossing: Crossing, control: switched_viscous.Parameters) -> Values:
     """Return delays and durations of damping (s), rms and peaks (m); None if the level was not exceeded."""
-    found: dict[str, Any] = {'exceeded_s': crossing.exceeded}
+    found: Values = {'exceeded_s': crossing.exceeded}
     if crossing.exceeded is None:
         return found | dict.fromkeys(
             (
@@ -128,7 +130,7 @@ def run(order: Order, progress: Progress) -> Outcome:
     return Outcome(figures, [picture], recordings, _statements(figures))
 
 
-def _own(parameters: GapParameters, depth: float, mount: str) -> dict[str, dict[str, Any]]:
+def _own(parameters: GapParameters, depth: float, mount: str) -> Settings:
     return {
         'mount_sim': {
             'scenario': 'motorway',
@@ -152,7 +154,7 @@ def _figures(
     parameters: GapParameters,
     control: switched_viscous.Parameters,
     mode: str,
-) -> dict[str, Any]:
+) -> Values:
     told = {f'{1e3 * depth:g} mm': figures_of(each, control) for depth, each in crossings.items()}
     return {
         **told[f'{1e3 * parameters.gap_depth:g} mm'],
@@ -166,11 +168,11 @@ def _figures(
     }
 
 
-def _statements(figures: dict[str, Any]) -> list[Statement]:
+def _statements(figures: Values) -> list[Statement]:
     return [_on_switching_on(figures), _on_effect(figures), _on_switching_off(figures), _on_hydro(figures)]
 
 
-def _on_switching_on(figures: dict[str, Any]) -> Statement:
+def _on_switching_on(figures: Values) -> Statement:
     delays = {gap: found['on_delay_s'] for gap, found in figures['gaps'].items()}
     known = [delay for delay in delays.values() if delay is not None]
     inside = [_DELAY[0] <= delay <= _DELAY[1] for delay in known]
@@ -185,7 +187,7 @@ def _on_switching_on(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _on_effect(figures: dict[str, Any]) -> Statement:
+def _on_effect(figures: Values) -> Statement:
     known, told = _shares(figures, OFF)
     return Statement(
         'Fig. 15',
@@ -197,7 +199,7 @@ def _on_effect(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _on_switching_off(figures: dict[str, Any]) -> Statement:
+def _on_switching_off(figures: Values) -> Statement:
     gaps, period = figures['gaps'], figures['period_s']
     shown = {gap: found['off_delay_s'] for gap, found in gaps.items()}
     compared = {gap: found['off_delay_in_band_s'] for gap, found in gaps.items()}
@@ -224,7 +226,7 @@ def _delays(delays: dict[str, float | None]) -> str:
     return ', '.join(f'{gap}: {_milliseconds(delay)}' for gap, delay in delays.items())
 
 
-def _on_hydro(figures: dict[str, Any]) -> Statement:
+def _on_hydro(figures: Values) -> Statement:
     known, told = _shares(figures, HYDRO)
     peaks = {gap: found['peak_m'] for gap, found in figures['gaps'].items() if found['peak_m']}
     clear, less = holds_if([share < _CLEAR for share in known]), any(share < 1.0 for share in known)
@@ -239,7 +241,7 @@ def _on_hydro(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _shares(figures: dict[str, Any], other: str) -> tuple[list[float], str]:
+def _shares(figures: Values, other: str) -> tuple[list[float], str]:
     """Return the rms over that of the `other` mount where it is known, and all of it told by gap."""
     shares = {
         gap: found['rms_m'][FRICTION] / found['rms_m'][other] if found['rms_m'] else None

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import bmat, csc_matrix
 from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, condense, solve
+from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad
+from skfem.helpers import dot
 
 from mount_models.quantity import Quantity
 from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_flux_density
@@ -78,99 +79,77 @@ def plate_field(
     `actuator` has at this current, so both computations speak of the same state of the iron.
     """
     plate = _Plate(coil, actuator, gap, surroundings or PlateSurroundings())
-    steady = plate.steady_state(float(core_flux_density(actuator, current, gap)))
+    steady = plate.steady_field(float(core_flux_density(actuator, current, gap)))
     return plate.alternating_field(steady, current, periods)
 
 
 class _Plate:
-    """Mesh, matrices and what is measured on them."""
+    """Mesh and matrices of half a plate with half its gap, and the fields on them."""
 
     def __init__(self, coil: RippleCoil, actuator: ReluctanceActuator, gap: float, around: PlateSurroundings):
         self.coil, self.actuator = coil, actuator
-        self.half = coil.plate_half_thickness
-        self.edge = 0.5 * (gap + actuator.residual_gap)
-        self.length = 0.25 * actuator.core_length
-        x, y = _grid(self.half, self.edge, self.length, around)
-        self.shape = (y.size - 1, x.size - 1)
-        self.mesh = MeshQuad.init_tensor(x, y)
-        self.basis = Basis(self.mesh, ElementQuad2())
-        centre = self.mesh.p[:, self.mesh.t].mean(axis=1)
-        self.iron = (centre[0] < self.half) & (centre[1] > self.edge)
-        wound = (centre[0] > self.half + around.winding_distance) & (
-            centre[0] < self.half + around.winding_distance + around.winding_thickness
-        )
-        wound &= centre[1] > self.edge + around.winding_start
-        self.order = np.lexsort((centre[0], centre[1]))
-        self.heights = np.diff(y)
-        self.x, self.y = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])
-        element = self.basis.elem
-        line = np.array([_GAUSS, (0.5, 0.5)])
-        if np.ptp(self.mesh.mapping().F(line)[0, 0]) < 0.1 * (x[1] - x[0]):
-            line = line[::-1]  # the elements' own first direction is y
-        self.line = Basis(self.mesh, element, quadrature=(line, np.array([0.5, 0.5])))
-        self.points = np.asarray(self.line.global_coordinates()[0])
-        self.centre = Basis(self.mesh, element, quadrature=(np.array([[0.5], [0.5]]), np.array([1.0])))
-        self.fixed = self.basis.get_dofs(lambda p: p[0] < 1e-12).all()
+        self.half = half = coil.plate_half_thickness
+        edge, length = 0.5 * (gap + actuator.residual_gap), 0.25 * actuator.core_length
+        x, y = _grid(half, edge, length, around)
+        mesh = MeshQuad.init_tensor(x, y)
+        self.basis = Basis(mesh, ElementQuad2())
+        # two Gauss points across each element, where the gradient is most exact, and its centre
+        self.line = Basis(mesh, self.basis.elem, quadrature=(np.array([(0.5, 0.5), _GAUSS]), np.full(2, 0.5)))
+        self.centre = Basis(mesh, self.basis.elem, quadrature=(np.full((2, 1), 0.5), np.ones(1)))
+        across, along = mesh.p[:, mesh.t].mean(axis=1)
+        self.x, self.y, self.heights = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), np.diff(y)
+        self.rows = np.lexsort((across, along)).reshape(self.y.size, self.x.size)
+        self.columns_of_iron = np.flatnonzero(self.x < half)
+        self.rows_of_iron = np.flatnonzero(self.y > edge)
+        self.iron = self._per_point((across < half) & (along > edge))
+        distance = across - half - around.winding_distance
+        wound = (distance > 0.0) & (distance < around.winding_thickness)
+        wound &= along > edge + around.winding_start
         winding = _load.assemble(self.basis, inside=self._per_point(wound.astype(float)))
-        self.winding = winding / winding.sum()
-        middle = self.edge + 0.5 * self.length
-        self.middle_row = int(np.searchsorted(y, middle)) - 1
-        surface = self.basis.get_dofs(lambda p: np.isclose(p[0], self.half, atol=1e-9))
-        nodes = surface.all()
-        self.surface_node = int(
-            nodes[
-                np.argmin(
-                    np.abs(self.basis.doflocs[1, nodes] - y[self.middle_row : self.middle_row + 2].mean())
-                )
-            ]
-        )
+        self.free = self.basis.complement_dofs(self.basis.get_dofs(lambda p: p[0] < 1e-12))
+        self.winding = (winding / winding.sum())[self.free]
+        self.middle = int(np.searchsorted(y, edge + 0.5 * length)) - 1
+        surface = self.basis.get_dofs(lambda p: np.isclose(p[0], half, atol=1e-9)).all()
+        height = np.abs(self.basis.doflocs[1, surface] - self.y[self.middle])
+        self.surface_node = int(surface[np.argmin(height)])
 
-    def steady_state(self, flux_density: float) -> FloatArray:
-        """Return A of the steady field with this mean flux density (T) in the middle of the plate."""
+    def steady_field(self, flux_density: float) -> FloatArray:
+        """Return A with this mean flux density (T) in the middle of the plate, by damped Newton steps."""
         potential = np.zeros(self.basis.N)
         if flux_density == 0.0:
             return potential
-        # the tension of the circuit is a good start; the flux grows with it, so a secant finds it
-        tension = flux_density * self.edge / MU_0
-        last = (0.0, 0.0)
+        nothing = np.zeros(self.free.size)
+        found = self.with_imposed_flux(self.stiffness(potential)).solve(np.append(nothing, flux_density))
         for _ in range(_MOST_STEPS):
-            potential = self._magnetised(potential, tension)
-            reached = potential[self.surface_node] / self.half
-            if abs(reached - flux_density) < _SAME_FLUX * flux_density:
+            potential[self.free] = found[:-1]
+            residual = self._residual(found)
+            if np.linalg.norm(residual) < _SAME_FIELD * abs(found[-1]) * np.linalg.norm(self.winding):
                 return potential
-            slope = (reached - last[1]) / (tension - last[0])
-            last = (tension, reached)
-            tension += (flux_density - reached) / slope
-        raise FieldError(
-            f'the winding found no tension for {flux_density:.2f} T in {_MOST_STEPS} steps; ask for less'
-        )
-
-    def _magnetised(self, start: FloatArray, tension: float) -> FloatArray:
-        """Return A at a tension (A) of the quarter circuit by Newton's method with halved steps."""
-        potential, load = start, tension * self.winding
-        residual = self._residual(potential, load)
-        for _ in range(_MOST_STEPS):
-            if np.linalg.norm(residual) < _SAME_FIELD * np.linalg.norm(load):
-                return potential
-            step = solve(*condense(self._stiffness(potential), -residual, D=self.fixed))
+            step = self.with_imposed_flux(self.stiffness(potential)).solve(np.append(-residual, 0.0))
             share = 1.0
-            while True:
-                tried = potential + share * step
-                left = self._residual(tried, load)
-                if np.linalg.norm(left) < np.linalg.norm(residual) or share < _LEAST_SHARE:
-                    break
+            while share > _LEAST_SHARE and np.linalg.norm(
+                self._residual(found + share * step)
+            ) >= np.linalg.norm(residual):
                 share *= 0.5
-            potential, residual = tried, left
+            found = found + share * step
         raise FieldError(f'the steady field did not settle in {_MOST_STEPS} steps; use a smaller current')
 
-    def _residual(self, potential: FloatArray, load: FloatArray) -> FloatArray:
-        gradient = self.basis.interpolate(potential).grad
-        secant, _ = self._reluctivities(gradient)
-        residual = _flow.assemble(self.basis, flow=secant * gradient) - load
-        residual[self.fixed] = 0.0
-        return np.asarray(residual, np.float64)
+    def with_imposed_flux(self, matrix: Any) -> Any:
+        """Return the factors of a system whose last unknown is the tension (A), its last row the mean (T)."""
+        place = np.flatnonzero(self.free == self.surface_node)
+        sensed = csc_matrix(([1.0 / self.half], ([0], place)), shape=(1, self.free.size))
+        within = matrix[self.free][:, self.free]
+        return splu(bmat([[within, -csc_matrix(self.winding[:, np.newaxis])], [sensed, None]], format='csc'))
 
-    def _stiffness(self, potential: FloatArray) -> Any:
+    def _residual(self, found: FloatArray) -> FloatArray:
+        potential = np.zeros(self.basis.N)
+        potential[self.free] = found[:-1]
+        gradient = self.basis.interpolate(potential).grad
+        flow = _flow.assemble(self.basis, flow=self._reluctivities(gradient)[0] * gradient)
+        return np.asarray(flow[self.free] - found[-1] * self.winding, np.float64)
+
+    def stiffness(self, potential: FloatArray) -> Any:
+        """Return the matrix of the small field about the field `potential`."""
         gradient = self.basis.interpolate(potential).grad
         secant, slope = self._reluctivities(gradient)
         square = np.maximum((gradient**2).sum(axis=0), 1e-30)
@@ -178,42 +157,38 @@ class _Plate:
 
     def _reluctivities(self, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return H/B and dH/dB (m/H) at each point, of the core's magnetisation curve or of air."""
-        density = np.sqrt((gradient**2).sum(axis=0))
+        curve = self._curve(np.sqrt((gradient**2).sum(axis=0)))
+        secant, slope = (np.where(self.iron, each, 1.0 / MU_0) for each in curve)
+        return secant, slope
+
+    def _curve(self, density: Any) -> tuple[Any, Any]:
+        """Return H/B and dH/dB (m/H) of the core at a flux density (T)."""
         a = self.actuator
         linear = MU_0 * a.knee_field + a.saturation_polarisation - density
         field = (-linear + np.sqrt(linear**2 + 4.0 * MU_0 * density * a.knee_field)) / (2.0 * MU_0)
         knee = a.knee_field + field
         slope = 1.0 / (MU_0 + a.saturation_polarisation * a.knee_field / knee**2)
-        secant = 1.0 / (MU_0 + a.saturation_polarisation / knee)
-        iron = self._per_point(self.iron.astype(float)) > 0.5
-        return np.where(iron, secant, 1.0 / MU_0), np.where(iron, slope, 1.0 / MU_0)
+        return 1.0 / (MU_0 + a.saturation_polarisation / knee), slope
 
     def alternating_field(self, steady: FloatArray, current: float, periods: int) -> PlateField:
         """Return the field with the ripple on top of the steady one, in the periodic state."""
-        stiffness = self._stiffness(steady)
-        mass = _mass.assemble(self.basis, sigma=self._per_point(self.coil.conductivity * self.iron))
-        sensed = np.zeros(self.basis.N)
-        sensed[self.surface_node] = 1.0 / self.half
-        march = _March(stiffness, mass, self.winding, sensed, self.fixed)
+        march = _March(self, self.stiffness(steady))
         plus, period = duty(self.coil, current), self.coil.pwm_period
         on, off, delay = plus * period, (1.0 - plus) * period, self.coil.sample_delay
         # the bridge imposes the rate of the mean flux density
         rate = 2.0 * self.coil.link_voltage / (self.actuator.turns * self.actuator.gap_area)
         rise, fall = rate * (1.0 - plus), -rate * plus
-        potential = np.zeros(self.basis.N)
         # starting in the middle of a rise, the density has no mean from the first period on
-        potential, density = march.go(potential, 0.0, rise, 0.5 * on, _STEPS)
-        before = after = potential
-        changes = []
+        march.go(rise, 0.5 * on)
+        surface = []
         for _ in range(periods):
-            before, density = march.go(potential, density, fall, off, _STEPS)
-            after, density = march.go(before, density, rise, delay, _STEPS)
-            potential, density = march.go(after, density, rise, on - delay, _STEPS)
-            changes.append(self._profile(after - before)[1][0])
-        change = after - before
-        depth, profile = self._profile(change)
+            before = march.go(fall, off)
+            change = march.go(rise, delay) - before
+            march.go(rise, on - delay)
+            depth, profile = self._profile(change, self.middle)
+            surface.append(profile[0])
         mean = float(change[self.surface_node] / self.half)
-        slope = self._slope(float(steady[self.surface_node]) / self.half)
+        slope = float(self._curve(float(steady[self.surface_node]) / self.half)[1])
         return PlateField(
             depth=depth,
             change=profile,
@@ -225,59 +200,37 @@ class _Plate:
             y=self.y,
             steady=self._density(steady),
             alternating=self._density(change),
-            drift=float(abs(changes[-1] / changes[-2] - 1.0)) if periods > 1 else float('nan'),
+            drift=float(abs(surface[-1] / surface[-2] - 1.0)) if periods > 1 else float('nan'),
         )
 
-    def _profile(self, potential: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return depths (m) and dA/dx (T) across the plate in the middle of its length, surface first.
+    def _profile(self, potential: FloatArray, row: int) -> tuple[FloatArray, FloatArray]:
+        """Return depths (m) and dA/dx (T) across the plate in a row of elements, surface first.
 
-        Inside the elements at Gauss points, where the gradient is most exact; at the surface by a
-        straight line through the two nearest.
+        Within the elements at Gauss points; at the surface by a straight line through the two nearest.
         """
-        row = self._row_of_iron(self.middle_row)
-        x, density = self.points[row].ravel(), self._at_gauss_points(potential)[row].ravel()
+        elements = self.rows[row, self.columns_of_iron]
+        x = np.asarray(self.line.global_coordinates()[0])[elements].ravel()
         order = np.argsort(-x)
-        depth, density = self.half - x[order], density[order]
+        depth = self.half - x[order]
+        density = self.line.interpolate(potential).grad[0][elements].ravel()[order]
         slope = (density[1] - density[0]) / (depth[1] - depth[0])
         return np.append(0.0, depth), np.append(density[0] - slope * depth[0], density)
 
     def _mean_surface_field(self, change: FloatArray, steady: FloatArray) -> float:
         """Return the alternating field strength (A/m) along the surface, averaged over the plate's length."""
-        total = length = 0.0
-        density, base = self._at_gauss_points(change), self._at_gauss_points(steady)
-        for number, height in enumerate(self.heights):
-            row = self._row_of_iron(number)
-            if row.size:
-                outermost = row[-1]
-                near = np.argsort(-self.points[outermost])
-                depth = self.half - self.points[outermost][near]
-                at = density[outermost][near]
-                surface = at[0] - (at[1] - at[0]) / (depth[1] - depth[0]) * depth[0]
-                total += height * surface * self._slope(abs(float(base[outermost].mean())))
-                length += height
-        return total / length
-
-    def _row_of_iron(self, number: int) -> npt.NDArray[np.int64]:
-        """Return the elements of one row inside the plate, from the middle outwards."""
-        row = self.order.reshape(self.shape)[number]
-        return np.asarray(row[self.iron[row]], np.int64)
-
-    def _at_gauss_points(self, potential: FloatArray) -> FloatArray:
-        return np.asarray(self.line.interpolate(potential).grad[0], np.float64)
-
-    def _slope(self, density: float) -> float:
-        """Return dH/dB (m/H) of the core at a flux density (T)."""
-        a = self.actuator
-        linear = MU_0 * a.knee_field + a.saturation_polarisation - density
-        field = (-linear + np.sqrt(linear**2 + 4.0 * MU_0 * density * a.knee_field)) / (2.0 * MU_0)
-        return float(1.0 / (MU_0 + a.saturation_polarisation * a.knee_field / (a.knee_field + field) ** 2))
+        field = [
+            self._profile(change, row)[1][0]
+            * self._curve(abs(float(self._profile(steady, row)[1][1:3].mean())))[1]
+            for row in self.rows_of_iron
+        ]
+        return float(np.average(field, weights=self.heights[self.rows_of_iron]))
 
     def _density(self, potential: FloatArray) -> FloatArray:
         """Return |B| (T) at the centres of the elements, shape (y, x)."""
         gradient = self.centre.interpolate(potential).grad[:, :, 0]
-        return np.asarray(np.hypot(*gradient)[self.order].reshape(self.shape), np.float64)
+        return np.asarray(np.hypot(*gradient)[self.rows], np.float64)
 
-    def _per_point(self, values: FloatArray) -> FloatArray:
+    def _per_point(self, values: Any) -> Any:
         """Return one value of each element at all its points."""
         return np.repeat(values[:, np.newaxis], self.basis.X.shape[-1], axis=1)
 
@@ -285,57 +238,36 @@ class _Plate:
 class _March:
     """Steps of the linear alternating field, by a stiffly accurate method of second order.
 
-    What is imposed is a weighted sum of A, `sensed`; the tension of the winding is whatever that takes.
+    The mean flux density is imposed; the tension of the winding is whatever that takes.
     """
 
-    def __init__(
-        self,
-        stiffness: Any,
-        mass: Any,
-        winding: FloatArray,
-        sensed: FloatArray,
-        fixed: npt.NDArray[np.int64],
-    ):
-        free = np.setdiff1d(np.arange(winding.size), fixed)
-        self._free, self._winding, self._sensed = free, winding[free], sensed[free]
-        self._stiffness, self._mass = stiffness[free][:, free], mass[free][:, free]
-        self._factors: dict[float, _Solver] = {}
+    def __init__(self, plate: _Plate, stiffness: Any):
+        self._plate, self._stiffness = plate, stiffness
+        self._mass = _mass.assemble(plate.basis, sigma=plate.coil.conductivity * plate.iron)
+        self._free_mass = self._mass[plate.free][:, plate.free]
+        self._factors: dict[float, Any] = {}
+        self._inner, self._density = np.zeros(plate.free.size), 0.0
 
-    def go(
-        self, potential: FloatArray, imposed: float, rate: float, duration: float, steps: int
-    ) -> tuple[FloatArray, float]:
-        """Return A and the imposed sum after `duration` (s), in which that grows from `imposed` at `rate`."""
-        dt = duration / steps
-        solver = self._solver(_GAMMA * dt)
-        inner = potential[self._free]
-        for step in range(steps):
-            half_way = self._stage(solver, inner, imposed + rate * (step + _GAMMA) * dt)
-            start = inner + (1.0 - _GAMMA) / _GAMMA * (half_way - inner)
-            inner = self._stage(solver, start, imposed + rate * (step + 1) * dt)
-        result = np.zeros_like(potential)
-        result[self._free] = inner
-        return result, imposed + rate * duration
+    def go(self, rate: float, duration: float) -> FloatArray:
+        """Return A after `duration` (s), in which the mean flux density grows at `rate` (T/s)."""
+        dt = duration / _STEPS
+        if dt not in self._factors:
+            self._factors[dt] = self._plate.with_imposed_flux(self._mass / (_GAMMA * dt) + self._stiffness)
+        for step in range(_STEPS):
+            half_way = self._stage(dt, self._inner, self._density + rate * (step + _GAMMA) * dt)
+            start = self._inner + (1.0 - _GAMMA) / _GAMMA * (half_way - self._inner)
+            self._inner = self._stage(dt, start, self._density + rate * (step + 1) * dt)
+        self._density += rate * duration
+        potential = np.zeros(self._plate.basis.N)
+        potential[self._plate.free] = self._inner
+        return potential
 
-    def _stage(self, solver: '_Solver', start: FloatArray, imposed: float) -> FloatArray:
-        right = np.append(self._mass @ start / solver.step, imposed)
-        return np.asarray(solver.factor.solve(right)[:-1], np.float64)
-
-    def _solver(self, step: float) -> '_Solver':
-        if step not in self._factors:
-            column, row = csc_matrix(self._winding[:, np.newaxis]), csc_matrix(self._sensed[np.newaxis])
-            matrix = bmat([[self._mass / step + self._stiffness, -column], [row, None]], format='csc')
-            self._factors[step] = _Solver(step, splu(matrix))
-        return self._factors[step]
-
-
-@dataclass(frozen=True)
-class _Solver:
-    step: float
-    factor: Any
+    def _stage(self, dt: float, start: FloatArray, imposed: float) -> FloatArray:
+        right = np.append(self._free_mass @ start / (_GAMMA * dt), imposed)
+        return np.asarray(self._factors[dt].solve(right)[:-1], np.float64)
 
 
 _MOST_STEPS = 60
-_SAME_FLUX = 1e-6
 _SAME_FIELD = 1e-9
 _LEAST_SHARE = 1e-3
 _STEPS = 16  # in each part of the period
@@ -351,9 +283,8 @@ def _grid(
     inwards = _graded(half, around.finest)
     outwards = _graded(around.air_width, 4.0 * around.finest)
     upwards = _graded(length, 8.0 * around.finest)
-    gap = np.linspace(0.0, edge, 9)
     x = np.concatenate([(half - inwards)[::-1], half + outwards[1:]])
-    return x, np.concatenate([gap, edge + upwards[1:]])
+    return x, np.concatenate([np.linspace(0.0, edge, 9), edge + upwards[1:]])
 
 
 def _graded(length: float, first: float) -> FloatArray:
@@ -367,11 +298,7 @@ def _graded(length: float, first: float) -> FloatArray:
 @BilinearForm
 def _tensor(u: Any, v: Any, w: Any) -> Any:
     """across grad(u) . grad(v) + along (g . grad(u)) (g . grad(v))."""
-    plain = u.grad[0] * v.grad[0] + u.grad[1] * v.grad[1]
-    directed = (w['g'][0] * u.grad[0] + w['g'][1] * u.grad[1]) * (
-        w['g'][0] * v.grad[0] + w['g'][1] * v.grad[1]
-    )
-    return w['across'] * plain + w['along'] * directed
+    return w['across'] * dot(u.grad, v.grad) + w['along'] * dot(w['g'], u.grad) * dot(w['g'], v.grad)
 
 
 @BilinearForm
@@ -381,7 +308,7 @@ def _mass(u: Any, v: Any, w: Any) -> Any:
 
 @LinearForm
 def _flow(v: Any, w: Any) -> Any:
-    return w['flow'][0] * v.grad[0] + w['flow'][1] * v.grad[1]
+    return dot(w['flow'], v.grad)
 
 
 @LinearForm

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,11 +12,12 @@ from engine_mount.experiments.harness.contract import (
     Outcome,
     Progress,
     Statement,
+    Values,
     numbers_of,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, GREY, finish, new_figure
-from engine_mount.experiments.harness.many_runs import run_all
+from engine_mount.experiments.harness.many_runs import Found, run_all
 from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE
 from engine_mount.experiments.policy_cases import (
     COMPARED,
@@ -77,7 +77,7 @@ def axes_of(parameters: PolicyParameters) -> Axes:
     )
 
 
-def statements(figures: dict[str, Any]) -> list[Statement]:
+def statements(figures: Values) -> list[Statement]:
     """Return what the paper says that depends on the policy, with what these figures say to it."""
     sweep, gap = figures['sweep_ratio'], figures['gap_peak_ratio']
 
@@ -116,7 +116,7 @@ _COLOURS = {
 _GAP_TIME, _BEFORE, _AFTER = 2.0, 0.05, 0.8  # s
 
 
-def draw_all(found: dict[Any, Any], figures: dict[str, Any], axes: Axes, folder: Path) -> list[Path]:
+def draw_all(found: Found, figures: Values, axes: Axes, folder: Path) -> list[Path]:
     """Draw what there is to draw and return the pictures."""
     pictures = [draw_velocity(folder / 'policy_velocity.png')]
     swept = sorted({key[2] for key, each in found.items() if key[0] == 'sweep' and 'displacement' in each})
@@ -132,7 +132,7 @@ def draw_all(found: dict[Any, Any], figures: dict[str, Any], axes: Axes, folder:
     return pictures
 
 
-def draw_sweeps(found: dict[Any, Any], levels: list[float], file: Path) -> Path:
+def draw_sweeps(found: Found, levels: list[float], file: Path) -> Path:
     """Draw the largest displacement in each half hertz, for all policies and mounts."""
     figure = new_figure('Front wheels on a sweep: largest displacement by policy', 3.2 * len(levels))
     panels = np.atleast_1d(figure.subplots(len(levels), 1, sharex=True))
@@ -153,7 +153,7 @@ def draw_sweeps(found: dict[Any, Any], levels: list[float], file: Path) -> Path:
     return finish(figure, file)
 
 
-def draw_gap(found: dict[Any, Any], place: tuple[float, int], file: Path) -> Path:
+def draw_gap(found: Found, place: tuple[float, int], file: Path) -> Path:
     """Draw the displacement over one gap, undamped in grey."""
     depth, seed = place
     figure = new_figure(f'Over a gap of {1e3 * depth:g} mm in the motorway')
@@ -219,7 +219,7 @@ def _true(frequency: FloatArray, lead: float) -> FloatArray:
     return 2j * np.pi * frequency * np.exp(2j * math.pi * frequency * lead)
 
 
-def draw_spectra(found: dict[Any, Any], idle: float, file: Path) -> Path:
+def draw_spectra(found: Found, idle: float, file: Path) -> Path:
     """Draw the chassis acceleration on the recorded road in bands of 1 Hz, without and with idle force."""
     figure = new_figure('The recorded drive as a road: acceleration of the chassis', 6.5)
     panels = figure.subplots(2, 1, sharex=True)
@@ -235,7 +235,7 @@ def draw_spectra(found: dict[Any, Any], idle: float, file: Path) -> Path:
     return finish(figure, file)
 
 
-def draw_front(points: list[dict[str, Any]], file: Path) -> Path:
+def draw_front(points: list[Values], file: Path) -> Path:
     """Draw the ratio on a light road over wear and over the acceleration with an idling engine."""
     figure = new_figure('What damping on light roads costs: lowest amplitude and damping varied')
     panels = figure.subplots(1, 2, sharey=True)

@@ -5,8 +5,8 @@ from itertools import product
 from typing import Annotated, Any, NamedTuple
 
 from engine_mount.experiments.harness.closed_loop import settings_of_run
-from engine_mount.experiments.harness.contract import Order
-from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE
+from engine_mount.experiments.harness.contract import Order, Values
+from engine_mount.experiments.harness.measures import sweep_parameters
 from engine_mount.experiments.policy_runs import PolicyJob
 from mount_control.policy import continuous_viscous
 from mount_models.quantity import Quantity
@@ -129,7 +129,9 @@ class Jobs:
         for level, idle, who in product(self._axes.levels, (0.0, self._parameters.idle_amplitude), COMPARED):
             kept = idle == 0.0 and level in _SHOWN_LEVELS
             last = self._parameters.last_frequency
-            yield self._job(('sweep', who, level, idle), _sweep(level, last, idle), 'sweep', kept=kept)
+            yield self._job(
+                ('sweep', who, level, idle), sweep_parameters(level, last, idle), 'sweep', kept=kept
+            )
 
     def gaps(self) -> Iterator[PolicyJob]:
         """Yield the gaps of all depths on several roads."""
@@ -171,7 +173,7 @@ class Jobs:
         for plant, (name, changes), level in product(
             self._axes.plants, DISTURBANCES.items(), self._axes.engine_levels
         ):
-            sim = _sweep(level, 14.0, 0.0) | _engine(*plant)
+            sim = sweep_parameters(level, 14.0, 0.0) | _engine(*plant)
             yield self._job(('robust', CONTINUOUS, *plant, name, level), sim | changes, 'sweep')
             if name == 'nominal':
                 yield self._job(('robust', HYDRO, *plant, level), sim, 'sweep')
@@ -208,7 +210,7 @@ class Jobs:
 
     def _variant(self, key: tuple[Any, ...], changes: dict[str, float]) -> Iterator[PolicyJob]:
         for level in (self._axes.levels[0], self._axes.levels[-1]):
-            yield self._job((*key, CONTINUOUS, level), _sweep(level, 14.0, 0.0), 'sweep', changes)
+            yield self._job((*key, CONTINUOUS, level), sweep_parameters(level, 14.0, 0.0), 'sweep', changes)
         for idle in (0.0, self._parameters.idle_amplitude):
             sim = _motorway(_ROUGH, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
             yield self._job((*key, CONTINUOUS, 'road', idle), sim, 'road', changes)
@@ -216,7 +218,7 @@ class Jobs:
     def _job(
         self,
         key: tuple[Any, ...],
-        sim: dict[str, Any],
+        sim: Values,
         kind: str,
         changes: dict[str, float] | None = None,
         **more: Any,
@@ -234,18 +236,7 @@ def _named(policy: str, changes: dict[str, float]) -> dict[str, float]:
     return {f'{policy}.{name}': value for name, value in changes.items()}
 
 
-def _sweep(level: float, last: float, idle: float) -> dict[str, Any]:
-    return {
-        'scenario': 'sweep',
-        'sweep.velocity_amplitude': level,
-        'sweep.first_frequency': FIRST_FREQUENCY,
-        'sweep.last_frequency': last,
-        'sweep.rate': RATE,
-        'idle.amplitude': idle,
-    }
-
-
-def _motorway(roughness: float, seed: int, duration: float) -> dict[str, Any]:
+def _motorway(roughness: float, seed: int, duration: float) -> Values:
     return {
         'scenario': 'motorway',
         'seed': seed,
@@ -256,7 +247,7 @@ def _motorway(roughness: float, seed: int, duration: float) -> dict[str, Any]:
     }
 
 
-def _gap(depth: float, roughness: float, seed: int) -> dict[str, Any]:
+def _gap(depth: float, roughness: float, seed: int) -> Values:
     return {
         **_motorway(roughness, seed, _GAP_SECONDS),
         'motorway.gap_depth': depth,

@@ -1,10 +1,13 @@
 """The figures of the comparison, from those of the runs."""
 
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine_mount.drives.bands import BELOW_ISOLATION
+from engine_mount.experiments.harness.contract import Values
+from engine_mount.experiments.harness.many_runs import Found
 from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE, first_extremum, peak_in
 from engine_mount.experiments.policy_cases import (
     ABLATIONS,
@@ -79,81 +82,128 @@ def gap_limit(depth: float, damping: float, delay: float) -> GapLimit:
     return GapLimit(float(np.abs(displacement).max()), first_extremum(displacement))
 
 
-Found = dict[tuple[Any, ...], Any]
 _LIMIT_DAMPINGS = (910.0, 1100.0, 2000.0, 2600.0, 3000.0)  # N s/m
 _LIMIT_DELAYS = (0.0, 0.04, 0.065, 0.1, 0.15)  # s
 _LIMIT_DEPTH, _LIMIT_DAMPING = 0.02, 2000.0
 _SUPPORTED = (*POLICIES, OFF)
 
 
-def figures_of(found: Found, parameters: PolicyParameters, axes: Axes) -> dict[str, Any]:
+def figures_of(found: Found, parameters: PolicyParameters, axes: Axes) -> Values:
     """Return all figures: plain numbers, texts, lists and mappings."""
-    told = {
-        'sweep_ratio': _by_level(found, axes, 0.0),
-        'gap_peak_ratio': _of_gaps(found, parameters, axes, 'peak_m'),
-        'gap_first_extremum_ratio': _of_gaps(found, parameters, axes, 'first_m'),
-        'thd': _of_rack(found, axes, 'thd', (*POLICIES, HYDRO)),
-        'tracking': _of_rack(found, axes, 'tracking', POLICIES),
+    idle, seeds = parameters.idle_amplitude, range(1, parameters.gap_seeds + 1)
+
+    def over(what: str, kind: str, who: str, *rest: Any, other: str = HYDRO) -> float:
+        """Return a figure of one mount over that of the `other` one in the same run."""
+        return float(found[kind, who, *rest][what] / found[kind, other, *rest][what])
+
+    def of_gaps(what: str) -> Values:
+        return {
+            who: {number(1e3 * d): [over(what, 'gap', who, d, seed) for seed in seeds] for d in axes.depths}
+            for who in _SUPPORTED
+        }
+
+    def of_rack(what: str, *mounts: str) -> Values:
+        return {who: {number(f): found['rack', who, f][what] for f in axes.frequencies} for who in mounts}
+
+    def of_road(road: str, speed: float, who: str) -> Values:
+        return {
+            'acceleration': over('acceleration', 'road', who, road, 0.0, other=OFF),
+            'acceleration_idling': over('acceleration', 'road', who, road, idle, other=OFF),
+            'displacement': over('peak_m', 'road', who, road, 0.0),
+            'j_per_km': 1e3 * found['road', who, road, 0.0]['power_w'] / speed,
+            'heat_w': found['road', who, road, 0.0]['heat_w'],
+        }
+
+    roads = dict.fromkeys(ROADS, SPEED)
+    if parameters.recorded is not None:
+        roads['recorded'] = parameters.recorded_speed
+    energy_road = 'random' if parameters.recorded is None else 'recorded'
+    told: Values = {
+        'sweep_ratio': {
+            who: {number(level): over('peak_m', 'sweep', who, level, 0.0) for level in axes.levels}
+            for who in _SUPPORTED
+        },
+        'gap_peak_ratio': of_gaps('peak_m'),
+        'gap_first_extremum_ratio': of_gaps('first_m'),
+        'thd': of_rack('thd', *POLICIES, HYDRO),
+        'tracking': of_rack('tracking', *POLICIES),
         'high_frequency_ratio': _high(found, axes, 0.0),
-        'high_frequency_ratio_idling': _high(found, axes, parameters.idle_amplitude),
-        'roads': _of_roads(found, parameters),
+        'high_frequency_ratio_idling': _high(found, axes, idle),
+        'roads': {
+            road: {who: of_road(road, speed, who) for who in COMPARED} for road, speed in roads.items()
+        },
         'tip_in': {
             who: {
-                'peak': found['tip-in', who]['peak_m'] / found['tip-in', HYDRO]['peak_m'],
-                'acceleration': found['tip-in', who]['acceleration'] / found['tip-in', OFF]['acceleration'],
+                'peak': over('peak_m', 'tip-in', who),
+                'acceleration': over('acceleration', 'tip-in', who, other=OFF),
             }
             for who in _SUPPORTED
         },
         'limits': _limits(found, axes),
-        'idle_amplitude_n': parameters.idle_amplitude,
+        'idle_amplitude_n': idle,
+        'energy_road': energy_road,
     }
-    road = 'recorded' if parameters.recorded is not None else 'random'
-    told['energy_road'] = road
-    told['energy_j_per_km'] = {who: told['roads'][road][who]['j_per_km'] for who in POLICIES}
-    if parameters.thorough:
-        told['robustness'] = _robustness(found, axes)
-        told['idling'] = _idling(found, axes)
-        told['learnt'] = _learnt(found, parameters, axes)
-        told['ablation'] = {name: _variant(found, ('ablation', name), axes) for name in ABLATIONS}
-        told['front'] = _front(found, axes)
-    return told
+    told['energy_j_per_km'] = {who: told['roads'][energy_road][who]['j_per_km'] for who in POLICIES}
+    if not parameters.thorough:
+        return told
+    engines = {f'{frequency:g} Hz by {how}': (how, frequency) for how, frequency in axes.plants}
+
+    def worst(who: str, plant: tuple[str, float], name: str) -> float:
+        """Return the highest ratio over the levels."""
+        return max(
+            found['robust', who, *plant, name, level]['peak_m']
+            / found['robust', HYDRO, *plant, level]['peak_m']
+            for level in axes.engine_levels
+        )
+
+    return told | {
+        'robustness': {
+            engine: {
+                **{name: worst(CONTINUOUS, plant, name) for name in DISTURBANCES},
+                PAPER: worst(PAPER, plant, 'nominal'),
+            }
+            for engine, plant in engines.items()
+        },
+        'idling': {
+            number(1e6 * roughness): {
+                who: {
+                    f'{frequency:g} Hz, {force:g} N': [
+                        over('acceleration', 'idle', who, roughness, frequency, force, other=OFF),
+                        over('rms_m', 'idle', who, roughness, frequency, force),
+                    ]
+                    for frequency, force in product(axes.idle_frequencies, axes.idle_forces)
+                }
+                for who in COMPARED
+            }
+            for roughness in sorted({key[2] for key in found if key[0] == 'idle'})
+        },
+        # what estimators from displacement alone say of engines and pads that are known here
+        'learnt': {
+            'frequency_hz': {
+                engine: {
+                    number(1e6 * road): found['learn', CONTINUOUS, *plant, road]['frequency_hz']
+                    for road in LEARNT_ROADS
+                }
+                for engine, plant in engines.items()
+            },
+            'friction_scale': {
+                number(scale): {
+                    number(1e6 * road): [
+                        found['learn', CONTINUOUS, scale, road, seed]['friction_scale'] for seed in seeds
+                    ]
+                    for road in LEARNT_ROADS
+                }
+                for scale in LEARNT_SCALES
+            },
+        },
+        'ablation': {name: _variant(found, ('ablation', name), axes) for name in ABLATIONS},
+        'front': _front(found, axes),
+    }
 
 
 def number(value: float) -> str:
     """Return a number as the key of a mapping."""
     return f'{value:g}'
-
-
-def _by_level(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
-    return {
-        who: {
-            number(level): found['sweep', who, level, idle]['peak_m']
-            / found['sweep', HYDRO, level, idle]['peak_m']
-            for level in axes.levels
-        }
-        for who in _SUPPORTED
-    }
-
-
-def _of_gaps(found: Found, parameters: PolicyParameters, axes: Axes, what: str) -> dict[str, Any]:
-    seeds = range(1, parameters.gap_seeds + 1)
-    return {
-        who: {
-            number(1e3 * depth): [
-                found['gap', who, depth, seed][what] / found['gap', HYDRO, depth, seed][what]
-                for seed in seeds
-            ]
-            for depth in axes.depths
-        }
-        for who in _SUPPORTED
-    }
-
-
-def _of_rack(found: Found, axes: Axes, what: str, who: tuple[str, ...]) -> dict[str, dict[str, float]]:
-    return {
-        each: {number(frequency): found['rack', each, frequency][what] for frequency in axes.frequencies}
-        for each in who
-    }
 
 
 def _high(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
@@ -163,100 +213,10 @@ def _high(found: Found, axes: Axes, idle: float) -> dict[str, dict[str, float]]:
         bands = [each for each in found['sweep', who, level, idle]['rms'] if each is not None]
         return float(np.sqrt(np.sum(np.square(bands)))) if bands else float('nan')
 
+    levels = [level for level in axes.levels if not np.isnan(rms(OFF, level))]
     return {
-        who: {
-            number(level): rms(who, level) / rms(OFF, level)
-            for level in axes.levels
-            if not np.isnan(rms(OFF, level))
-        }
+        who: {number(level): rms(who, level) / rms(OFF, level) for level in levels}
         for who in (*POLICIES, HYDRO)
-    }
-
-
-def _of_roads(found: Found, parameters: PolicyParameters) -> dict[str, Any]:
-    roads = dict.fromkeys(ROADS, SPEED)
-    if parameters.recorded is not None:
-        roads['recorded'] = parameters.recorded_speed
-    return {
-        road: {
-            who: {
-                'acceleration': _over(found, 'acceleration', road, who, 0.0, OFF),
-                'acceleration_idling': _over(
-                    found, 'acceleration', road, who, parameters.idle_amplitude, OFF
-                ),
-                'displacement': _over(found, 'peak_m', road, who, 0.0, HYDRO),
-                'j_per_km': 1e3 * found['road', who, road, 0.0]['power_w'] / speed,
-                'heat_w': found['road', who, road, 0.0]['heat_w'],
-            }
-            for who in COMPARED
-        }
-        for road, speed in roads.items()
-    }
-
-
-def _over(found: Found, what: str, road: str, who: str, idle: float, other: str) -> float:
-    return float(found['road', who, road, idle][what] / found['road', other, road, idle][what])
-
-
-def _robustness(found: Found, axes: Axes) -> dict[str, Any]:
-    """Return the highest ratio over the levels, by engine and disturbance; that of the paper's policy too."""
-
-    def worst(who: str, plant: tuple[str, float], name: str) -> float:
-        return max(
-            found['robust', who, *plant, name, level]['peak_m']
-            / found['robust', HYDRO, *plant, level]['peak_m']
-            for level in axes.engine_levels
-        )
-
-    return {
-        f'{frequency:g} Hz by {how}': {
-            **{name: worst(CONTINUOUS, (how, frequency), name) for name in DISTURBANCES},
-            PAPER: worst(PAPER, (how, frequency), 'nominal'),
-        }
-        for how, frequency in axes.plants
-    }
-
-
-def _idling(found: Found, axes: Axes) -> dict[str, Any]:
-    """Return acceleration over that without current, and displacement over the hydromount's, rms."""
-    return {
-        f'{1e6 * roughness:g}': {
-            who: {
-                f'{frequency:g} Hz, {force:g} N': [
-                    found['idle', who, roughness, frequency, force]['acceleration']
-                    / found['idle', OFF, roughness, frequency, force]['acceleration'],
-                    found['idle', who, roughness, frequency, force]['rms_m']
-                    / found['idle', HYDRO, roughness, frequency, force]['rms_m'],
-                ]
-                for frequency in axes.idle_frequencies
-                for force in axes.idle_forces
-            }
-            for who in COMPARED
-        }
-        for roughness in sorted({key[2] for key in found if key[0] == 'idle'})
-    }
-
-
-def _learnt(found: Found, parameters: PolicyParameters, axes: Axes) -> dict[str, Any]:
-    """Return what estimators from displacement alone say of engines and pads that are known here."""
-    seeds = range(1, parameters.gap_seeds + 1)
-    return {
-        'frequency_hz': {
-            f'{frequency:g} Hz by {how}': {
-                f'{1e6 * roughness:g}': found['learn', CONTINUOUS, how, frequency, roughness]['frequency_hz']
-                for roughness in LEARNT_ROADS
-            }
-            for how, frequency in axes.plants
-        },
-        'friction_scale': {
-            number(scale): {
-                f'{1e6 * roughness:g}': [
-                    found['learn', CONTINUOUS, scale, roughness, seed]['friction_scale'] for seed in seeds
-                ]
-                for roughness in LEARNT_ROADS
-            }
-            for scale in LEARNT_SCALES
-        },
     }
 
 
@@ -274,7 +234,7 @@ def _variant(found: Found, key: tuple[Any, ...], axes: Axes) -> dict[str, float]
     }
 
 
-def _front(found: Found, axes: Axes) -> list[dict[str, Any]]:
+def _front(found: Found, axes: Axes) -> list[Values]:
     """Return all points, each with whether another one is better in ratio, wear and both accelerations."""
     points = []
     names = {point: name for name, point in NAMED.items()}
@@ -298,7 +258,7 @@ def _front(found: Found, axes: Axes) -> list[dict[str, Any]]:
     return points
 
 
-def _limits(found: Found, axes: Axes) -> dict[str, Any]:
+def _limits(found: Found, axes: Axes) -> Values:
     """Return what an ideal damper leaves: always on in the sweep, on after some delay over a gap."""
     always, free = gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, 0.0), gap_limit(_LIMIT_DEPTH, 0.0, 0.0)
     return {

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from engine_mount.experiments.harness.contract import Settings, Values
 from engine_mount.experiments.policy_cases import CONTINUOUS, PAPER, POLICIES
 
 _HEAD = f"""# Control policies side by side
@@ -22,7 +22,7 @@ below 1 is won.
 """
 
 
-def write_policy(figures: dict[str, Any], pictures: Sequence[Path], file: Path) -> Path:
+def write_policy(figures: Values, pictures: Sequence[Path], file: Path) -> Path:
     """Write the page to `file` and return it; its pictures are expected in `figures/`."""
     shown = {picture.stem: picture.name for picture in pictures}
     parts = [_HEAD, _in_short(figures), _sweeps(figures, shown), _gaps(figures, shown), _rack(figures, shown)]
@@ -39,7 +39,7 @@ def write_policy(figures: dict[str, Any], pictures: Sequence[Path], file: Path) 
     return file
 
 
-def _in_short(figures: dict[str, Any]) -> str:
+def _in_short(figures: Values) -> str:
     sweep, gap = figures['sweep_ratio'], figures['gap_peak_ratio']
     lines = ['## In short\n', '| | ' + ' | '.join(POLICIES) + ' |', '|---|---|---|']
     road = figures['roads'][figures['energy_road']]
@@ -64,7 +64,7 @@ def _in_short(figures: dict[str, Any]) -> str:
     return '\n'.join(lines) + '\n\n' + _lost(figures)
 
 
-def _lost(figures: dict[str, Any]) -> str:
+def _lost(figures: Values) -> str:
     """Return what the continuous law costs."""
     road, tip = figures['roads'][figures['energy_road']], figures['tip_in'][CONTINUOUS]
     paper, ours = road[PAPER], road[CONTINUOUS]
@@ -86,7 +86,7 @@ def _lost(figures: dict[str, Any]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _sweeps(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
+def _sweeps(figures: Values, shown: Mapping[str, str]) -> str:
     text = '## Sweep\n\n' + _picture(shown, 'policy_sweep', 'Largest displacement over frequency')
     text += 'Largest displacement from 3 to 14 Hz, by road level V0 in m/s:\n\n'
     text += _table('policy', figures['sweep_ratio'])
@@ -100,7 +100,7 @@ def _sweeps(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
     return text
 
 
-def _gaps(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
+def _gaps(figures: Values, shown: Mapping[str, str]) -> str:
     text = '## Gap in the motorway\n\n' + _picture(shown, 'policy_gap', 'Displacement over a gap')
     for key, told in (
         ('gap_peak_ratio', 'Largest displacement'),
@@ -115,7 +115,7 @@ def _gaps(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
     return text
 
 
-def _rack(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
+def _rack(figures: Values, shown: Mapping[str, str]) -> str:
     text = '## Rack\n\n' + _picture(shown, 'policy_velocity', 'Gain and phase of the velocity')
     text += 'A sine of 1 mm: total harmonic distortion of the mount force, %, by frequency in Hz:\n\n'
     text += _table('policy', figures['thd'])
@@ -123,7 +123,7 @@ def _rack(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
     return text + _table('policy', figures['tracking'], '.1f')
 
 
-def _roads(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
+def _roads(figures: Values, shown: Mapping[str, str]) -> str:
     text = '## Roads\n\n' + _picture(shown, 'policy_recorded', 'Acceleration on the recorded road')
     text += (
         'The law was tuned on random roads with other seeds; the figures of the recorded road and of '
@@ -145,7 +145,7 @@ def _roads(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
     return text + '; '.join(told) + '.\n'
 
 
-def _engines(figures: dict[str, Any]) -> str:
+def _engines(figures: Values) -> str:
     return (
         '## Other engines, pads, sensors, temperatures\n\n'
         'Largest displacement on the sweep, worst road level; the continuous law, and in the last column the '
@@ -153,7 +153,7 @@ def _engines(figures: dict[str, Any]) -> str:
     )
 
 
-def _idling(figures: dict[str, Any]) -> str:
+def _idling(figures: Values) -> str:
     text = (
         '## Idling engine\n\nAcceleration from 20 to 200 Hz over that without current, and rms '
         'displacement from '
@@ -181,7 +181,7 @@ def _idling(figures: dict[str, Any]) -> str:
     )
 
 
-def _limits(figures: dict[str, Any]) -> str:
+def _limits(figures: Values) -> str:
     limits = figures['limits']
     delays = ', '.join(f'{value:.2f} at {delay} ms' for delay, value in limits['gap_after_delay'].items())
     return (
@@ -198,7 +198,7 @@ def _limits(figures: dict[str, Any]) -> str:
     )
 
 
-def _learnt(learnt: dict[str, Any]) -> str:
+def _learnt(learnt: Values) -> str:
     scales = {
         scale: {road: f'{np.mean(values):.2f} +- {np.std(values):.2f}' for road, values in each.items()}
         for scale, each in learnt['friction_scale'].items()
@@ -222,13 +222,13 @@ def _learnt(learnt: dict[str, Any]) -> str:
     )
 
 
-def _ablation(figures: dict[str, Any]) -> str:
+def _ablation(figures: Values) -> str:
     return '## What each part is for\n\nThe continuous law, one part changed at a time:\n\n' + _table(
         'changed', figures['ablation']
     )
 
 
-def _front(figures: dict[str, Any], shown: Mapping[str, str]) -> str:
+def _front(figures: Values, shown: Mapping[str, str]) -> str:
     text = '## Wear against effect\n\n' + _picture(shown, 'policy_front', 'Front of ratio and cost')
     text += (
         'Points that none beats in all of ratio on a light road, both accelerations and wear (random road); '
@@ -253,7 +253,7 @@ def _picture(shown: Mapping[str, str], name: str, title: str) -> str:
     return f'![{title}](figures/{shown[name]})\n\n' if name in shown else ''
 
 
-def _table(corner: str, rows: Mapping[str, Mapping[str, Any]], form: str = '.2f') -> str:
+def _table(corner: str, rows: Settings, form: str = '.2f') -> str:
     columns = list(next(iter(rows.values())))
     lines = [f'| {corner} | ' + ' | '.join(columns) + ' |', '|---|' + '---|' * len(columns)]
     for name, values in rows.items():

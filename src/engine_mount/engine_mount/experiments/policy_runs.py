@@ -1,7 +1,6 @@
 """One run of a policy, in a process of its own, and its figures."""
 
 import functools
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from engine_mount.drives.bands import BELOW_ISOLATION
 from engine_mount.drives.loop.run import run_core_into
+from engine_mount.experiments.harness.contract import Settings, Values
 from engine_mount.experiments.harness.many_runs import TruthOnly
 from engine_mount.experiments.harness.measures import first_extremum, peak_and_rms, rms_in_bands
 from engine_mount.reports.drive.signals import FloatArray
@@ -98,14 +98,14 @@ class PolicyJob:
     """
 
     key: tuple[Any, ...]
-    parameters: Mapping[str, Mapping[str, Any]]
+    parameters: Settings
     kind: str
     recorded: RecordedScenario | None = None
     damper: tuple[float, float] = (0.0, 0.0)
     kept: bool = False
 
 
-def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], dict[str, Any]]:
+def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], Values]:
     """Run one job through the same closed loop as every drive in core; return its key and its figures."""
     truth = TruthOnly(_FIELDS)
     sim = with_flattened(SimParameters(), job.parameters['mount_sim'])
@@ -120,11 +120,11 @@ def run_policy_job(job: PolicyJob) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return job.key, figures
 
 
-def _of_sweep(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+def _of_sweep(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> Values:
     return peak_and_rms(signals['displacement'], signals['chassis_acceleration'])
 
 
-def _of_gap(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+def _of_gap(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> Values:
     behind = signals['displacement'][round(sim.motorway.gap_time / SAMPLE_TIME) :]
     force = signals['friction_force'][-behind.size :] / sim.friction.scale
     return {
@@ -134,7 +134,7 @@ def _of_gap(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) 
     }
 
 
-def _of_rack(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+def _of_rack(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> Values:
     frequency = sim.bench.frequency
     time = SAMPLE_TIME * np.arange(signals['displacement'].size)
     part, _ = whole_periods(time, frequency, _PERIODS)
@@ -148,7 +148,7 @@ def _of_rack(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob)
     }
 
 
-def _of_road(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> dict[str, Any]:
+def _of_road(signals: dict[str, FloatArray], sim: SimParameters, job: PolicyJob) -> Values:
     part = slice(round(_SETTLING / SAMPLE_TIME), None)
     moved = {name: values[part] for name, values in signals.items()}
     acceleration = moved['chassis_acceleration'] - moved['chassis_acceleration'].mean()

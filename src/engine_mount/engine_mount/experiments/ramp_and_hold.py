@@ -1,7 +1,7 @@
 """Fig. 7: the sticking contact is pulled by a ramp and held; its relaxation gives the linear parameters."""
 
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from engine_mount.experiments.harness.contract import (
     Progress,
     Seed,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
@@ -97,7 +98,7 @@ def _wanted(time: FloatArray, parameters: RampParameters) -> FloatArray:
 
 def _figures(
     rack: FrictionRecording, time: FloatArray, relaxation: Relaxation, parameters: RampParameters
-) -> dict[str, Any]:
+) -> Values:
     held = time > 0.0
     yielding = _wanted(time, parameters) - rack.displacement
     final_force = float(np.mean(rack.force[time > time[-1] - 1.0]))
@@ -166,7 +167,7 @@ def _draw(
     rack: FrictionRecording,
     time: FloatArray,
     relaxation: Relaxation,
-    results: dict[str, Any],
+    results: Values,
     parameters: RampParameters,
     file: Path,
 ) -> Path:
@@ -203,7 +204,7 @@ def _draw(
     return finish(figure, file)
 
 
-def _statements(results: dict[str, Any], parameters: RampParameters) -> list[Statement]:
+def _statements(results: Values, parameters: RampParameters) -> list[Statement]:
     errors, raw, whole, printed = (
         results[f'errors{name}']
         for name in ('', '_without_ramp_correction', '_fitted_from_end_of_ramp', '_as_printed')

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,9 @@ from engine_mount.experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Settings,
     Statement,
+    Values,
     holds_if_lower,
     parameters_of,
 )
@@ -94,13 +96,13 @@ def _density(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return frequency, density
 
 
-def ratios(figures: dict[str, Any], key: str, other: str = HYDRO) -> list[float]:
+def ratios(figures: Values, key: str, other: str = HYDRO) -> list[float]:
     """Return by band the friction mount's rms over that of `other`; nothing where there is no such rms."""
     mine, its = figures['runs'][FRICTION][key], figures['runs'][other][key]
     return [] if mine is None else [each / beside for each, beside in zip(mine, its, strict=True)]
 
 
-def while_on(figures: dict[str, Any]) -> str:
+def while_on(figures: Values) -> str:
     """Return a sentence on the rms displacement of all mounts while the friction damper was on."""
     key = 'displacement_rms_while_friction_is_on_m'
     values = {name: each[key] for name, each in figures['runs'].items()}
@@ -164,7 +166,7 @@ def _scenario(parameters: RecordedDriveParameters) -> RecordedScenario:
     return RecordedScenario(*(getattr(parameters, name) for name in RecordedScenario._fields))
 
 
-def _own(parameters: RecordedDriveParameters, mount: str) -> dict[str, dict[str, Any]]:
+def _own(parameters: RecordedDriveParameters, mount: str) -> Settings:
     return {
         'mount_sim': {
             'scenario': 'recorded',
@@ -182,7 +184,7 @@ def _figures(
     parameters: RecordedDriveParameters,
     control: switched_viscous.Parameters,
     mode: str,
-) -> dict[str, Any]:
+) -> Values:
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     active = np.interp(truth.time, seen.time, seen.damping_active.astype(float)) > 0.5
     events = near(active, 1.0 / control.eigenfrequency)
@@ -209,7 +211,7 @@ def _figures(
     }
 
 
-def _figures_of(truth: Truth, active: BoolArray, events: BoolArray) -> dict[str, Any]:
+def _figures_of(truth: Truth, active: BoolArray, events: BoolArray) -> Values:
     return {
         'displacement_rms_m': _rms(truth.displacement),
         'displacement_peak_m': float(np.max(np.abs(truth.displacement))),
@@ -221,7 +223,7 @@ def _figures_of(truth: Truth, active: BoolArray, events: BoolArray) -> dict[str,
     }
 
 
-def _bands_of(name: str, unit: str, values: FloatArray, events: BoolArray) -> dict[str, Any]:
+def _bands_of(name: str, unit: str, values: FloatArray, events: BoolArray) -> Values:
     return {
         f'{name}_band_rms_{unit}': rms_in_bands(values, BANDS),
         f'{name}_band_rms_at_events_{unit}': rms_in_bands_within(values, events),
@@ -234,12 +236,12 @@ def _rms(values: FloatArray) -> float | None:
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 
-def statements(figures: dict[str, Any]) -> list[Statement]:
+def statements(figures: Values) -> list[Statement]:
     """Return what the paper says about good roads, each with what these figures say to it."""
     return [_on_isolation(figures), _on_displacement(figures)]
 
 
-def _on_isolation(figures: dict[str, Any]) -> Statement:
+def _on_isolation(figures: Values) -> Statement:
     force = ratios(figures, 'force_band_rms_else_n')
     displacement = ratios(figures, 'displacement_band_rms_else_m')
     return Statement(
@@ -252,7 +254,7 @@ def _on_isolation(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _on_displacement(figures: dict[str, Any]) -> Statement:
+def _on_displacement(figures: Values) -> Statement:
     hydro = ratios(figures, 'displacement_band_rms_at_events_m')
     soft = ratios(figures, 'displacement_band_rms_at_events_m', ELASTOMER)
     return Statement(
@@ -265,7 +267,7 @@ def _on_displacement(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _by_band(figures: dict[str, Any], values: list[float]) -> str:
+def _by_band(figures: Values, values: list[float]) -> str:
     if not values:
         return 'unknown, for damping was never on'
     return ', '.join(
@@ -307,7 +309,7 @@ _LIMITS = """## Limits of this comparison
 """
 
 
-def write_recorded_drive(figures: dict[str, Any], pictures: Sequence[Path], rate: float, file: Path) -> Path:
+def write_recorded_drive(figures: Values, pictures: Sequence[Path], rate: float, file: Path) -> Path:
     """Write the page to `file` and return it; `rate` (Hz) is that of the recording's sensor.
 
     Its pictures are expected in `figures/`.
@@ -337,7 +339,7 @@ def write_recorded_drive(figures: dict[str, Any], pictures: Sequence[Path], rate
     return file
 
 
-def _drive(figures: dict[str, Any], rate: float) -> str:
+def _drive(figures: Values, rate: float) -> str:
     bands = ', '.join(
         f'{value:.3f} m/s^2 from {low:g} to {high:g} Hz'
         for (low, high), value in zip(figures['bands_hz'], figures['acceleration_band_rms_m_s2'], strict=True)
@@ -350,7 +352,7 @@ def _drive(figures: dict[str, Any], rate: float) -> str:
     )
 
 
-def _in_short(figures: dict[str, Any]) -> str:
+def _in_short(figures: Values) -> str:
     lines = []
     for where, suffix in (('At the moments of damping', 'at_events'), ('Else', 'else')):
         for what, unit in (('displacement', 'm'), ('force', 'n')):
@@ -369,7 +371,7 @@ def _in_short(figures: dict[str, Any]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _bands(figures: dict[str, Any], what: str, name: str, unit: str, scale: float) -> str:
+def _bands(figures: Values, what: str, name: str, unit: str, scale: float) -> str:
     bands = [f'{low:g} to {high:g} Hz' for low, high in figures['bands_hz']]
     shown = {'m': 'mm', 'n': 'N'}[unit]
     lines = [
@@ -386,7 +388,7 @@ def _bands(figures: dict[str, Any], what: str, name: str, unit: str, scale: floa
     return '\n'.join(lines) + '\n'
 
 
-def _parts(figures: dict[str, Any]) -> str:
+def _parts(figures: Values) -> str:
     return (
         f'Moments of damping are those with the friction damper on, and {figures["events_margin_s"]:.3f} s '
         f'before and behind: {100.0 * figures["events_share"]:.1f} % of the drive, the same ones for all '
@@ -395,7 +397,7 @@ def _parts(figures: dict[str, Any]) -> str:
     )
 
 
-def _events(figures: dict[str, Any]) -> str:
+def _events(figures: Values) -> str:
     share = 100.0 * figures['damping_active_share']
     return (
         f'Damping went on {figures["times_on"]} times and was on for {share:.1f} % of the drive '

@@ -16,6 +16,7 @@ from engine_mount.experiments.harness.contract import (
     Progress,
     Seed,
     Statement,
+    Values,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, GREY, RED, family, finish, new_figure
@@ -163,7 +164,7 @@ def _record(order: Order, parameters: SawtoothParameters, load: float, number: i
     return record_friction_rack(order.out / f'sawtooth_{load:.0f}N', measured, session)
 
 
-def _figures(runs: list[Run], shown: Run, parameters: SawtoothParameters) -> dict[str, Any]:
+def _figures(runs: list[Run], shown: Run, parameters: SawtoothParameters) -> Values:
     every = [stroke for each in runs for stroke in each.strokes]
     coefs = parameters.friction
     a_error = [s.a - offset_coefficient(coefs, s.velocity, s.normal_force) for s in every]
@@ -215,7 +216,7 @@ def _jump(run: Run, direction: float) -> list[float]:
     return [s.fall for s in chosen]
 
 
-def _statements(results: dict[str, Any]) -> list[Statement]:
+def _statements(results: Values) -> list[Statement]:
     falling, count = results['strokes_with_falling_coefficient'], results['strokes']
     jumps, least = results['jump_p'], min(results['jump_p'] + results['jump_n'])
     straight = results['largest_residual_over_noise']
@@ -276,7 +277,7 @@ def _statements(results: dict[str, Any]) -> list[Statement]:
     ]
 
 
-def _statement_on_models(results: dict[str, Any]) -> Statement:
+def _statement_on_models(results: Values) -> Statement:
     macro, slow, micro = (
         results[f'simplified_error_{where}'] for where in ('macroslip', 'slow_macroslip', 'microslip')
     )

@@ -19,12 +19,13 @@ from engine_mount.experiments.harness.contract import (
     Outcome,
     Progress,
     Statement,
+    Values,
     numbers_of,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import finish, new_figure
-from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
-from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE
+from engine_mount.experiments.harness.many_runs import Found, Job, run_all, run_job
+from engine_mount.experiments.harness.measures import sweep_parameters
 from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drive.signals import FloatArray
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
@@ -243,17 +244,16 @@ def axes_of(parameters: SensitivityParameters) -> Axes:
 
 
 def _jobs(order: Order, parameters: SensitivityParameters, axes: Axes) -> list[Job]:
-    damper, jobs = parameters.damper, []
+    damper, last, jobs = parameters.damper, parameters.last_frequency, []
     for level, idle in product(axes.levels, axes.idle_forces):
-        jobs.append(
-            _job(order, ('friction', level, idle), _sweep(parameters, 'friction', level, idle), damper)
-        )
+        sim = sweep_parameters(level, last, idle)
+        jobs.append(_job(order, ('friction', level, idle), {**sim, 'mount': 'friction'}, damper))
         for resistance, asymmetry in product(axes.resistances, axes.asymmetries):
-            sim = _sweep(parameters, 'hydro', level, idle) | _hydromount(resistance, asymmetry)
-            jobs.append(_job(order, ('hydro', level, resistance, asymmetry, idle), sim, damper))
+            hydro = {**sim, 'mount': 'hydro', **_hydromount(resistance, asymmetry)}
+            jobs.append(_job(order, ('hydro', level, resistance, asymmetry, idle), hydro, damper))
     for level in axes.levels:
-        sim = _sweep(parameters, 'friction', level, 0.0)
-        jobs.append(_job(order, ('friction as there', level), sim, DAMPER))
+        sim = sweep_parameters(level, last)
+        jobs.append(_job(order, ('friction as there', level), {**sim, 'mount': 'friction'}, DAMPER))
     jobs.append(_job(order, ('friction on the rack',), _bench('friction'), damper))
     for resistance, asymmetry in product(axes.resistances, axes.asymmetries):
         sim = _bench('hydro') | _hydromount(resistance, asymmetry)
@@ -261,24 +261,12 @@ def _jobs(order: Order, parameters: SensitivityParameters, axes: Axes) -> list[J
     return jobs
 
 
-def _job(order: Order, key: tuple[Any, ...], sim: dict[str, Any], damper: Any) -> Job:
+def _job(order: Order, key: tuple[Any, ...], sim: Values, damper: Any) -> Job:
     own = {'mount_sim': sim, 'mount_control': {'policy': PAPER, 'damper': damper}}
     return Job(key, settings_of_run(order, own, NAME))
 
 
-def _sweep(parameters: SensitivityParameters, mount: str, level: float, idle: float) -> dict[str, Any]:
-    return {
-        'scenario': 'sweep',
-        'mount': mount,
-        'sweep.velocity_amplitude': level,
-        'sweep.first_frequency': FIRST_FREQUENCY,
-        'sweep.last_frequency': parameters.last_frequency,
-        'sweep.rate': RATE,
-        'idle.amplitude': idle,
-    }
-
-
-def _bench(mount: str) -> dict[str, Any]:
+def _bench(mount: str) -> Values:
     return {
         'scenario': 'bench',
         'mount': mount,
@@ -288,14 +276,14 @@ def _bench(mount: str) -> dict[str, Any]:
     }
 
 
-def _hydromount(resistance: float, asymmetry: float) -> dict[str, Any]:
+def _hydromount(resistance: float, asymmetry: float) -> Values:
     return {
         'hydromount.decoupler_resistance': resistance,
         'hydromount.compliance_asymmetry': asymmetry,
     }
 
 
-def _maps(axes: Axes, found: dict[tuple[Any, ...], Any]) -> Maps:
+def _maps(axes: Axes, found: Found) -> Maps:
     shape = tuple(len(values) for values in axes)
     peak, rms = np.full(shape, np.nan), np.full((len(ISOLATION_BANDS), *shape), np.nan)
     friction_peak = np.full((shape[0], shape[3]), np.nan)
@@ -321,7 +309,7 @@ def _orders_below(friction: FloatArray, hydro: list[float]) -> list[int]:
     return [k + 1 for k in range(friction.size) if friction[k] < hydro[k]]
 
 
-def _figures(maps: Maps, parameters: SensitivityParameters, runs: int) -> dict[str, Any]:
+def _figures(maps: Maps, parameters: SensitivityParameters, runs: int) -> Values:
     return {
         'runs': runs,
         'damper': parameters.damper,

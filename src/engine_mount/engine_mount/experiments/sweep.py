@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from engine_mount.experiments.harness.contract import (
     Order,
     Outcome,
     Progress,
+    Settings,
     Statement,
+    Values,
     holds_if,
     parameters_of,
 )
 from engine_mount.experiments.harness.drawing import BLUE, finish, new_figure
-from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE, peak_in, rms_in
+from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE, peak_in, rms_in, sweep_parameters
 from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drawing.style import COLOURS, HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 from engine_mount.reports.drive.evaluation import switching
@@ -56,7 +58,7 @@ def defined_peak(edges: list[float], peaks: list[float], level: float) -> Band |
     return max(inner, key=lambda found: found[1], default=None)
 
 
-def figures_of(passed: SweepRun, level: float) -> dict[str, Any]:
+def figures_of(passed: SweepRun, level: float) -> Values:
     """Return peaks, rms and switching frequencies of one run; `level` (m) is that of switching on."""
     truth, frequency = passed.drive.truth, passed.frequency
     edges, peaks = peak_per_band(frequency, truth.displacement)
@@ -125,16 +127,11 @@ def run(order: Order, progress: Progress) -> Outcome:
     return Outcome(figures, pictures, recordings, _statements(figures))
 
 
-def _own(parameters: SweepParameters, mount: str, idle: float) -> dict[str, dict[str, Any]]:
+def _own(parameters: SweepParameters, mount: str, idle: float) -> Settings:
     return {
         'mount_sim': {
-            'scenario': 'sweep',
+            **sweep_parameters(parameters.velocity_amplitude, parameters.last_frequency, idle),
             'mount': mount,
-            'sweep.velocity_amplitude': parameters.velocity_amplitude,
-            'sweep.first_frequency': FIRST_FREQUENCY,
-            'sweep.last_frequency': parameters.last_frequency,
-            'sweep.rate': RATE,
-            'idle.amplitude': idle,
         },
         'mount_control': {'policy': PAPER, 'damper': parameters.damper},
     }
@@ -145,9 +142,7 @@ def _switch_on_level(order: Order) -> float:
     return float(control.get('switch_on_level', switched_viscous.Parameters().switch_on_level))
 
 
-def _figures(
-    runs: dict[str, SweepRun], parameters: SweepParameters, mode: str, level: float
-) -> dict[str, Any]:
+def _figures(runs: dict[str, SweepRun], parameters: SweepParameters, mode: str, level: float) -> Values:
     told = {name: figures_of(each, level) for name, each in runs.items()}
     chosen = told[FRICTION]
     return {
@@ -163,7 +158,7 @@ def _figures(
     }
 
 
-def _statements(figures: dict[str, Any]) -> list[Statement]:
+def _statements(figures: Values) -> list[Statement]:
     return [
         _on_peak_of_hydro(figures),
         _on_peak_of_friction(figures),
@@ -172,7 +167,7 @@ def _statements(figures: dict[str, Any]) -> list[Statement]:
     ]
 
 
-def _on_peak_of_hydro(figures: dict[str, Any]) -> Statement:
+def _on_peak_of_hydro(figures: Values) -> Statement:
     found = figures['runs'][HYDRO]['defined_peak']
     limit = 1e3 * DEFINED_PEAK * figures['switch_on_level_m']
     told = 'no such peak' if found is None else f'a peak of {1e3 * found[1]:.2f} mm near {found[0]:.1f} Hz'
@@ -185,7 +180,7 @@ def _on_peak_of_hydro(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _on_peak_of_friction(figures: dict[str, Any]) -> Statement:
+def _on_peak_of_friction(figures: Values) -> Statement:
     chosen = figures['runs'][FRICTION]
     found, highest = chosen['defined_peak'], max(chosen['peak_displacement_m'])
     where = chosen['band_edges_hz'][int(np.argmax(chosen['peak_displacement_m']))]
@@ -201,7 +196,7 @@ def _on_peak_of_friction(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _switching_told(run_figures: dict[str, Any]) -> str:
+def _switching_told(run_figures: Values) -> str:
     on, off = run_figures['switched_on_hz'], run_figures['switched_off_hz']
     if not on:
         return 'damping never on'
@@ -209,7 +204,7 @@ def _switching_told(run_figures: dict[str, Any]) -> str:
     return f'damping on at {on[0]:.1f} Hz{end}'
 
 
-def _on_damping(figures: dict[str, Any]) -> Statement:
+def _on_damping(figures: Values) -> Statement:
     peaks = {name: figures['runs'][name]['resonance_peak_m'] for name in (FRICTION, HYDRO, OFF, ALWAYS)}
     reference, paper = 'Fig. 14', 'The damping of the friction mount round the resonance is far higher.'
     if None in peaks.values():
@@ -227,7 +222,7 @@ def _on_damping(figures: dict[str, Any]) -> Statement:
     )
 
 
-def _on_noise(figures: dict[str, Any]) -> Statement:
+def _on_noise(figures: Values) -> Statement:
     runs = figures['runs']
     pairs = {'road alone': (FRICTION, HYDRO)}
     if FRICTION_IDLE in runs:

@@ -88,9 +88,3 @@ def test_frequency_in_band_is_that_of_a_sine():
     time = SAMPLE_TIME * np.arange(4000)
     motion = 1e-3 * np.sin(2.0 * np.pi * 7.0 * time) + 1e-3 * np.sin(2.0 * np.pi * 30.0 * time)
     assert policy_runs.frequency_in_band(motion) == pytest.approx(7.0, abs=0.05)
-
-
-def test_band_rms_of_a_sine_is_its_amplitude_over_root_two():
-    time = SAMPLE_TIME * np.arange(4000)
-    both = 3.0 * np.sin(2.0 * np.pi * 25.0 * time) + 5.0 * np.sin(2.0 * np.pi * 8.0 * time)
-    assert measures.rms_in_bands(both, [(20.0, 200.0)])[0] == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)

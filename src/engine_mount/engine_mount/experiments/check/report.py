@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from engine_mount.experiments.check.run import GRAPH, MODES, CheckOrder, Result, Shown
-from engine_mount.experiments.check.suite import MEASURES, RACK, Limit, Manoeuvre
+from engine_mount.experiments.check.suite import CLOCK, MEASURES, RACK, Limit, Manoeuvre
+from engine_mount.experiments.harness.contract import Values
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.recordings.run.screen import Table as ScreenTable
 from engine_mount.reports.drawing.chart import Array, Chart, Curve, Panel, Span
@@ -82,7 +82,7 @@ def all_verdicts(
 
 
 def _verdict(manoeuvre: str, limit: Limit, result: Result, through: str, common: bool) -> Verdict:
-    if MEASURES[limit.measure].clock and through != GRAPH:
+    if CLOCK in MEASURES[limit.measure].seats and through != GRAPH:
         return Verdict(manoeuvre, limit, math.nan, Judged.LEFT_OUT, math.nan, common)
     if result.broke_down:
         return Verdict(manoeuvre, limit, math.nan, Judged.NOT_JUDGED, math.nan, common)
@@ -209,7 +209,7 @@ def number(value: float) -> str:
     return '–' if math.isnan(value) else f'{value:.0f}' if abs(value) >= 1000.0 else f'{value:.3g}'
 
 
-def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> dict[str, Any]:
+def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> Values:
     """Return what `--json` writes: the same order gives the same, whatever the number of jobs."""
     return {
         'passed': all(map(passed, verdicts.values())),
@@ -229,7 +229,7 @@ def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdi
     }
 
 
-def _as_json(verdict: Verdict) -> dict[str, Any]:
+def _as_json(verdict: Verdict) -> Values:
     limit = verdict.limit
     return {
         'quantity': limit.measure,

@@ -1,14 +1,11 @@
 """The suite driven: orders checked before the first manoeuvre, in core several at a time."""
 
-import contextlib
 import functools
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +13,7 @@ from engine_mount.drives.drive import DriveOrder, record_drive
 from engine_mount.drives.loop.run import run_core_into
 from engine_mount.drives.preflight import preflight
 from engine_mount.experiments.check.suite import BANDS, RACK, Manoeuvre
+from engine_mount.experiments.harness.contract import Settings, Values
 from engine_mount.experiments.harness.many_runs import TruthOnly
 from engine_mount.experiments.harness.measures import first_extremum, rms_in_bands
 from engine_mount.fleet.runner import run_tasks
@@ -23,7 +21,7 @@ from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import Losses, losses
 from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.events.switching_changes import Switching
-from engine_mount.recordings.run.screen import Bar, Screen
+from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth, load_drive
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
@@ -58,7 +56,7 @@ class Driven:
 
     drive: DriveSignals
     truth: Truth
-    parameters: Mapping[str, Mapping[str, Any]]
+    parameters: Settings
 
     @functools.cached_property
     def switching(self) -> Switching:
@@ -164,7 +162,7 @@ class Trial:
     """
 
     manoeuvre: Manoeuvre
-    parameters: Mapping[str, Mapping[str, Any]]
+    parameters: Settings
     through: str
     out: Path
     domain: int = 0
@@ -198,8 +196,8 @@ class Result:
     broke_down: str = ''
 
 
-def run_trial(trial: Trial, screen: Screen | None = None) -> Result:
-    """Drive one manoeuvre and return what came of it; raises `Interrupted`. `screen` is told of the drive.
+def run_trial(trial: Trial) -> Result:
+    """Drive one manoeuvre and return what came of it; raises `Interrupted`.
 
     One that breaks down, or whose recording cannot be judged, is `broken_down`: the others go on.
     """
@@ -212,7 +210,7 @@ def run_trial(trial: Trial, screen: Screen | None = None) -> Result:
         priority=trial.priority,
     )
     try:
-        folder, run, complaints = record_drive(order, screen or Screen(io.StringIO()))
+        folder, run, complaints = record_drive(order, Screen(io.StringIO()))
         return _result(trial, open_recording(folder.recording), run, complaints)
     except (GraphError, ValueError) as error:
         return broken_down(str(error))
@@ -223,7 +221,7 @@ def broken_down(reason: str) -> Result:
     return Result({}, (), Shown(), reason)
 
 
-def _result(trial: Trial, recording: Recording, run: dict[str, Any], complaints: list[str]) -> Result:
+def _result(trial: Trial, recording: Recording, run: Values, complaints: list[str]) -> Result:
     audits = audit(recording)
     found = losses(recording, audits)
     remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
@@ -267,7 +265,7 @@ def at_samples(truth: Truth, count: int) -> Truth:
     return Truth(**found)
 
 
-def _alone(parameters: Mapping[str, Mapping[str, Any]], mount: str) -> Beside:
+def _alone(parameters: Settings, mount: str) -> Beside:
     """Return another mount on the same excitation: no bus, no recording, the same plant."""
     truth = TruthOnly(_FIELDS)
     sim = {**parameters['mount_sim'], 'mount': mount}
@@ -307,7 +305,6 @@ def _shown(driven: Driven, beside: Mapping[str, Beside]) -> Shown:
     )
 
 
-Settings = Mapping[str, Mapping[str, Any]]
 Told = Callable[[str, Result, float], None]
 """Takes a manoeuvre that is done, what came of it, and the share of all that is done with it (0..1)."""
 
@@ -359,7 +356,7 @@ def run_trials(trials: Sequence[Trial], jobs: int, screen: Screen, tell: Told) -
     whole = sum(trial.seconds for trial in trials)
     done = 0.0
     with screen.bar('checking', transient=True) as bar:
-        for trial, result in _in_core(trials, jobs) if trials[0].through == CORE else _in_turn(trials, bar):
+        for trial, result in _in_core(trials, jobs) if trials[0].through == CORE else _in_turn(trials):
             done += trial.seconds
             bar(done / whole, trial.manoeuvre.name)
             results[trial.manoeuvre.name] = result
@@ -375,36 +372,12 @@ def _in_core(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, Result
         yield trials[done.place], done.result or broken_down(done.reason)
 
 
-def _in_turn(trials: Sequence[Trial], bar: Bar) -> Iterator[tuple[Trial, Result]]:
-    """Return the trials one by one, with what came of them; the bar goes on while one is driven."""
-    whole = sum(trial.seconds for trial in trials)
-    done = 0.0
+def _in_turn(trials: Sequence[Trial]) -> Iterator[tuple[Trial, Result]]:
     for trial in trials:
-        name, begin, part = trial.manoeuvre.name, done / whole, trial.seconds / whole
-        bar(begin, name)
-        yield trial, run_trial(trial, _Within(partial(_show_part, bar, name, begin, part)))
-        done += trial.seconds
+        yield trial, run_trial(trial)
 
 
-class _Within(Screen):
-    """The screen of one drive of many: nothing of it is seen but how far it has come."""
-
-    def __init__(self, show: Bar):
-        super().__init__(io.StringIO())
-        self._show = show
-
-    @contextlib.contextmanager
-    def bar(self, what: str, *, transient: bool = False) -> Iterator[Bar]:
-        yield self._show
-
-
-def _show_part(
-    bar: Bar, name: str, begin: float, part: float, share: float, what: str = '', detail: str = ''
-) -> None:
-    bar(begin + part * share, name, detail)
-
-
-def _merged(manoeuvre: Manoeuvre, settings: Settings) -> dict[str, dict[str, Any]]:
+def _merged(manoeuvre: Manoeuvre, settings: Settings) -> Settings:
     merged = {node: dict(values) for node, values in manoeuvre.settings.items()}
     for node, values in settings.items():
         for name, value in values.items():

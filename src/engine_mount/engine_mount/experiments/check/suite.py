@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from engine_mount.experiments.harness.contract import Settings
 from mount_bringup.settings import checked_settings
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.quantity import ParameterError, check_name
@@ -13,69 +14,32 @@ from mount_models.quantity import ParameterError, check_name
 BANDS = ((3.0, 14.0), (14.0, 20.0), (20.0, 30.0), (30.0, 50.0), (20.0, 200.0))
 """Hz: resonance of the engine; the isolation bands of the sweep; what the chassis passes on as sound."""
 REFERENCES = ('hydromount', 'undamped')
-ROAD, RACK = 'road', 'rack'
+ROAD, RACK, CLOCK = 'road', 'rack', 'clock'
 
 
 @dataclass(frozen=True)
 class Measure:
     """What a number means, its unit ('' for counts and ratios), and on which seat it can be told.
 
-    `clock`: it is one of real time and not judged in core and lock-step.
+    One with the seat `CLOCK` is of real time and not judged in core and lock-step.
     """
 
     unit: str
     meaning: str
-    seats: tuple[str, ...] = (ROAD, RACK)
-    clock: bool = False
+    seats: tuple[str, ...]
 
 
-def _beside(name: str, what: str, seats: tuple[str, ...]) -> dict[str, Measure]:
-    return {
-        f'{name}_over_{other}': Measure('', f'{what}, over that of the {other} mount', seats)
-        if other == 'undamped'
-        else Measure('', f'{what}, over that of the hydromount', seats)
-        for other in REFERENCES
-    }
+def _shipped(file: str) -> Any:
+    """Return the content of a YAML file beside this module."""
+    return plain_yaml(importlib.resources.files(__package__).joinpath(file).read_text(encoding='utf-8'))
 
 
-MEASURES: dict[str, Measure] = {
-    'peak_displacement_mm': Measure('mm', 'largest displacement', (ROAD,)),
-    **_beside('peak', 'largest displacement', (ROAD,)),
-    'rms_displacement_mm': Measure('mm', 'rms displacement', (ROAD,)),
-    **_beside('rms', 'rms displacement', (ROAD,)),
-    'first_extremum_mm': Measure('mm', 'first clear turning point of the displacement', (ROAD,)),
-    **_beside('first_extremum', 'first clear turning point of the displacement', (ROAD,)),
-    'ringing_s': Measure('s', 'until the displacement stays below a fifth of the undamped peak', (ROAD,)),
-    **_beside('ringing', 'time until it stays below a fifth of the undamped peak', (ROAD,)),
-    **{
-        name: measure
-        for low, high in BANDS
-        for name, measure in _beside(
-            f'chassis_{low:g}_{high:g}hz', f'rms chassis acceleration, {low:g} to {high:g} Hz', (ROAD,)
-        ).items()
-    },
-    'distortion_percent': Measure('%', 'harmonic distortion of the mount force', (RACK,)),
-    'distortion_over_hydromount': Measure('', 'that, over that of the hydromount', (RACK,)),
-    'cycle_loss_j': Measure('J', 'work of the mount force per period', (RACK,)),
-    'cycle_loss_over_hydromount': Measure('', 'that, over that of the hydromount', (RACK,)),
-    'friction_error_percent': Measure('%', 'rms friction force error over the largest wanted force'),
-    'switched_on': Measure('', 'how often damping went on'),
-    'damping_share_percent': Measure('%', 'share of the time with damping on'),
-    'pad_energy_j': Measure('J', 'work of friction, by which the pads wear'),
-    'peak_current_a': Measure('A', 'largest current setpoint of the controller'),
-    'coil_power_w': Measure('W', 'mean heat of the coil'),
-    'rest_gap_error_um': Measure('µm', 'size of the error of the estimated rest gap'),
-    'contact_gap_error_um': Measure('µm', 'size of the error of the estimated contact gap'),
-    'lost_samples': Measure('', 'samples that the recording lacks'),
-    'unanswered_samples': Measure('', 'samples without a setpoint while control was active'),
-    'faults': Measure('', 'faults told by nodes and electronics'),
-    'remarks': Measure('', 'what else was not as it should be, by sentences'),
-    'latency_p99_us': Measure('µs', '99 of 100 setpoints came back within', clock=True),
+MEASURES = {
+    name: Measure(unit, meaning, tuple(seats.split()))
+    for name, (unit, meaning, seats) in _shipped('measures.yaml').items()
 }
 """{name: what it means}. A number that is not known is exceeded, whatever its limit."""
 
-
-Settings = dict[str, dict[str, Any]]
 
 SOURCES = ('contract', 'derived', 'paper', 'chosen')
 """Where the number of a limit comes from; `chosen` ones are a decision of whoever wrote the suite."""
@@ -111,7 +75,7 @@ class Manoeuvre:
     name: str
     about: str
     evaluated_from: float
-    settings: Mapping[str, Mapping[str, Any]]
+    settings: Settings
     limits: tuple[Limit, ...]
     common: tuple[Limit, ...]
 
@@ -123,10 +87,7 @@ class Manoeuvre:
 
 def shipped_suite() -> tuple[Manoeuvre, ...]:
     """Return the manoeuvres that come with the package."""
-    text = (importlib.resources.files('engine_mount.experiments.check') / 'suite.yaml').read_text(
-        encoding='utf-8'
-    )
-    return suite_of(plain_yaml(text))
+    return suite_of(_shipped('suite.yaml'))
 
 
 def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:

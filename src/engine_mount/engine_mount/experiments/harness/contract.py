@@ -12,6 +12,11 @@ P = TypeVar('P', bound=NamedTuple)
 
 Seed = Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)]
 
+Values = dict[str, Any]
+"""Plain numbers, texts, lists and mappings by name."""
+Settings = Mapping[str, Mapping[str, Any]]
+"""{owner: {parameter: value}}; an owner is a node or an experiment."""
+
 Progress = Callable[[float, str], None]
 """Takes the share that is done, 0 .. 1, and what is being done."""
 
@@ -51,7 +56,7 @@ class Order:
     """
 
     out: Path
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
     graph: bool = False
 
 
@@ -62,7 +67,7 @@ class Outcome:
     `pages` are texts of the experiment's own (Markdown) that find its pictures in `figures/`.
     """
 
-    figures: dict[str, Any]
+    figures: Values
     pictures: list[Path] = field(default_factory=list)
     recordings: list[Path] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
@@ -87,7 +92,7 @@ class Experiment:
     closed_loop: bool = False
     needs: str = ''
 
-    def known_settings(self) -> dict[str, dict[str, Any]]:
+    def known_settings(self) -> dict[str, Values]:
         """Return {name: {parameter: default}} of the experiment's own parameters."""
         return {self.name: flattened(self.defaults)}
 

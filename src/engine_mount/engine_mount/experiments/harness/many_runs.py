@@ -1,6 +1,6 @@
 """Many runs of the closed loop side by side, each in a process of its own; nothing is recorded."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
+from engine_mount.experiments.harness.contract import Settings, Values
 from engine_mount.experiments.harness.measures import peak_and_rms
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.reports.sections.periodic import harmonics, whole_periods
@@ -18,6 +19,8 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_sim.plant.plant import TRUTH
 
 FloatArray = npt.NDArray[np.float64]
+Found = dict[tuple[Any, ...], Any]
+"""{key of a run: its figures}."""
 J = TypeVar('J')
 
 _ORDERS = 8
@@ -29,7 +32,7 @@ class Job:
     """One run: its key in the results, and the parameters of all nodes."""
 
     key: tuple[Any, ...]
-    parameters: Mapping[str, Mapping[str, Any]]
+    parameters: Settings
 
 
 class TruthOnly:
@@ -61,12 +64,12 @@ def run_all(
     workers: int,
     told: Callable[[int], None],
     work: Callable[[J], tuple[tuple[Any, ...], Any]],
-) -> dict[tuple[Any, ...], Any]:
+) -> Found:
     """Return {key: figures} of all jobs; `told` takes how many are done. 0 workers: one for each core.
 
     `work` returns key and figures of one job, as `run_job` does.
     """
-    found: dict[tuple[Any, ...], Any] = {}
+    found: Found = {}
     for done in run_tasks(work, jobs, workers=workers):
         if done.result is None:
             raise done.error or ChildProcessError(done.reason)
@@ -76,7 +79,7 @@ def run_all(
     return found
 
 
-def run_job(job: Job) -> tuple[tuple[Any, ...], dict[str, Any]]:
+def run_job(job: Job) -> tuple[tuple[Any, ...], Values]:
     """Run one job through the same closed loop as every drive in core; return its key and its figures."""
     truth = TruthOnly()
     outcome = run_core_into(truth, job.parameters)
@@ -86,7 +89,7 @@ def run_job(job: Job) -> tuple[tuple[Any, ...], dict[str, Any]]:
     return job.key, peak_and_rms(displacement, acceleration)
 
 
-def _of_bench(force: FloatArray, parameters: Parameters) -> dict[str, Any]:
+def _of_bench(force: FloatArray, parameters: Parameters) -> Values:
     frequency = float(parameters['mount_sim']['bench.frequency'])
     time = SAMPLE_TIME * np.arange(force.size)
     part, _ = whole_periods(time, frequency, _PERIODS)

@@ -1,11 +1,11 @@
 """Figures of a displacement or an acceleration at 1 kHz that several experiments share."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
+from engine_mount.experiments.harness.contract import Values
 from engine_mount.reports.drive.signals import FloatArray
 from mount_models.sampling import SAMPLE_TIME
 
@@ -13,6 +13,18 @@ Band = tuple[float, float]
 FIRST_FREQUENCY, RATE = 1.0, 1.0  # Hz, Hz/s: Sec. 6
 _CLEAR = 0.3  # chosen: a turning point of so much of the largest one counts as the first
 _FIRST_WITHIN = 0.3  # s
+
+
+def sweep_parameters(level: float, last: float, idle: float = 0.0) -> Values:
+    """Return the simulator's parameters of a sweep: road level (m/s), last frequency (Hz), idle force (N)."""
+    return {
+        'scenario': 'sweep',
+        'sweep.velocity_amplitude': level,
+        'sweep.first_frequency': FIRST_FREQUENCY,
+        'sweep.last_frequency': last,
+        'sweep.rate': RATE,
+        'idle.amplitude': idle,
+    }
 
 
 def peak_in(frequency: FloatArray, displacement: FloatArray, band: Band) -> float | None:
@@ -29,7 +41,7 @@ def rms_in(frequency: FloatArray, acceleration: FloatArray, band: Band) -> float
     return float(np.sqrt(np.mean(acceleration[within] ** 2))) if whole and within.any() else None
 
 
-def peak_and_rms(displacement: FloatArray, acceleration: FloatArray) -> dict[str, Any]:
+def peak_and_rms(displacement: FloatArray, acceleration: FloatArray) -> Values:
     """Return the largest displacement (m) below the isolation bands and the rms (m/s^2) in each of them.
 
     Both (n,) at 1 kHz from the begin of the sweep.
