@@ -221,7 +221,7 @@ class _Plate:
         field = [
             self._profile(change, row)[1][0]
             * self._curve(abs(float(self._profile(steady, row)[1][1:3].mean())))[1]
-            for row in self.rows_of_iron
+            for row in self.rows_of_iron.tolist()
         ]
         return float(np.average(field, weights=self.heights[self.rows_of_iron]))
 

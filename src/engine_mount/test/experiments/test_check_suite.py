@@ -84,7 +84,7 @@ def test_the_shipped_suite_names_a_reason_and_a_source_for_every_limit_and_can_b
     assert {'gap_10mm', 'gap_20mm', 'gap_30mm', 'rough_road', 'sweep', 'idle', 'rack', 'tip_in'} <= {
         each.name for each in suite
     }
-    assert all(limit.reason and limit.source for each in suite for limit in (*each.limits, *each.common))
+    assert all(limit.reason and limit.source for each in suite for limit in each.limits)
     for through in (CORE, LOCKSTEP, GRAPH):
         assert len(trials_of(CheckOrder(suite, through), tmp_path)) == len(suite)
 

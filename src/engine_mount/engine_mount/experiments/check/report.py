@@ -40,7 +40,6 @@ class Verdict:
     value: float
     judged: Judged
     margin: float
-    common: bool
 
     @property
     def has_failed(self) -> bool:
@@ -50,12 +49,7 @@ class Verdict:
 
 def verdicts_of(manoeuvre: Manoeuvre, result: Result, through: str) -> list[Verdict]:
     """Return the verdicts on one manoeuvre in the order of its limits."""
-    return [
-        _verdict(manoeuvre.name, limit, result, through, common)
-        for limits, common in ((manoeuvre.limits, False), (manoeuvre.common, True))
-        for limit in limits
-        if manoeuvre.seat in MEASURES[limit.measure].seats
-    ]
+    return [_verdict(manoeuvre.name, limit, result, through) for limit in manoeuvre.limits]
 
 
 def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
@@ -81,16 +75,16 @@ def all_verdicts(
     return {each.name: verdicts_of(each, results[each.name], through) for each in suite}
 
 
-def _verdict(manoeuvre: str, limit: Limit, result: Result, through: str, common: bool) -> Verdict:
+def _verdict(manoeuvre: str, limit: Limit, result: Result, through: str) -> Verdict:
     if CLOCK in MEASURES[limit.measure].seats and through != GRAPH:
-        return Verdict(manoeuvre, limit, math.nan, Judged.LEFT_OUT, math.nan, common)
+        return Verdict(manoeuvre, limit, math.nan, Judged.LEFT_OUT, math.nan)
     if result.broke_down:
-        return Verdict(manoeuvre, limit, math.nan, Judged.NOT_JUDGED, math.nan, common)
+        return Verdict(manoeuvre, limit, math.nan, Judged.NOT_JUDGED, math.nan)
     value = result.figures.get(limit.measure, math.nan)
     left = limit.value - value if limit.bound == 'at_most' else value - limit.value
     judged = Judged.PASSED if left >= 0.0 else Judged.FAILED  # a value that is not known fails
     margin = left / abs(limit.value) if limit.value else math.nan
-    return Verdict(manoeuvre, limit, value, judged, margin, common)
+    return Verdict(manoeuvre, limit, value, judged, margin)
 
 
 HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
@@ -177,11 +171,11 @@ def told_once(verdicts: Verdicts) -> list[Verdict]:
             broken[verdict.manoeuvre] = verdict
         elif verdict.judged is Judged.FAILED:
             failed.append(verdict)
-        elif verdict.common:
+        elif verdict.limit.common:
             common.setdefault(key, []).append(verdict)
         else:
             held.append(verdict)
-    exceeded = {(verdict.limit.measure, verdict.limit.bound) for verdict in failed if verdict.common}
+    exceeded = {(verdict.limit.measure, verdict.limit.bound) for verdict in failed if verdict.limit.common}
     for key, group in common.items():
         if key not in exceeded:
             held.append(worst_first(group)[0])
@@ -193,7 +187,7 @@ def cells(verdict: Verdict, shared: str = '') -> tuple[str, ...]:
     if verdict.judged is Judged.NOT_JUDGED:
         return Judged.FAILED.value, verdict.manoeuvre, 'broke down', '', '', ''
     limit = verdict.limit
-    is_shared = shared and verdict.common and verdict.judged is not Judged.FAILED
+    is_shared = shared and verdict.limit.common and verdict.judged is not Judged.FAILED
     return (
         verdict.judged.value,
         shared if is_shared else verdict.manoeuvre,
@@ -288,7 +282,7 @@ def _finding(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) 
     if result.broke_down:
         words: list[Cell] = [f'{result.broke_down};', not_judged(verdicts)]
         return Finding(manoeuvre.name, BAD, [Link('broke down:', manoeuvre.name), *words])
-    worst = worst_first([each for each in verdicts if not each.common] or verdicts)
+    worst = worst_first([each for each in verdicts if not each.limit.common] or verdicts)
     failed = [each for each in worst_first(verdicts) if each.judged is Judged.FAILED]
     text: list[Cell] = [Link('exceeded:' if failed else 'least left:', manoeuvre.name)]
     for place, each in enumerate(failed or worst[:1]):

@@ -2,7 +2,7 @@
 
 import importlib.resources
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,28 +56,28 @@ class SuiteError(ValueError):
 
 @dataclass(frozen=True)
 class Limit:
-    """A bound of a measure: `at_most` or `at_least` so much, and where that comes from."""
+    """A bound of a measure: `at_most` or `at_least` so much, and where that comes from.
+
+    A `common` one is shared with all manoeuvres of the suite.
+    """
 
     measure: str
     bound: str
     value: float
     source: str
     reason: str
+    common: bool
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on.
-
-    `common` are the limits that it shares with all manoeuvres of its suite.
-    """
+    """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on."""
 
     name: str
     about: str
     evaluated_from: float
     settings: Settings
-    limits: tuple[Limit, ...]
-    common: tuple[Limit, ...]
+    limits: tuple[Limit, ...] = ()
 
     @property
     def seat(self) -> str:
@@ -101,7 +101,7 @@ def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:
 def suite_of(content: Any) -> tuple[Manoeuvre, ...]:
     """Return the manoeuvres of a suite's content; raises `SuiteError`."""
     told = _mapping('the suite', content, _OF_SUITE)
-    common = tuple(_limits('limits', told.get('limits', {})))
+    common = tuple(_limits('limits', told.get('limits', {}), common=True))
     named = _mapping('manoeuvres', told.get('manoeuvres'))
     if not named:
         raise SuiteError('manoeuvres must name at least one manoeuvre')
@@ -123,18 +123,14 @@ def _manoeuvre(name: str, entry: Any, common: tuple[Limit, ...]) -> Manoeuvre:
     begin = _number(f'{name}.evaluated_from_s', told.get('evaluated_from_s', 0.0))
     if begin < 0.0:
         raise SuiteError(f'{name}.evaluated_from_s ({begin:g} s) must be 0 or more')
-    made = Manoeuvre(
-        name,
-        _text(f'{name}.about', told.get('about')),
-        begin,
-        _settings(name, told.get('set')),
-        tuple(_limits(name, told.get('limits', {}))),
-        common,
-    )
-    for limit in made.limits:
+    about = _text(f'{name}.about', told.get('about'))
+    made = Manoeuvre(name, about, begin, _settings(name, told.get('set')))
+    own = tuple(_limits(name, told.get('limits', {})))
+    for limit in own:
         if made.seat not in MEASURES[limit.measure].seats:
             raise SuiteError(f'{name}: {limit.measure} cannot be told on a {made.seat}; leave it out')
-    return made
+    shared = (limit for limit in common if made.seat in MEASURES[limit.measure].seats)
+    return replace(made, limits=(*own, *shared))
 
 
 def _settings(name: str, entry: Any) -> Settings:
@@ -152,7 +148,7 @@ def _settings(name: str, entry: Any) -> Settings:
     return checked
 
 
-def _limits(name: str, entry: Any) -> Iterator[Limit]:
+def _limits(name: str, entry: Any, *, common: bool = False) -> Iterator[Limit]:
     for measure, told in _mapping(f'{name}', entry).items():
         _check_key(name, measure, MEASURES, 'quantity')
         place = f'{name}.{measure}'
@@ -164,7 +160,7 @@ def _limits(name: str, entry: Any) -> Iterator[Limit]:
         if not bounds:
             raise SuiteError(f'{place} must have {" or ".join(_BOUNDS)}')
         for bound in bounds:
-            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason)
+            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason, common)
 
 
 def _mapping(place: str, entry: Any, known: Collection[str] = ()) -> Mapping[str, Any]:
