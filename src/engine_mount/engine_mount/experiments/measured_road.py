@@ -19,6 +19,7 @@ from engine_mount.experiments.harness.contract import (
     holds_if_lower,
     numbers_of,
     parameters_of,
+    write_page,
 )
 from engine_mount.experiments.harness.many_runs import Found, Job, TruthOnly, run_all
 from engine_mount.experiments.harness.measures import rms_in_bands
@@ -207,9 +208,7 @@ def write_measured_road(figures: Values, pictures: Sequence[Path], file: Path) -
     parts = [_HEAD, _road(figures), f'![The road](figures/{pictures[0].name})\n']
     parts += [_table(speed, runs, figures['bands_hz']) for speed, runs in figures['runs'].items()]
     parts += [_in_words(figures), _LIMITS.format(contact=figures['contact_length_m'])]
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text('\n'.join(parts), encoding='utf-8')
-    return file
+    return write_page(parts, file)
 
 
 def _road(figures: Values) -> str:

@@ -1,5 +1,6 @@
 """The runs that are compared: which policy or mount, on what, and with which plant."""
 
+import importlib.resources
 from collections.abc import Iterator
 from itertools import product
 from typing import Annotated, Any, NamedTuple
@@ -9,6 +10,7 @@ from engine_mount.experiments.harness.contract import Order, Values
 from engine_mount.experiments.harness.measures import sweep_parameters
 from engine_mount.experiments.policy_runs import PolicyJob
 from mount_control.policy import continuous_viscous
+from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
 from mount_sim.plant.vehicle import Elastomer, Vehicle
@@ -19,36 +21,11 @@ POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
 NOMINAL = 8.0  # Hz
-_NOISE, _JITTER = {'electronics.displacement_noise': 1e-5}, {'electronics.sample_jitter': 3e-4}
-DISTURBANCES: dict[str, dict[str, float]] = {
-    'nominal': {},
-    'pads -15 %': {'friction.scale': 0.85},
-    'pads +15 %': {'friction.scale': 1.15},
-    '10 um noise': _NOISE,
-    '0.3 ms jitter': _JITTER,
-    'coil at 80 degC': {'electronics.coil_temperature': 80.0},
-    'pads -15 %, noise, jitter': {'friction.scale': 0.85, **_NOISE, **_JITTER},
-    'pads +15 %, noise, jitter': {'friction.scale': 1.15, **_NOISE, **_JITTER},
-}
-ABLATIONS: dict[str, dict[str, float]] = {
-    'as it is': {},
-    'idle line not weighed': {'idle_weight': 0.0},
-    'quality 1': {'quality': 1.0},
-    'slow tracker': {'position_gain': 0.3},
-    'no prediction': {'lead_time': 0.0},
-    'opens and closes at once': {'opening_time': 0.001, 'closing_time': 0.003},
-    'opens slowly': {'opening_time': 0.04},
-    'rounded less': {'rounding_velocity': 0.0001},
-    'rounded more': {'rounding_velocity': 0.004},
-}
-AMPLITUDES = ((0.12e-3, 0.40e-3), (0.20e-3, 0.48e-3), (0.30e-3, 0.60e-3), (0.45e-3, 0.80e-3))  # m
-DAMPINGS = (1500.0, 2000.0, 2600.0, 3200.0)  # N s/m
-NAMED = {
-    'gentle': (0.12e-3, 0.40e-3, 1500.0),
-    'default': (0.12e-3, 0.40e-3, 2600.0),
-    'sparing': (0.30e-3, 0.60e-3, 1500.0),
-}
-"""Points of the front that are worth a name: lowest and full amplitude (m), damping coefficient (N s/m)."""
+_CASES = plain_yaml(importlib.resources.files(__package__).joinpath('policy_cases.yaml').read_text('utf-8'))
+DISTURBANCES, ABLATIONS, DAMPINGS = _CASES['disturbances'], _CASES['ablations'], _CASES['dampings']
+AMPLITUDES = tuple(map(tuple, _CASES['amplitudes']))
+NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
+"""{lowest and full amplitude (m), damping coefficient (N s/m): name}: points of the front worth one."""
 LEARNT_ROADS, LEARNT_SCALES = (2e-6, 16e-6), (0.85, 1.0, 1.15)
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}

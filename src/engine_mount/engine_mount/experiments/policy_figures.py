@@ -237,13 +237,12 @@ def _variant(found: Found, key: tuple[Any, ...], axes: Axes) -> dict[str, float]
 def _front(found: Found, axes: Axes) -> list[Values]:
     """Return all points, each with whether another one is better in ratio, wear and both accelerations."""
     points = []
-    names = {point: name for name, point in NAMED.items()}
     for lowest, full in AMPLITUDES:
         for damping in DAMPINGS:
             figures = _variant(found, ('front', lowest, full, damping), axes)
             points.append(
                 {
-                    'name': names.get((lowest, full, damping), ''),
+                    'name': NAMED.get((lowest, full, damping), ''),
                     'lowest_amplitude_m': lowest,
                     'full_amplitude_m': full,
                     'damping_coefficient': damping,

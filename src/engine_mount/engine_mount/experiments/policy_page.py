@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.experiments.harness.contract import Settings, Values
+from engine_mount.experiments.harness.contract import Settings, Values, write_page
 from engine_mount.experiments.policy_cases import CONTINUOUS, PAPER, POLICIES
 
 _HEAD = f"""# Control policies side by side
@@ -34,9 +34,7 @@ def write_policy(figures: Values, pictures: Sequence[Path], file: Path) -> Path:
         parts.append(_limits(figures))
     if 'learnt' in figures:
         parts += ['## What was not done, and why\n', _learnt(figures['learnt'])]
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text('\n'.join(part for part in parts if part), encoding='utf-8')
-    return file
+    return write_page(filter(None, parts), file)
 
 
 def _in_short(figures: Values) -> str:

@@ -20,6 +20,7 @@ from engine_mount.experiments.harness.contract import (
     Values,
     holds_if_lower,
     parameters_of,
+    write_page,
 )
 from engine_mount.experiments.harness.drawing import BLUE, GREY, RED, finish, new_figure
 from engine_mount.experiments.harness.measures import rms_in_bands
@@ -334,9 +335,7 @@ def write_recorded_drive(figures: Values, pictures: Sequence[Path], rate: float,
             level=f'{1e3 * figures["switch_on_level_m"]:g} mm',
         ),
     ]
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text('\n'.join(parts), encoding='utf-8')
-    return file
+    return write_page(parts, file)
 
 
 def _drive(figures: Values, rate: float) -> str:

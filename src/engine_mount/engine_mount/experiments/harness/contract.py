@@ -1,6 +1,6 @@
 """Lists of numbers as one parameter, written with commas."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -137,3 +137,10 @@ def numbers_of(name: str, text: str, low: float, high: float) -> list[float]:
             'a single one with a comma behind it'
         )
     return values
+
+
+def write_page(parts: Iterable[str], file: Path) -> Path:
+    """Write the parts of a page (Markdown) to `file` and return it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text('\n'.join(parts), encoding='utf-8')
+    return file
