@@ -101,7 +101,7 @@ class SawtoothParameters(NamedTuple):
     lowest_normal_force: Annotated[float, Quantity('N', 'first normal force', 10.0, 300.0, 'Sec. 4')] = 40.0
     highest_normal_force: Annotated[float, Quantity('N', 'last normal force', 10.0, 300.0, 'Sec. 4')] = 120.0
     normal_force_step: Annotated[float, Quantity('N', 'step between them', 1.0, 300.0)] = 20.0
-    shown_normal_force: Annotated[float, Quantity('N', 'pictures in detail', 10.0, 300.0, 'Fig. 9')] = 100.0
+    shown_normal_force: Annotated[float, Quantity('N', 'drawn in detail', 10.0, 300.0, 'Fig. 9')] = 100.0
     force_noise: ForceNoise = 0.5
     displacement_noise: DisplacementNoise = 20e-9
     seed: Seed = 1
@@ -227,7 +227,7 @@ def _statements(results: Values) -> list[Statement]:
             'Sec. 4, Fig. 8',
             'Behind a turning point the coefficient is higher and then decays while the pads are moved on '
             'at constant speed.',
-            f'At the pictures normal force mu falls along each stroke, by {jumps[0]:.3f} at the lowest and '
+            f'At the drawn normal force mu falls along each stroke, by {jumps[0]:.3f} at the lowest and '
             f'{jumps[-1]:.3f} at the highest speed (positive direction).',
             Holds.YES if least > 0.0 else Holds.PARTLY,
         ),
