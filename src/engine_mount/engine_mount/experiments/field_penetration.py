@@ -20,11 +20,10 @@ from engine_mount.experiments.harness.contract import (
 from engine_mount.experiments.harness.drawing import BLUE, RED, family, finish, new_figure
 from engine_mount.experiments.plate_finite_elements import PlateField, plate_field
 from engine_mount.experiments.registry import NAMES
+from engine_mount.reports.drive.signals import FloatArray
 from mount_models.quantity import Quantity
 from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_field, differential_permeability
 from mount_sim.plant.ripple import RippleCoil, diffusion_time, duty, penetration_depth
-
-FloatArray = npt.NDArray[np.float64]
 
 _TERMS = 2000
 """Terms of the series: they fall with the square of their number, so the rest is below 1e-3 of the first."""

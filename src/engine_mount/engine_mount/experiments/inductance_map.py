@@ -28,6 +28,7 @@ from engine_mount.experiments.harness.fixed_gaps import (
 )
 from engine_mount.experiments.registry import NAMES
 from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.reports.drive.signals import FloatArray
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import (
     crossing_current_from_gap,
@@ -42,8 +43,6 @@ from mount_recorder.session import new_session, session_text
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil
-
-FloatArray = npt.NDArray[np.float64]
 
 NAME = 'inductance_map'
 

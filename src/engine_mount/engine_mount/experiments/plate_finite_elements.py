@@ -13,17 +13,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import bmat, csc_matrix
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad
 from skfem.helpers import dot
 
+from engine_mount.reports.drive.signals import FloatArray
 from mount_models.quantity import Quantity
 from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_flux_density
 from mount_sim.plant.ripple import RippleCoil, duty
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class FieldError(ValueError):

@@ -21,7 +21,7 @@ from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.messages.series import Payloads
 from engine_mount.recordings.run.place import open_mount
 from engine_mount.recordings.run.screen import Screen
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
 from mount_recorder.topic_groups import registered_topic

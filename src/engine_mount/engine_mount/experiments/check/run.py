@@ -25,8 +25,8 @@ from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth, load_drive
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
+from engine_mount.settings.chosen import policy_of
 from engine_mount.settings.mounts import mounts_of
-from mount_bringup.chosen import policy_of
 from mount_bringup.graph.nodes import GraphError
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError, with_flattened

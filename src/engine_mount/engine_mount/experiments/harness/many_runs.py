@@ -5,20 +5,19 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
 from engine_mount.experiments.harness.contract import Settings, Values
 from engine_mount.experiments.harness.measures import peak_and_rms
 from engine_mount.fleet.runner import run_tasks
+from engine_mount.reports.drive.signals import FloatArray
 from engine_mount.reports.sections.periodic import harmonics, whole_periods
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_init.initialisation import InitialisationResult
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.plant.plant import TRUTH
 
-FloatArray = npt.NDArray[np.float64]
 Found = dict[tuple[Any, ...], Any]
 """{key of a run: its figures}."""
 J = TypeVar('J')
