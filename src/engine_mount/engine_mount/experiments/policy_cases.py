@@ -1,8 +1,10 @@
 """The runs that are compared: which policy or mount, on what, and with which plant."""
 
 import importlib.resources
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from itertools import product
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 from engine_mount.experiments.harness.closed_loop import settings_of_run
@@ -35,6 +37,10 @@ _RACK_AMPLITUDE, _RACK_SECONDS = 1e-3, 3.5  # m, s
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
 _TIP_IN = 400.0  # N, chosen
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
+
+
+Make = Callable[..., PolicyJob]
+"""Makes a run from its key, the parameters of the simulator and the kind of its figures."""
 
 
 class PolicyParameters(NamedTuple):
@@ -86,131 +92,109 @@ class Axes(NamedTuple):
 
 def jobs_of(order: Order, parameters: PolicyParameters, axes: Axes) -> list[PolicyJob]:
     """Return all runs."""
-    jobs = Jobs(order, parameters, axes)
-    made = [*jobs.sweeps(), *jobs.gaps(), *jobs.rack(), *jobs.roads()]
-    return made + (
-        [*jobs.robustness(), *jobs.idling(), *jobs.learning(), *jobs.variants()]
-        if parameters.thorough
-        else []
-    )
-
-
-class Jobs:
-    """Makes the runs group by group."""
-
-    def __init__(self, order: Order, parameters: PolicyParameters, axes: Axes):
-        self._order, self._parameters, self._axes = order, parameters, axes
-
-    def sweeps(self) -> Iterator[PolicyJob]:
-        """Yield the sweeps over all levels, without and with idle force."""
-        for level, idle, who in product(self._axes.levels, (0.0, self._parameters.idle_amplitude), COMPARED):
-            kept = idle == 0.0 and level in _SHOWN_LEVELS
-            last = self._parameters.last_frequency
-            yield self._job(
-                ('sweep', who, level, idle), sweep_parameters(level, last, idle), 'sweep', kept=kept
-            )
-
-    def gaps(self) -> Iterator[PolicyJob]:
-        """Yield the gaps of all depths on several roads."""
-        for depth, seed, who in product(
-            self._axes.depths, range(1, self._parameters.gap_seeds + 1), COMPARED
-        ):
-            kept = seed == 1 and depth == _SHOWN_DEPTH
-            yield self._job(('gap', who, depth, seed), _gap(depth, 2e-6, seed), 'gap', kept=kept)
-
-    def rack(self) -> Iterator[PolicyJob]:
-        """Yield the sines of the rack."""
-        own = continuous_viscous.Parameters()
-        dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (own.damping_coefficient, own.rounding_velocity)}
-        for frequency, who in product(self._axes.frequencies, (*POLICIES, HYDRO)):
-            sim = {
-                'scenario': 'bench',
-                'bench.frequency': frequency,
-                'bench.amplitude': _RACK_AMPLITUDE,
-                'timeline.duration': _RACK_SECONDS,
-            }
-            yield self._job(('rack', who, frequency), sim, 'rack', damper=dampers.get(who, (0.0, 0.0)))
-
-    def roads(self) -> Iterator[PolicyJob]:
-        """Yield random roads, a tip-in, and the road behind the recording."""
-        for idle, who in product((0.0, self._parameters.idle_amplitude), COMPARED):
-            for road, roughness in ROADS.items():
-                sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
-                yield self._job(('road', who, road, idle), sim, 'road')
-            if self._parameters.recorded is not None:
-                sim = {'scenario': 'motorway', 'idle.amplitude': idle}
-                recorded = self._parameters.recorded
-                yield self._job(('road', who, 'recorded', idle), sim, 'road', recorded=recorded, kept=True)
-        for who in COMPARED:
-            sim = _motorway(2e-6, _HELD_OUT_SEED, 4.0) | {'tip_in.force': _TIP_IN}
-            yield self._job(('tip-in', who), sim, 'road')
-
-    def robustness(self) -> Iterator[PolicyJob]:
-        """Yield sweeps with other engines, pads, sensors and temperatures."""
-        for plant, (name, changes), level in product(
-            self._axes.plants, DISTURBANCES.items(), self._axes.engine_levels
-        ):
-            sim = sweep_parameters(level, 14.0, 0.0) | _engine(*plant)
-            yield self._job(('robust', CONTINUOUS, *plant, name, level), sim | changes, 'sweep')
-            if name == 'nominal':
-                yield self._job(('robust', HYDRO, *plant, level), sim, 'sweep')
-                yield self._job(('robust', PAPER, *plant, name, level), sim, 'sweep')
-
-    def idling(self) -> Iterator[PolicyJob]:
-        """Yield roads with an idling engine."""
-        for roughness, frequency, force, who in product(
-            (2e-6, _ROUGH), self._axes.idle_frequencies, self._axes.idle_forces, COMPARED
-        ):
-            sim = _motorway(roughness, _HELD_OUT_SEED, 6.0) | {
-                'idle.amplitude': force,
-                'idle.frequency': frequency,
-            }
-            yield self._job(('idle', who, roughness, frequency, force), sim, 'road')
-
-    def learning(self) -> Iterator[PolicyJob]:
-        """Yield roads with other engines and gaps with other pads, to see what could be learnt of them."""
-        for plant, roughness in product(self._axes.plants, LEARNT_ROADS):
-            sim = _motorway(roughness, _HELD_OUT_SEED, 10.0) | _engine(*plant)
-            yield self._job(('learn', CONTINUOUS, *plant, roughness), sim, 'road')
-        seeds = range(1, self._parameters.gap_seeds + 1)
-        for scale, roughness, seed in product(LEARNT_SCALES, LEARNT_ROADS, seeds):
-            sim = _gap(_SHOWN_DEPTH, roughness, seed) | {'friction.scale': scale}
-            yield self._job(('learn', CONTINUOUS, scale, roughness, seed), sim, 'gap')
-
-    def variants(self) -> Iterator[PolicyJob]:
-        """Yield the continuous law without each of its parts, and the points of the front."""
+    make = partial(_job, order)
+    jobs = [*_roads_and_rack(make, parameters, axes)]
+    if parameters.thorough:
+        jobs += [*_robustness(make, axes), *_idling(make, axes), *_learning(make, parameters, axes)]
         for name, changes in ABLATIONS.items():
-            yield from self._variant(('ablation', name), changes)
+            jobs += _variant(make, parameters, axes, ('ablation', name), changes)
         for (lowest, full), damping in product(AMPLITUDES, DAMPINGS):
             changes = {'lowest_amplitude': lowest, 'full_amplitude': full, 'damping_coefficient': damping}
-            yield from self._variant(('front', lowest, full, damping), changes)
+            jobs += _variant(make, parameters, axes, ('front', lowest, full, damping), changes)
+    return jobs
 
-    def _variant(self, key: tuple[Any, ...], changes: dict[str, float]) -> Iterator[PolicyJob]:
-        for level in (self._axes.levels[0], self._axes.levels[-1]):
-            yield self._job((*key, CONTINUOUS, level), sweep_parameters(level, 14.0, 0.0), 'sweep', changes)
-        for idle in (0.0, self._parameters.idle_amplitude):
-            sim = _motorway(_ROUGH, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
-            yield self._job((*key, CONTINUOUS, 'road', idle), sim, 'road', changes)
 
-    def _job(
-        self,
-        key: tuple[Any, ...],
-        sim: Values,
-        kind: str,
-        changes: dict[str, float] | None = None,
-        **more: Any,
-    ) -> PolicyJob:
-        who = next(part for part in key if part in COMPARED)
-        policy = who if who in POLICIES else PAPER
-        own = {
-            'mount_sim': sim | {'mount': {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')},
-            'mount_control': {'policy': policy, **_named(policy, changes or {})},
+def _roads_and_rack(make: Make, parameters: PolicyParameters, axes: Axes) -> Iterator[PolicyJob]:
+    """Yield sweeps, gaps of all depths on several roads, sines of the rack, roads and a tip-in."""
+    idles = (0.0, parameters.idle_amplitude)
+    for level, idle, who in product(axes.levels, idles, COMPARED):
+        kept = idle == 0.0 and level in _SHOWN_LEVELS
+        sim = sweep_parameters(level, parameters.last_frequency, idle)
+        yield make(('sweep', who, level, idle), sim, 'sweep', kept=kept)
+    for depth, seed, who in product(axes.depths, range(1, parameters.gap_seeds + 1), COMPARED):
+        kept = seed == 1 and depth == _SHOWN_DEPTH
+        yield make(('gap', who, depth, seed), _gap(depth, 2e-6, seed), 'gap', kept=kept)
+    own = continuous_viscous.Parameters()
+    dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (own.damping_coefficient, own.rounding_velocity)}
+    for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
+        sim = {
+            'scenario': 'bench',
+            'bench.frequency': frequency,
+            'bench.amplitude': _RACK_AMPLITUDE,
+            'timeline.duration': _RACK_SECONDS,
         }
-        return PolicyJob(key, settings_of_run(self._order, own, NAME), kind, **more)
+        yield make(('rack', who, frequency), sim, 'rack', damper=dampers.get(who, (0.0, 0.0)))
+    for idle, who in product(idles, COMPARED):
+        for road, roughness in ROADS.items():
+            sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
+            yield make(('road', who, road, idle), sim, 'road')
+        if parameters.recorded is not None:
+            sim = {'scenario': 'motorway', 'idle.amplitude': idle}
+            key = ('road', who, 'recorded', idle)
+            yield make(key, sim, 'road', recorded=parameters.recorded, kept=True)
+    for who in COMPARED:
+        sim = _motorway(2e-6, _HELD_OUT_SEED, 4.0) | {'tip_in.force': _TIP_IN}
+        yield make(('tip-in', who), sim, 'road')
 
 
-def _named(policy: str, changes: dict[str, float]) -> dict[str, float]:
-    return {f'{policy}.{name}': value for name, value in changes.items()}
+def _robustness(make: Make, axes: Axes) -> Iterator[PolicyJob]:
+    """Yield sweeps with other engines, pads, sensors and temperatures."""
+    for plant, (name, changes), level in product(axes.plants, DISTURBANCES.items(), axes.engine_levels):
+        sim = sweep_parameters(level, 14.0) | _engine(*plant)
+        yield make(('robust', CONTINUOUS, *plant, name, level), sim | changes, 'sweep')
+        if name == 'nominal':
+            yield make(('robust', HYDRO, *plant, level), sim, 'sweep')
+            yield make(('robust', PAPER, *plant, name, level), sim, 'sweep')
+
+
+def _idling(make: Make, axes: Axes) -> Iterator[PolicyJob]:
+    """Yield roads with an idling engine."""
+    for roughness, frequency, force, who in product(
+        (2e-6, _ROUGH), axes.idle_frequencies, axes.idle_forces, COMPARED
+    ):
+        idle = {'idle.amplitude': force, 'idle.frequency': frequency}
+        sim = _motorway(roughness, _HELD_OUT_SEED, 6.0) | idle
+        yield make(('idle', who, roughness, frequency, force), sim, 'road')
+
+
+def _learning(make: Make, parameters: PolicyParameters, axes: Axes) -> Iterator[PolicyJob]:
+    """Yield roads with other engines and gaps with other pads, to see what could be learnt of them."""
+    for plant, roughness in product(axes.plants, LEARNT_ROADS):
+        sim = _motorway(roughness, _HELD_OUT_SEED, 10.0) | _engine(*plant)
+        yield make(('learn', CONTINUOUS, *plant, roughness), sim, 'road')
+    seeds = range(1, parameters.gap_seeds + 1)
+    for scale, roughness, seed in product(LEARNT_SCALES, LEARNT_ROADS, seeds):
+        sim = _gap(_SHOWN_DEPTH, roughness, seed) | {'friction.scale': scale}
+        yield make(('learn', CONTINUOUS, scale, roughness, seed), sim, 'gap')
+
+
+def _variant(
+    make: Make, parameters: PolicyParameters, axes: Axes, key: tuple[Any, ...], changes: dict[str, float]
+) -> Iterator[PolicyJob]:
+    """Yield the runs of the continuous law with some of its parameters changed."""
+    for level in (axes.levels[0], axes.levels[-1]):
+        yield make((*key, CONTINUOUS, level), sweep_parameters(level, 14.0), 'sweep', changes)
+    for idle in (0.0, parameters.idle_amplitude):
+        sim = _motorway(_ROUGH, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
+        yield make((*key, CONTINUOUS, 'road', idle), sim, 'road', changes)
+
+
+def _job(
+    order: Order,
+    key: tuple[Any, ...],
+    sim: Values,
+    kind: str,
+    changes: Mapping[str, float] = MappingProxyType({}),
+    **more: Any,
+) -> PolicyJob:
+    who = next(part for part in key if part in COMPARED)
+    policy = who if who in POLICIES else PAPER
+    changed = {f'{policy}.{name}': value for name, value in changes.items()}
+    own = {
+        'mount_sim': sim | {'mount': {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')},
+        'mount_control': {'policy': policy, **changed},
+    }
+    return PolicyJob(key, settings_of_run(order, own, NAME), kind, **more)
 
 
 def _motorway(roughness: float, seed: int, duration: float) -> Values:
