@@ -3,9 +3,9 @@
 import errno
 import os
 import shutil
-import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -50,7 +50,7 @@ class SplitError(ValueError):
 
 
 class SplitRule(NamedTuple):
-    """The limits of a file: bytes of `size`, ns in `duration`; 0 is no limit."""
+    """The limits of a file: bytes of `size`, ns of log time in `duration`; 0 is no limit."""
 
     size: int = 0
     duration: int = 0
@@ -69,6 +69,19 @@ def checked_rule(rule: SplitRule) -> SplitRule:
     return rule
 
 
+@dataclass
+class _Topic:
+    name: str
+    type: str
+    hash: str
+    offers: Offers
+    latched: bool
+    details: Mapping[str, str]
+    channel: int = 0  # the same in all files; 0 until the first message: only then is its publisher known
+    offered_qos: Sequence[OfferedQos] = ()
+    last: tuple[bytes, int] | None = None  # message and publish time, of a latched one
+
+
 class BagWriter:
     """One recording, from its creation to `close`; used by one thread at a time.
 
@@ -77,8 +90,7 @@ class BagWriter:
     and `RecordingError` is raised by the call that met the end and by every later `write`.
 
     With a `split` rule the recording goes on in a next file, which begins with the last message of each
-    latched topic, so that it can be read alone. The file before is closed by a thread of its own. A duration
-    is one of log times, or of `clock` (ns), which is read after each chunk.
+    latched topic, so that it can be read alone. `close` forces all files to the disk.
     """
 
     def __init__(
@@ -89,26 +101,23 @@ class BagWriter:
         chunk_size: int = CHUNK_SIZE,
         custom_data: Mapping[str, str] | None = None,
         open_file: type[RecordFile] = RecordFile,
-        clock: Callable[[], int] | None = None,
     ):
         self.folder = Path(folder)
         self.failure = ''
         self.closed = False
-        self.statement: Callable[[Mapping[str, int]], Mapping[str, str]] | None = None
-        """Returns the record of the recorder for the messages kept by topic, at the end."""
+        self.receptions: Mapping[str, Reception] | None = None
+        """The counts of the recorder, from which the end of the recording states the losses."""
+        self.excerpt = False
+        """Whether the recording holds a part of what was received, on purpose."""
         self._split = split
         self._custom_data = dict(custom_data or {})
         self._create_file = partial(McapWriter, library=LIBRARY, chunk_size=chunk_size, open_file=open_file)
-        self._clock = clock if split.duration else None
-        self._file_began: int | None = None  # by `clock`, ns
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[str, int] = {}  # by type, the same in all files
         self._channels: dict[str, int] = {}  # of the topics for which `write` has nothing else to do
-        self._files: list[_File] = []
-        self._unfinished: list[str] = []  # why full files have no summary
-        self._closing: threading.Thread | None = None
-        self._duration = 0 if clock else split.duration  # of log times, ns; 0: no limit
-        self._due = 0 if self._duration else _NEVER  # log time from which a message may begin a file
+        self._files: list[McapWriter] = []
+        self._repeated = Counter[int]()  # by channel: messages that an earlier file has too
+        self._due = 0 if split.duration else _NEVER  # log time from which a message may begin a file
         create_folder(self.folder)
         try:
             self._open_file()
@@ -118,26 +127,18 @@ class BagWriter:
 
     @property
     def kept(self) -> int:
-        """How many messages stand in complete chunks."""
-        return sum(file.kept for file in self._files)
+        """How many messages stand in complete chunks, repetitions not counted."""
+        return sum(writer.message_counts.total() for writer in self._files) - self._repeated.total()
 
     @property
     def pending(self) -> int:
         """How many messages wait in the chunks that are being filled."""
-        return self._files[-1].writer.pending
+        return self._file.pending
 
     @property
     def size(self) -> int:
         """How many bytes the files have."""
-        return sum(file.writer.file.size for file in self._files)
-
-    def unwritten(self, handed: int) -> int:
-        """Return how many of the messages handed over do not stand on the disk, once writing has failed."""
-        return handed - self.kept
-
-    def attach(self, receptions: Mapping[str, Reception]) -> None:
-        """Take the recorder's counts, from which the end of the recording states the losses."""
-        self.statement = partial(loss_statement, receptions)
+        return sum(writer.file.size for writer in self._files)
 
     def add_topic(
         self,
@@ -157,10 +158,9 @@ class BagWriter:
         if name in self._topics:
             raise RecordingError(f'topic {name} is already part of the recording {self.folder}')
         if type_name not in self._schemas:
-            self._schemas[type_name] = _add_schema(self._files[-1].writer, type_name)
+            self._schemas[type_name] = _add_schema(self._file, type_name)
         offers = offered_qos if callable(offered_qos) else partial(tuple, offered_qos)
-        hash_text = type_hash(type_name)
-        self._topics[name] = _Topic(name, type_name, offers, hash_text, latched, dict(details or {}))
+        self._topics[name] = _Topic(name, type_name, type_hash(type_name), offers, latched, details or {})
 
     def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int | None = None) -> None:
         """Add one serialised message; times in ns, the publish time is the receive time where unknown.
@@ -172,9 +172,8 @@ class BagWriter:
         try:
             if receive_time >= self._due:
                 self._begin_file(receive_time)
-            self._add_message(self._channels[topic], raw, receive_time, publish_time)
-        except KeyError:
-            self._write_first_or_latched(topic, raw, receive_time, publish_time)
+            channel = self._channels.get(topic) or self._checked_channel(topic, raw, publish_time)
+            self._add_message(channel, raw, receive_time, publish_time)
         except OSError as error:
             self._end_early(error)
 
@@ -193,7 +192,7 @@ class BagWriter:
         """Complete the chunks that are being filled; raises `RecordingError` when the disk is full."""
         if not self.closed:
             try:
-                self._files[-1].writer.flush()
+                self._file.flush()
             except OSError as error:
                 self._end_early(error)
 
@@ -206,126 +205,90 @@ class BagWriter:
             self._finish()
         except OSError as error:
             self._fail(f'{_reason_of(error)}; the file ends without its summary but with whole chunks')
-        if self._unfinished:
-            self._fail('; '.join(self._unfinished))
 
     def stop(self, why: str) -> None:
         """Close the recording before its time and raise `RecordingError` with the sentence `why`."""
-        if self.failure:
-            raise RecordingError(self.failure)
         self.close()
         self._fail(f'{why}; the file is closed and readable')
 
     def discard(self) -> None:
         """Remove the recording from the disk, for one that was never begun."""
         self._refuse_writes()
-        for file in self._files:
-            file.writer.file.close()
+        for writer in self._files:
+            writer.file.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _write_first_or_latched(self, topic: str, raw: bytes, receive_time: int, publish_time: int) -> None:
-        if self.failure:
-            raise RecordingError(self.failure)
+    def _checked_channel(self, name: str, raw: bytes, publish_time: int) -> int:
+        """Return the channel of a topic for its first message, and for each of a latched topic."""
         if self.closed:
-            raise RecordingError(f'recording {self.folder} is closed; nothing can be added')
-        if topic not in self._topics:
-            raise RecordingError(f'topic {topic} is not announced; call add_topic before write')
-        known = self._topics[topic]
-        self._open_channel(known)
-        if known.latched:
-            known.last = raw, publish_time
+            raise RecordingError(self.failure or f'recording {self.folder} is closed; nothing can be added')
+        if name not in self._topics:
+            raise RecordingError(f'topic {name} is not announced; call add_topic before write')
+        topic = self._topics[name]
+        self._open_channel(topic)
+        if topic.latched:
+            topic.last = raw, publish_time
         else:
-            self._channels[topic] = known.channel
-        try:
-            self._add_message(known.channel, raw, receive_time, publish_time)
-        except OSError as error:
-            self._end_early(error)
+            self._channels[name] = topic.channel
+        return topic.channel
 
     # Files.
 
     def _open_file(self) -> None:
-        name = f'{self.folder.name}_{len(self._files)}.mcap'
-        writer = self._create_file(self.folder / name)
+        writer = self._create_file(self.folder / f'{self.folder.name}_{len(self._files)}.mcap')
         # In the order in which they were declared first, so that all files give them the same numbers.
         for type_name in self._schemas:
             _add_schema(writer, type_name)
         for topic in sorted(self._topics.values(), key=lambda topic: topic.channel):
             if topic.channel:
-                self._declare(writer, topic)
-        writer.after_chunk = self._after_chunk
-        self._files.append(_File(name, writer))
-        self._add_message = writer.add_message
+                self._add_channel(writer, topic)
+        writer.after_chunk = self._note_size
+        self._files.append(writer)
+        self._file, self._add_message = writer, writer.add_message
 
-    def _declare(self, writer: McapWriter, topic: '_Topic') -> int:
+    def _add_channel(self, writer: McapWriter, topic: _Topic) -> int:
         details = {
             'offered_qos_profiles': qos_text(topic.offered_qos),
-            'topic_type_hash': topic.type_hash,
+            'topic_type_hash': topic.hash,
             **topic.details,
         }
         group = topic_group(topic.name, topic.type)
         return writer.add_channel(topic.name, 'cdr', self._schemas[topic.type], details, group)
 
-    def _open_channel(self, topic: '_Topic') -> None:
+    def _open_channel(self, topic: _Topic) -> None:
         if not topic.channel:
             topic.offered_qos = tuple(topic.offers())
-            topic.channel = self._declare(self._files[-1].writer, topic)
+            topic.channel = self._add_channel(self._file, topic)
 
-    def _after_chunk(self) -> None:
-        if self._split.size and self._files[-1].writer.size_at_end > self._split.size:
+    def _note_size(self) -> None:
+        if self._split.size and self._file.size_at_end > self._split.size:
             self._due = 0  # with the next message, so that no file is empty
-        if self._clock is not None:
-            now = self._clock()
-            self._file_began = now if self._file_began is None else self._file_began
-            if now - self._file_began >= self._split.duration:
-                self._due = 0
 
     def _begin_file(self, time: int) -> None:
         """Begin a file with the message of log time `time` (ns), unless the present one is still empty."""
-        full = self._files[-1]
-        if full.writer.pending or full.kept:
-            full.writer.flush()
+        full = self._file
+        if full.pending or full.message_counts:
+            full.flush()
             self._open_file()
-            self._close_in_thread(full)
+            full.finish(embedded_record(self._description([full])))
             self._due = _NEVER
-            self._file_began = self._clock() if self._clock is not None else None
             self._repeat_latched(time)
-        self._due = time + self._duration if self._duration else _NEVER
+        self._due = time + self._split.duration if self._split.duration else _NEVER
 
     def _repeat_latched(self, time: int) -> None:
         """Write the latched messages with log time `time` (ns) and their own publish times.
 
         A metadata record before them names their topics: a reader of all files counts each once.
         """
-        repeated = [topic for topic in self._topics.values() if topic.last is not None]
-        names = yaml.safe_dump([topic.name for topic in repeated], default_flow_style=True)
-        file = self._files[-1]
-        file.writer.add_metadata(PIECE_RECORD, {'number': str(len(self._files) - 1), 'repeated': names})
+        repeated = [(topic, *topic.last) for topic in self._topics.values() if topic.last is not None]
+        names = yaml.safe_dump([topic.name for topic, *_ in repeated], default_flow_style=True)
+        self._file.add_metadata(PIECE_RECORD, {'number': str(len(self._files) - 1), 'repeated': names})
         try:
-            for topic in repeated:
-                raw, publish_time = topic.last or (b'', 0)
-                file.writer.add_message(topic.channel, raw, time, publish_time)
-            file.writer.flush()
+            for topic, raw, publish_time in repeated:
+                self._file.add_message(topic.channel, raw, time, publish_time)
+            self._file.flush()
         finally:
-            file.repeated = dict(file.writer.message_counts)
-
-    def _close_in_thread(self, file: '_File') -> None:
-        """Close a full file while the next one is written: bringing it to the disk may take a second."""
-        records = embedded_record(self._description([file]))
-
-        def finish() -> None:
-            try:
-                file.writer.finish(records)
-            except OSError as error:
-                self._unfinished.append(f'{file.name} ends without its summary: {_reason_of(error)}')
-
-        self._wait_for_closing()
-        self._closing = threading.Thread(target=finish, name='bag file', daemon=True)
-        self._closing.start()
-
-    def _wait_for_closing(self) -> None:
-        if self._closing is not None:
-            self._closing.join()
-            self._closing = None
+            self._repeated.update(self._file.message_counts)
 
     # The end.
 
@@ -353,48 +316,29 @@ class BagWriter:
         self._refuse_writes()
         for topic in self._topics.values():
             self._open_channel(topic)
-        records: dict[str, Mapping[str, str]] = {**embedded_record(self._description(self._files[-1:]))}
-        if self.statement is not None:
-            kept = {topic.name: _count(self._files, topic, repeated=False) for topic in self._topics.values()}
-            records[RECORDER_RECORD] = self.statement(kept)
+        records: dict[str, Mapping[str, str]] = {**embedded_record(self._description([self._file]))}
+        if self.receptions is not None:
+            kept = {
+                topic.name: _count(self._files, topic) - self._repeated[topic.channel]
+                for topic in self._topics.values()
+            }
+            records[RECORDER_RECORD] = loss_statement(self.receptions, kept, excerpt=self.excerpt)
         try:
-            self._files[-1].writer.finish(records)
+            self._file.finish(records)
         finally:
-            self._wait_for_closing()
-            write_durably(self.folder / METADATA_NAME, metadata_text(self._description(self._files)))
+            metadata = self.folder / METADATA_NAME
+            metadata.write_text(metadata_text(self._description(self._files)), encoding='utf-8')
+            for path in (metadata, *(writer.file.path for writer in self._files)):
+                with path.open('rb') as file:
+                    os.fsync(file.fileno())
 
-    def _description(self, files: Sequence['_File']) -> dict[str, object]:
+    def _description(self, files: Sequence[McapWriter]) -> dict[str, object]:
         topics = [
-            TopicEntry(topic.name, topic.type, _count(files, topic), topic.offered_qos, topic.type_hash)
+            TopicEntry(topic.name, topic.type, _count(files, topic), topic.offered_qos, topic.hash)
             for topic in self._topics.values()
         ]
-        entries = [file_entry(file.name, file.writer) for file in files]
+        entries = [file_entry(writer.file.path.name, writer) for writer in files]
         return bag_description(topics, entries, self._custom_data, os.environ.get('ROS_DISTRO', 'jazzy'))
-
-
-@dataclass
-class _Topic:
-    name: str
-    type: str
-    offers: Offers
-    type_hash: str
-    latched: bool
-    details: dict[str, str]
-    channel: int = 0  # the same in all files; 0 until the first message: only then is its publisher known
-    offered_qos: tuple[OfferedQos, ...] = ()
-    last: tuple[bytes, int] | None = None  # message and publish time, of a latched one
-
-
-@dataclass
-class _File:
-    name: str
-    writer: McapWriter
-    repeated: dict[int, int] = field(default_factory=dict)  # by channel: what an earlier file has too
-
-    @property
-    def kept(self) -> int:
-        """How many messages stand in complete chunks, repetitions not counted."""
-        return sum(self.writer.message_counts.values()) - sum(self.repeated.values())
 
 
 def create_folder(folder: Path) -> None:
@@ -414,25 +358,15 @@ def create_folder(folder: Path) -> None:
 
 def file_entry(name: str, writer: McapWriter) -> FileEntry:
     """Return what `metadata.yaml` says of a file: what is physically there."""
-    return FileEntry(name, writer.start_time, writer.end_time, sum(writer.message_counts.values()))
-
-
-def write_durably(path: Path, text: str) -> None:
-    """Write a text and bring it to the disk."""
-    with path.open('w', encoding='utf-8') as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
+    return FileEntry(name, writer.start_time, writer.end_time, writer.message_counts.total())
 
 
 def _add_schema(writer: McapWriter, type_name: str) -> int:
     return writer.add_schema(type_name, 'ros2msg', schema_text(type_name).encode())
 
 
-def _count(files: Iterable[_File], topic: _Topic, *, repeated: bool = True) -> int:
-    """Return how many messages of a topic stand in complete chunks, with or without repetitions."""
-    counts = (file.writer.message_counts.get(topic.channel, 0) for file in files)
-    return sum(counts) - (0 if repeated else sum(file.repeated.get(topic.channel, 0) for file in files))
+def _count(files: Sequence[McapWriter], topic: _Topic) -> int:
+    return sum(writer.message_counts[topic.channel] for writer in files)
 
 
 def _reason_of(error: OSError) -> str:

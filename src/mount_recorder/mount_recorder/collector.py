@@ -34,8 +34,8 @@ class Collector:
     """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
 
     The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
-    process cost more than the work. Only that one can `attend` to other work too. `on_failure` takes the
-    sentence on the exception that has ended a thread of its own, which looks each `period` s.
+    process cost more than the work. `on_failure` takes the sentence on the exception that has ended a thread
+    of its own, which takes a batch each `period` s.
     """
 
     def __init__(
@@ -55,8 +55,7 @@ class Collector:
         self._on_failure = on_failure
         self._failure = ''
         self._taken_at = 0.0
-        self._works: list[Poll] = [self._take_when_due]
-        self._attended: list[Poll] = []
+        self._polls: list[Poll] = []
         self._receivers: list[tuple[Subscription, Callable[[], Taken | None], Receive]] = []
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -81,41 +80,34 @@ class Collector:
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
         """Create a publisher of `topic` and return the function that publishes its bytes, from any thread."""
-        publisher = self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic))
-        return publisher.publish
+        return self.node.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic)).publish
 
     def unmatched(self) -> list[str]:
         """Return the names of the topics that no publisher has been found for yet."""
         return sorted(s.topic_name for s, *_ in self._receivers if s.get_publisher_count() == 0)
 
-    def add_poll(self, work: Poll) -> None:
-        """Let the thread that serves the publishers do `work` too while it serves; `work` must not raise."""
+    def start(self, *polls: Poll) -> None:
+        """Begin to take messages; a shared thread calls the `polls`, which must not raise, beside them."""
         if self._shared_thread is None:
-            raise ValueError('a collector with a thread of its own attends to nothing but its messages')
-        self._works.append(work)
-
-    def start(self) -> None:
-        """Begin to take messages."""
-        if self._shared_thread is not None:
-            for work in self._works:
-                self._shared_thread.add_poll(work)
-                self._attended.append(work)
-            return
-        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
-        self._thread.start()
+            self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
+            self._thread.start()
+        else:
+            self._polls = [self._take_when_due, *polls]
+            for poll in self._polls:
+                self._shared_thread.add_poll(poll)
 
     def stop(self) -> None:
         """Take what is there, end the thread and destroy the node; safe to call twice."""
         if self._ending.is_set():
             return
         self._ending.set()
-        if self._shared_thread is not None and self._attended:
-            with contextlib.suppress(DataThreadEndedError):
-                self._shared_thread.change(self._take_batch)
-            for work in self._attended:
-                self._shared_thread.remove_poll(work)
         if self._thread is not None:
             self._thread.join()
+        if self._shared_thread is not None and self._polls:
+            with contextlib.suppress(DataThreadEndedError):
+                self._shared_thread.change(self._take_batch)
+            for poll in self._polls:
+                self._shared_thread.remove_poll(poll)
         self.node.destroy_node()
 
     def _serve(self) -> None:
@@ -124,15 +116,14 @@ class Collector:
                 self._take_batch()
             self._take_batch()
         except BaseException as error:
-            # The border of the thread: unheard, its end would leave a recording without its messages.
+            # The border of the thread: unreported, its end would leave a recording without its messages.
             traceback.print_exc()
             self._failure = f'the thread that takes the messages has ended: {type(error).__name__}: {error}'
             self._on_failure(self._failure)
 
     def _take_when_due(self) -> bool:
-        now = time.monotonic()
-        if now - self._taken_at > _SHARED_PERIOD:
-            self._taken_at = now
+        if time.monotonic() - self._taken_at > _SHARED_PERIOD:
+            self._taken_at = time.monotonic()
             self._take_batch()
         return False
 

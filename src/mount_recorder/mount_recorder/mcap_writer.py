@@ -13,7 +13,8 @@ every state of the file ends with a whole record.
 
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import zstandard
@@ -62,10 +63,8 @@ class McapWriter:
         self, path: Path, library: str, chunk_size: int = CHUNK_SIZE, open_file: type[RecordFile] = RecordFile
     ):
         """Write the head of the file and hold back room for its end."""
-        self.message_counts: dict[int, int] = {}  # by channel, of the chunks that are in the file
-        self.start_time: int | None = None  # ns, earliest log time in the file
-        self.end_time: int | None = None
-        self.after_chunk: Callable[[], None] = _nothing  # called when chunks have reached the file
+        self.message_counts = Counter[int]()  # by channel, of the chunks that are in the file
+        self.after_chunk: Callable[[], object] | None = None  # called when chunks have reached the file
         self._chunk_size = chunk_size
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: list[Schema] = []
@@ -90,6 +89,16 @@ class McapWriter:
     def pending(self) -> int:
         """How many messages wait in the chunks that are being filled."""
         return sum(len(numbers) for chunk in self._groups.values() for numbers in chunk.entries.values()) // 2
+
+    @property
+    def start_time(self) -> int | None:
+        """The earliest log time in the file, ns; None without messages."""
+        return min((index.message_start_time for index in self._chunk_indexes), default=None)
+
+    @property
+    def end_time(self) -> int | None:
+        """The latest log time in the file, ns."""
+        return max((index.message_end_time for index in self._chunk_indexes), default=None)
 
     @property
     def size_at_end(self) -> int:
@@ -123,7 +132,8 @@ class McapWriter:
         chunk = self._chunk_of[channel]
         entries = chunk.entries.get(channel)
         if entries is None:
-            entries = self._open_entries(chunk, channel)
+            self._declare(chunk, self._channels[channel - 1])
+            entries = chunk.entries[channel] = []
         length = len(raw)
         entries += (log_time, chunk.size)
         chunk.parts += (
@@ -136,26 +146,23 @@ class McapWriter:
 
     def flush(self) -> None:
         """Write the chunks that are being filled, of each group that has a message."""
-        records: list[bytes] = []
-        indexes: list[ChunkIndex] = []
-        counts: dict[int, int] = {}
-        for _, chunk in sorted(self._groups.items()):
-            if chunk.entries:
-                begin = self.file.size + sum(map(len, records))
-                record, *message_indexes = self._take_chunk(chunk, begin, indexes, counts)
-                records += [record, *message_indexes]
-        if not records:
+        filled = [chunk for _, chunk in sorted(self._groups.items()) if chunk.entries]
+        if not filled:
             return
+        data, indexes, counts = b'', [], Counter[int]()
+        for chunk in filled:
+            counts.update({channel: len(numbers) // 2 for channel, numbers in chunk.entries.items()})
+            records, index = self._packed_chunk(chunk, self.file.size + len(data))
+            data += records
+            indexes.append(index)
+            chunk.clear()  # whatever becomes of the write, its messages are no longer pending
         self._room += sum(_ROOM_PER_CHUNK + 10 * len(index.message_index_offsets) for index in indexes)
         self.file.keep_room(self._room)
-        self._append(b''.join(records))
+        self._append(data)
         self._chunk_indexes += indexes
-        for channel, count in counts.items():
-            self.message_counts[channel] = self.message_counts.get(channel, 0) + count
-        known = [time for time in (self.start_time, self.end_time) if time is not None]
-        self.start_time = min([*known, *(index.message_start_time for index in indexes)])
-        self.end_time = max([*known, *(index.message_end_time for index in indexes)])
-        self.after_chunk()
+        self.message_counts.update(counts)
+        if self.after_chunk is not None:
+            self.after_chunk()
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record behind what is already in the file."""
@@ -194,25 +201,17 @@ class McapWriter:
         self.file.append(data)
         self._data_crc = zlib.crc32(data, self._data_crc)
 
-    def _open_entries(self, chunk: '_FillingChunk', channel: int) -> list[int]:
-        record = self._channels[channel - 1]
-        for declaration in (self._schemas[record.schema_id - 1], record):
-            if (known := (type(declaration), declaration.id)) not in chunk.declared:
+    def _declare(self, chunk: '_FillingChunk', channel: Channel) -> None:
+        for record in (self._schemas[channel.schema_id - 1], channel):
+            if (known := (type(record), record.id)) not in chunk.declared:
                 chunk.declared.add(known)
-                chunk.parts.append(_packed(declaration))
+                chunk.parts.append(_packed(record))
                 chunk.size += len(chunk.parts[-1])
-        return chunk.entries.setdefault(channel, [])
 
-    def _take_chunk(
-        self, chunk: '_FillingChunk', begin: int, indexes: list[ChunkIndex], counts: dict[int, int]
-    ) -> list[bytes]:
-        """Return a chunk that will stand at `begin`, and the indexes of its messages, and empty it.
-
-        Whatever becomes of the write, its messages are no longer pending.
-        """
-        data, entries = b''.join(chunk.parts), chunk.entries
-        chunk.clear()
-        times = [time for numbers in entries.values() for time in numbers[::2]]
+    def _packed_chunk(self, chunk: '_FillingChunk', begin: int) -> tuple[bytes, ChunkIndex]:
+        """Return a chunk that will stand at `begin`, with the indexes of its messages, and its own index."""
+        data = b''.join(chunk.parts)
+        times = [time for numbers in chunk.entries.values() for time in numbers[::2]]
         packed = Chunk(
             compression='zstd',
             data=self._compress(data),
@@ -221,41 +220,46 @@ class McapWriter:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        records = [_packed(packed)]
-        end, offsets = begin + len(records[0]), {}
-        for channel, numbers in entries.items():
-            offsets[channel] = end
+        records = _packed(packed)
+        length, offsets = len(records), {}
+        for channel, numbers in chunk.entries.items():
+            offsets[channel] = begin + len(records)
             size = 8 * len(numbers)
             head = _INDEX.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size)
-            records.append(head + struct.pack(f'<{len(numbers)}Q', *numbers))
-            end += len(records[-1])
-            counts[channel] = len(numbers) // 2
-        indexes.append(
-            ChunkIndex(
-                message_start_time=packed.message_start_time,
-                message_end_time=packed.message_end_time,
-                chunk_start_offset=begin,
-                chunk_length=len(records[0]),
-                message_index_offsets=offsets,
-                message_index_length=end - begin - len(records[0]),
-                compression=packed.compression,
-                compressed_size=len(packed.data),
-                uncompressed_size=packed.uncompressed_size,
-            )
+            records += head + struct.pack(f'<{len(numbers)}Q', *numbers)
+        return records, ChunkIndex(
+            message_start_time=packed.message_start_time,
+            message_end_time=packed.message_end_time,
+            chunk_start_offset=begin,
+            chunk_length=length,
+            message_index_offsets=offsets,
+            message_index_length=len(records) - length,
+            compression=packed.compression,
+            compressed_size=len(packed.data),
+            uncompressed_size=packed.uncompressed_size,
         )
-        return records
 
     def _summary(self, start: int) -> bytes:
-        groups: dict[Opcode, Iterable[McapRecord]] = {
+        statistics = Statistics(
+            attachment_count=len(self._attachment_indexes),
+            channel_count=len(self._channels),
+            channel_message_counts=self.message_counts,
+            chunk_count=len(self._chunk_indexes),
+            message_count=self.message_counts.total(),
+            message_end_time=self.end_time or 0,
+            message_start_time=self.start_time or 0,
+            metadata_count=len(self._metadata_indexes),
+            schema_count=len(self._schemas),
+        )
+        groups: dict[Opcode, Sequence[McapRecord]] = {
             Opcode.SCHEMA: self._schemas,
             Opcode.CHANNEL: self._channels,
-            Opcode.STATISTICS: [self._statistics()],
+            Opcode.STATISTICS: [statistics],
             Opcode.CHUNK_INDEX: self._chunk_indexes,
             Opcode.ATTACHMENT_INDEX: self._attachment_indexes,
             Opcode.METADATA_INDEX: self._metadata_indexes,
         }
-        data = bytearray()
-        offsets = bytearray()
+        data = offsets = b''
         for opcode, records in groups.items():
             if group := b''.join(map(_packed, records)):
                 offsets += _packed(SummaryOffset(opcode, start + len(data), len(group)))
@@ -263,22 +267,10 @@ class McapWriter:
         offset_start = start + len(data)
         data += offsets
         # The CRC covers the summary and the footer up to the CRC itself.
-        footer = struct.pack('<BQQQ', Opcode.FOOTER, 8 + 8 + 4, start, offset_start)
-        crc = zlib.crc32(footer, zlib.crc32(data))
-        return bytes(data) + _packed(Footer(start, offset_start, crc)) + MCAP0_MAGIC
-
-    def _statistics(self) -> Statistics:
-        return Statistics(
-            attachment_count=len(self._attachment_indexes),
-            channel_count=len(self._channels),
-            channel_message_counts=self.message_counts,
-            chunk_count=len(self._chunk_indexes),
-            message_count=sum(self.message_counts.values()),
-            message_end_time=self.end_time or 0,
-            message_start_time=self.start_time or 0,
-            metadata_count=len(self._metadata_indexes),
-            schema_count=len(self._schemas),
+        crc = zlib.crc32(
+            struct.pack('<BQQQ', Opcode.FOOTER, 8 + 8 + 4, start, offset_start), zlib.crc32(data)
         )
+        return data + _packed(Footer(start, offset_start, crc)) + MCAP0_MAGIC
 
 
 class _FillingChunk:
@@ -292,10 +284,6 @@ class _FillingChunk:
         self.parts: list[bytes] = []
         self.entries: dict[int, list[int]] = {}  # by channel: log time (ns), offset, log time, offset, ...
         self.size = 0
-
-
-def _nothing() -> None:
-    """Do nothing after a chunk."""
 
 
 def _packed(record: McapRecord) -> bytes:

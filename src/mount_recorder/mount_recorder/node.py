@@ -1,12 +1,10 @@
 """The node `mount_recorder`: records the topics of the graph into rosbag2 MCAP bags."""
 
 import time
-from collections import deque
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.qos import QoSProfile
@@ -17,13 +15,12 @@ from std_srvs.srv import Trigger
 from mount_recorder.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.collector import Collector
-from mount_recorder.diagnosis import Counted, OnFull, RecorderState, judge, unobserved_sentence
+from mount_recorder.diagnosis import Figures, OnFull, judge
+from mount_recorder.event_window import EventWindow
 from mount_recorder.metadata import OfferedQos
 from mount_recorder.parameters import RecorderParameters, split_of
-from mount_recorder.recorder import Recorder, Unobserved
-from mount_recorder.snapshot import Snapshot, SnapshotRule
-from mount_recorder.space import SpaceGuard
-from mount_recorder.watching import present_time, watch_topic
+from mount_recorder.recorder import Recorder, free_space
+from mount_recorder.watching import FaultWatch, SampleWatch
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import BY_HAND, Mark, mark_text
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
@@ -31,32 +28,25 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import RealTimeThreads
-from mount_ros.topics import EVENT, TOPICS, Delivery, Topic, topic
+from mount_ros.topics import (
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DIAGNOSTICS,
+    EVENT,
+    TOPICS,
+    Delivery,
+    Topic,
+    topic,
+)
 
 NAME = 'mount_recorder'
-_MARKS_LOGGED = 10  # chosen: of those set by itself between two reports
+_HOUR = 3_600_000_000_000  # ns
 _FAMILY = 'mount_record'  # all recorders are called so or something longer
 _PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
     'mounts': ('', 'namespaces of the mounts to record, as in left,right; empty: one mount in its own'),
     'topics': ([entry.name for entry in TOPICS], 'names of registered topics to record'),
 }
-
-
-class _Parts(NamedTuple):
-    """What exists from `configure` to `cleanup`."""
-
-    parameters: RecorderParameters
-    on_full: OnFull
-    data_path: Collector
-    sink: BagWriter | Snapshot
-    recorder: Recorder
-    space: SpaceGuard
-    marks: AutomaticMarks
-    event: str
-    """Full name of the topic of the marks."""
-    send_event: Callable[[bytes], None]
-    subscriptions: dict[str, Subscription]
 
 
 class MountRecorder(SafeLifecycleNode):
@@ -71,97 +61,88 @@ class MountRecorder(SafeLifecycleNode):
         for parameter, (default, meaning) in _PLACES.items():
             self.declare_parameter(parameter, default, ParameterDescriptor(description=meaning))
         declare(self, RecorderParameters())
-        self._configured: _Parts | None = None
-        self._logged_failure = ''
-        self._logged_malformed: set[str] = set()
-        self._unlogged_marks: deque[str] = deque(maxlen=_MARKS_LOGGED)
-        self._counted = SlidingWindow(Counted())
-        self._began_at = 0.0
+        self._recorder: Recorder | None = None
         self._mark_service = self.create_service(
             Trigger, '~/mark', self._on_mark, callback_group=self.transitions
         )
 
+    # What is set here exists until `cleanup`.
     def configure(self) -> None:
-        parameters = read(self, RecorderParameters())
-        on_full = _on_full(parameters.on_full)
+        self._settings = parameters = read(self, RecorderParameters())
         topics = [_registered(name) for name in self.get_parameter('topics').value]
         mounts = [name.strip() for name in self.get_parameter('mounts').value.split(',')]
         uri = self.get_parameter('uri').value
         if not uri:
             raise RecordingError('parameter uri is empty; name the folder that the recording shall create')
-        kinds = mark_kinds(parameters.automatic_marks)
-        folder = Path(uri).expanduser().absolute()
-        space = SpaceGuard(folder, parameters.free_reserve)
-        if shortage := space.shortage():
-            raise RecordingError(f'recording {folder} cannot be started: {shortage}')
+        self._on_full = _on_full(parameters.on_full)
+        self._marks = AutomaticMarks(self._publish_automatic, mark_kinds(parameters.automatic_marks))
         thread = self.data_thread if self.lockstep else None
-        self.data_path = data_path = Collector(self, thread=thread, on_failure=self.report_failure)
-        event = data_path.node.resolve_topic_name(EVENT.name)
-        sink = _open_sink(folder, parameters, event, topics)
-        marks = AutomaticMarks(self._publish_automatic, kinds)
-        recorder = Recorder(sink, threaded=not self.lockstep, space=space, on_loss=self._mark_loss)
-        send_event = data_path.sender(EVENT)
-        self._configured = _Parts(
-            parameters, on_full, data_path, sink, recorder, space, marks, event, send_event, {}
+        data_path = Collector(self, thread=thread, on_failure=self.report_failure)
+        self.data_path = self._collector = data_path
+        self._event = data_path.node.resolve_topic_name(EVENT.name)
+        self._send_event = data_path.sender(EVENT)
+        if parameters.snapshot and EVENT not in topics:
+            raise RecordingError(f'a snapshot is set off by the topic {EVENT.name}; name it among the topics')
+        around = parameters.snapshot, parameters.snapshot_after, parameters.snapshot_memory
+        self._recorder = Recorder(
+            Path(uri).expanduser().absolute(),
+            open_writer=partial(BagWriter, split=split_of(parameters)),
+            window=EventWindow(self._event, *around) if parameters.snapshot else None,
+            threaded=not self.lockstep,
+            free_reserve=parameters.free_reserve,
+            on_loss=self._mark_loss,
         )
+        self._subscriptions_by_topic: dict[str, Subscription] = {}
         self._logged_failure = ''
-        self._logged_malformed = set()
         for entry in topics:
             common = entry.name.startswith('/') or mounts == ['']
             for mount in [''] if common else mounts:
                 self._record(entry, mount)
         if mounts != [''] and EVENT in topics:
             self._record(EVENT, '')  # marks of the recorder itself, which concern all mounts
-        if self.lockstep:
-            data_path.add_poll(recorder.poll)
-        data_path.start()
+        data_path.start(*[self._recorder.poll] if self.lockstep else [])
 
     def activate(self) -> None:
-        self._parts.recorder.begin()
-        self._counted = SlidingWindow(Counted())
+        self._core.begin()
+        self._counted = SlidingWindow[Figures]({})
         self._began_at = time.monotonic()
-        self.get_logger().info(f'recording to {self._parts.sink.folder}')
+        self.get_logger().info(f'recording to {self._core.folder}')
 
     def deactivate(self) -> None:
-        recorder, sink = self._parts.recorder, self._parts.sink
+        recorder = self._core
         if not recorder.begun:
             return
         recorder.end()
         figures = recorder.figures()
-        places = sink.folders if isinstance(sink, Snapshot) else [sink.folder]
-        where = ', '.join(map(str, places)) or 'nowhere, for lack of an event'
+        places = ', '.join(str(writer.folder) for writer in recorder.writers)
         self.get_logger().info(
-            f'recorded {figures.kept} messages, {figures.file_size} bytes, to {where}; {figures.lost} lost'
+            f'recorded {figures["kept"]} messages, {figures["file_bytes"]} bytes, '
+            f'to {places or "nowhere, for lack of an event"}; '
+            f'{figures["lost"]} lost'
         )
 
     def cleanup(self) -> None:
-        if self._configured is not None:
-            if self._configured.recorder.begun:
-                self._configured.recorder.end()
+        if self._recorder is not None:
+            if self._recorder.begun:
+                self._recorder.end()
             else:
-                self._configured.sink.discard()
-        self._configured = None
+                self._recorder.discard()
+        self._recorder = None
 
     def judge(self) -> Verdict:
-        parts = self._parts
-        recorder, sink, figures = parts.recorder, parts.sink, parts.recorder.figures()
-        unobserved = dict(recorder.unobserved)
-        self._log_news(figures.failure, unobserved)
-        elapsed = time.monotonic() - self._began_at
-        state = RecorderState(
-            str(sink.folder),
+        recorder = self._core
+        figures = self._figures(recorder)
+        if recorder.failure != self._logged_failure:
+            self._logged_failure = recorder.failure
+            self.get_logger().error(recorder.failure)
+        return judge(
             figures,
-            {name: entry.get_publisher_count() for name, entry in parts.subscriptions.items()},
-            recorder.watches,
-            parts.space.free(),
-            figures.file_size / elapsed if elapsed > 1.0 else 0.0,
-            recorder.overflowed(),
-            unobserved,
-            parts.marks.sent,
-            recorder.received_on(parts.event),
-            sink.figures() if isinstance(sink, Snapshot) else None,
+            self._counted.earlier(time.monotonic(), figures),
+            recorder.unobserved,
+            failure=recorder.failure,
+            on_full=self._on_full,
+            recording=recorder.window is None or recorder.window.running,
         )
-        return judge(state, parts.on_full, self._counted.earlier(time.monotonic(), state.counted))
 
     def mark(self, text: str = '', kind: str = BY_HAND) -> Mark:
         """Publish a mark of this moment on `event` and return it; raises `RecordingError` unless active."""
@@ -181,54 +162,73 @@ class MountRecorder(SafeLifecycleNode):
         return response
 
     @property
-    def _parts(self) -> _Parts:
-        if self._configured is None:
+    def _core(self) -> Recorder:
+        if self._recorder is None:
             raise RecordingError('the recorder is not configured')
-        return self._configured
+        return self._recorder
 
     def _record(self, entry: Topic, mount: str) -> None:
-        parts = self._parts
         placed = replace(entry, name=f'{mount}/{entry.name}') if mount else entry
-        name = parts.data_path.node.resolve_topic_name(placed.name)
+        name = self._collector.node.resolve_topic_name(placed.name)
         latched = entry.delivery is Delivery.LATCHED
-        parts.sink.add_topic(name, entry.type, partial(_offers, parts.data_path, name), latched=latched)
-        rate, namespace = parts.parameters.sample_rate, self.get_namespace()
-        watch_topic(parts.recorder, entry, name, parts.marks, namespace, self._present_time, rate)
-        receive = (parts.recorder.latched_receiver if latched else parts.recorder.receiver)(name)
-        parts.subscriptions[name] = parts.data_path.collect(placed, receive)
+        offers = partial(_offers, self._collector, name)
+        receive = self._core.add_topic(name, entry.type, offers, latched=latched)
+        self._watch(entry, name, mount)
+        self._subscriptions_by_topic[name] = self._collector.collect(placed, receive)
 
-    def _log_news(self, failure: str, unobserved: Mapping[str, Unobserved]) -> None:
-        """Log what is new since the last report: a failure, marks, kinds of malformed messages."""
-        if failure and not self._logged_failure:
-            self._logged_failure = failure
-            self.get_logger().error(failure)
-        if marks := [self._unlogged_marks.popleft() for _ in range(len(self._unlogged_marks))]:
-            self.get_logger().info(f'marked: {"; ".join(marks)}')
-        if new := {name: unobserved[name] for name in unobserved.keys() - self._logged_malformed}:
-            self._logged_malformed |= new.keys()
-            self.get_logger().warning(unobserved_sentence(new))
+    def _watch(self, entry: Topic, name: str, mount: str) -> None:
+        recorder = self._core
+        if entry is DIAGNOSTICS:
+            faults = FaultWatch(self._marks, self.get_namespace(), self._present_time)
+            recorder.observers[name] = faults.observe
+        # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
+        elif entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
+            rate = entry.rate_at(self._settings.sample_rate)
+            watch = SampleWatch(self._marks, name, rate, trace=entry is CONTROL_TRACE, mount=mount)
+            recorder.watches[name], recorder.observers[name] = watch.stamps, watch.observe
+
+    def _figures(self, recorder: Recorder) -> dict[str, Any]:
+        figures: dict[str, Any] = {'folder': str(recorder.folder), **recorder.figures()}
+        elapsed = time.monotonic() - self._began_at
+        receptions, window = recorder.receptions, recorder.window
+        figures |= {
+            'free_bytes': free_space(recorder.folder),
+            'bytes_per_second': round(figures['file_bytes'] / elapsed) if elapsed > 1.0 else 0,
+            'last_stamp': recorder.last_stamp,
+            'marks': self._marks.sent,
+            'events': receptions[self._event].received if self._event in receptions else 0,
+        }
+        if window is not None:
+            figures |= {'snapshots': len(recorder.writers), 'held_bytes': window.held_bytes}
+            figures['held_s'] = round(window.held, 3)
+        for name, subscription in self._subscriptions_by_topic.items():
+            figures[f'publishers.{name}'] = subscription.get_publisher_count()
+        return {**figures, **recorder.figures_by_topic()}
 
     # Marks.
 
     def _present_time(self) -> int:
-        return present_time(self.get_clock().now().nanoseconds, self._parts.recorder.last_stamp)
+        """Return "now" on the clock of the stamps, ns.
+
+        It is the system's unless the stamps begin at 0, as in lock-step: then it is the stamp that came last.
+        """
+        clock, last_stamp = self.get_clock().now().nanoseconds, self._core.last_stamp
+        return last_stamp if last_stamp and abs(clock - last_stamp) > _HOUR else clock
 
     def _mark_loss(self, count: int) -> None:
         text = f'{count} messages not recorded: the disk was slower than the data'
-        self._parts.marks.mark(MarkKind.RECORDING_LOSS, self._present_time(), text)
+        self._marks.mark(MarkKind.RECORDING_LOSS, self._present_time(), text)
 
     def _publish(self, mark: Mark) -> None:
-        self._parts.send_event(serialised(String(data=mark_text(mark))))
+        self._send_event(serialised(String(data=mark_text(mark))))
 
     def _publish_automatic(self, mark: Mark) -> None:
         """Publish a mark unless another recorder of this namespace does: of several the first by name."""
-        node = self._parts.data_path.node
         try:
-            infos = node.get_publishers_info_by_topic(EVENT.name)
+            infos = self._collector.node.get_publishers_info_by_topic(EVENT.name)
             names = [info.node_name for info in infos if info.node_name.startswith(_FAMILY)]
-            if min(names, default=node.get_name()) >= node.get_name():
+            if min(names, default=self._collector.node.get_name()) >= self._collector.node.get_name():
                 self._publish(mark)
-                self._unlogged_marks.append(f'{mark.kind}, {mark.text}')
         except RuntimeError:  # rclpy's errors of a context that is already shut down
             return
 
@@ -236,19 +236,6 @@ class MountRecorder(SafeLifecycleNode):
 def main() -> None:
     """Run the recorder until SIGINT or SIGTERM."""
     run_node(MountRecorder)
-
-
-def _open_sink(
-    folder: Path, parameters: RecorderParameters, event: str, topics: list[Topic]
-) -> BagWriter | Snapshot:
-    # What belongs together in a file is told by the steady clock: the system's, of the log times, may step.
-    open_writer = partial(BagWriter, split=split_of(parameters), clock=time.monotonic_ns)
-    if not parameters.snapshot:
-        return open_writer(folder)
-    if EVENT not in topics:
-        raise RecordingError(f'a snapshot is set off by the topic {EVENT.name}; name it among the topics')
-    before, after = round(1e9 * parameters.snapshot), round(1e9 * parameters.snapshot_after)
-    return Snapshot(folder, event, SnapshotRule(before, after, parameters.snapshot_memory), open_writer)
 
 
 def _registered(name: str) -> Topic:

@@ -6,8 +6,6 @@ from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SampleRate
 from mount_recorder.automatic_marks import MarkKind
 from mount_recorder.bag_writer import SplitRule, checked_rule
-from mount_recorder.snapshot import AFTER, MEMORY
-from mount_recorder.space import RESERVE
 
 _PETABYTE = 10**15
 _ALL_KINDS = ', '.join(kind.value for kind in MarkKind)
@@ -25,13 +23,13 @@ class RecorderParameters(NamedTuple):
     snapshot: Annotated[
         float, Quantity('s', 'record only events, with this much before each; 0: record all', 0.0, 3600.0)
     ] = 0.0
-    snapshot_after: Annotated[float, Quantity('s', 'and with this much after it', 0.0, 3600.0)] = AFTER * 1e-9
+    snapshot_after: Annotated[float, Quantity('s', 'and with this much after it', 0.0, 3600.0)] = 10.0
     snapshot_memory: Annotated[
         int, Quantity('B', 'memory for what may come before an event', 1 << 20, 1 << 36)
-    ] = MEMORY
+    ] = 256 << 20  # 75 s of a full drive with the simulator's truth
     free_reserve: Annotated[
         int, Quantity('B', 'free disk space below which the recording is closed', 0, _PETABYTE)
-    ] = RESERVE
+    ] = 200_000_000
     automatic_marks: Annotated[
         str, Quantity('words', 'which events are marked without being asked; empty: none')
     ] = _ALL_KINDS

@@ -48,14 +48,11 @@ class RecordFile:
         self._reserve_path.unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Bring the file to the disk and close it; safe to call twice."""
+        """Close the file; safe to call twice."""
         self.release_room()
         if self._handle >= 0:
             handle, self._handle = self._handle, -1
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            os.close(handle)
 
     # What a test replaces to play a full disk.
 

@@ -5,15 +5,19 @@ in bytes, and what does not fit is lost, counted and reported. In lock-step one 
 no time passes while it writes, and two that take turns in one process cost more than the work.
 """
 
+import shutil
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
-from mount_recorder.bag_writer import BagWriter, RecordingError
-from mount_recorder.queue import Item, ReceivedQueue
-from mount_recorder.snapshot import Snapshot
-from mount_recorder.space import SpaceGuard
+from mount_recorder.bag_writer import BagWriter, Offers, RecordingError
+from mount_recorder.event_window import ITEM_OVERHEAD, EventWindow, Item
+from mount_recorder.folders import snapshot_folder
+from mount_recorder.losses import Reception
+from mount_recorder.schemas import schema_text
 from mount_recorder.stamp_watch import StampWatch
 
 MEMORY_LIMIT = 128 << 20  # bytes, chosen: half a minute of a full drive with the simulator's truth
@@ -27,21 +31,8 @@ _SETTLE_LIMIT = 5.0  # s, chosen
 Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns)."""
 
-Observe = Callable[[bytes, int], None]
-"""Looks at (serialised message, time of arrival ns)."""
-
-
-@dataclass(frozen=True)
-class RecorderFigures:
-    """What the recorder has done; sizes in bytes."""
-
-    received: int
-    kept: int  # in complete chunks on the disk
-    file_size: int
-    queued: int
-    queued_bytes: int
-    lost: int  # did not fit into the queue, or came after the disk was full
-    failure: str
+Observe = Callable[[bytes], None]
+"""Evaluates a serialised message."""
 
 
 @dataclass(frozen=True)
@@ -54,91 +45,98 @@ class Unobserved:
 
 
 class Recorder:
-    """Takes serialised messages of announced topics and writes them from `begin` to `end`.
+    """Takes serialised messages and writes them into the recording `folder` from `begin` to `end`.
 
-    The functions that `receiver` and `latched_receiver` return are all called by one thread, `begin`
-    and `end` by any other. The writing is done by a thread of its own, or (`threaded` off) by whoever
-    calls `poll`. What `watch` and `observe` take is called where the writing is done, and so is
-    `on_loss`, with the number of messages for which the queue had no room since it was called last.
-    A message on which an observer fails is recorded all the same and counted in `unobserved`; so is a
-    failure of `on_loss`.
+    With a `window` it writes only around events: the first makes the recording `folder`, later ones
+    `folder`_2, `folder`_3, ... An event while a recording still runs makes it longer.
+
+    The functions that `add_topic` returns are all called by one thread, `begin` and `end` by any other. The
+    writing is done by a thread of its own, or (`threaded` off) by whoever calls `poll`. The `observers`
+    are called there too, each with the messages of its topic, and so is `on_loss`, with the number of
+    messages for which the queue had no room since it was called last. A message on which an observer fails
+    is recorded all the same and counted in `unobserved`; so is a failure of `on_loss`.
+
+    The recording is closed before the disk has less than `free_reserve` bytes left.
     """
 
     def __init__(
         self,
-        writer: BagWriter | Snapshot,
+        folder: Path,
         *,
+        open_writer: Callable[[Path], BagWriter] = BagWriter,
+        window: EventWindow | None = None,
         memory_limit: int = MEMORY_LIMIT,
         threaded: bool = True,
-        space: SpaceGuard | None = None,
+        free_reserve: int = 0,
         on_loss: Callable[[int], None] = lambda _: None,
     ):
+        self.folder = folder
+        self.window = window
+        self.writers: list[BagWriter] = []
+        self.receptions: dict[str, Reception] = {}
+        self.observers: dict[str, Observe] = {}
         self.watches: dict[str, StampWatch] = {}
         self.unobserved: dict[str, Unobserved] = {}
+        self.failure = ''
         self.begun = False
-        self._writer = writer
-        self._space = space
+        self._new_writer = open_writer
+        self._memory_limit = memory_limit
+        self._free_reserve = free_reserve
         self._on_loss = on_loss
-        self._observers: dict[str, Observe] = {}
-        self._queue = ReceivedQueue(memory_limit)
-        self._open = False
-        self._gate = threading.Lock()
+        self._topics: list[tuple[str, str, Offers, bool]] = []
+        self._queue: deque[Item] = deque()
+        self._queued_bytes = 0
         self._latched: dict[str, Item] = {}
-        self._handed = 0  # to the writer, or thrown away after it failed
-        self._failure = ''
-        self._turn_end = self._changed = self._looked = 0.0  # steady times, s
-        self._kept_before = self._lost_before = 0
+        self._wanted = 0  # messages that a window has selected
+        self._open = False
+        self._gate = threading.Lock()  # of the queue, for a moment each
         self._writing = threading.Lock()
+        self._turn_end = self._changed = self._space_checked = 0.0  # steady times, s
+        self._kept_before = self._lost_before = 0
         self._ending = threading.Event()
-        self._threaded = threaded
-        self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
-        writer.attach(self._queue.receptions)
+        self._thread = threading.Thread(target=self._work, name='recorder', daemon=True) if threaded else None
+        if shortage := self._shortage():
+            raise RecordingError(f'recording {folder} cannot be started: {shortage}')
+        if folder.exists():
+            raise RecordingError(f'{folder} exists already; a recording is never written over')
+        if window is None:
+            self._open_writer()
 
-    def receiver(self, topic: str) -> Receive:
-        """Return the function that takes the messages of `topic`; before `begin` it drops them."""
-        take = self._queue.taker(topic)
+    def add_topic(
+        self, name: str, type_name: str, offers: Offers = tuple, *, latched: bool = False
+    ) -> Receive:
+        """Announce a topic and return the function that takes its messages.
+
+        Before `begin` it drops them, but keeps the last one of a `latched` topic for it. Raises `SchemaError`
+        for a type that is not installed.
+        """
+        schema_text(type_name)
+        self._topics.append((name, type_name, offers, latched))
+        self.receptions[name] = Reception()
+        if self.window is None:
+            self.writers[0].add_topic(name, type_name, offers, latched=latched)
+        elif latched:
+            self.window.latched.add(name)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
-            if self._open:
-                take((topic, raw, received, sent))
-
-        return receive
-
-    def latched_receiver(self, topic: str) -> Receive:
-        """Return the same for a latched topic: the last message before `begin` is kept for it."""
-        take = self._queue.taker(topic)
-
-        def receive(raw: bytes, received: int, sent: int) -> None:
-            item = (topic, raw, received, sent)
             with self._gate:
                 if self._open:
-                    take(item)
-                else:
-                    self._latched[topic] = item
+                    self._put((name, raw, received, sent))
+                elif latched:
+                    self._latched[name] = name, raw, received, sent
 
         return receive
-
-    def watch(self, topic: str, rate: float, stamp_of: Callable[[bytes], int]) -> StampWatch:
-        """Count missing samples of `topic`, which has `rate` in Hz; `stamp_of` returns ns."""
-        watch = self.watches[topic] = StampWatch(rate)
-        self.observe(topic, lambda raw, _: watch.add(stamp_of(raw)))
-        return watch
-
-    def observe(self, topic: str, observe: Observe) -> None:
-        """Show each message of `topic` to `observe`, instead of to the one before."""
-        self._observers[topic] = observe
 
     def begin(self) -> None:
         """Record from now on, the kept latched messages first; raises `RecordingError` a second time."""
         if self.begun:
-            raise RecordingError(f'recording {self._writer.folder} has ended; configure a new one')
+            raise RecordingError(f'recording {self.folder} has ended; configure a new one')
         with self._gate:
-            self.begun = True
+            self.begun = self._open = True
             for item in sorted(self._latched.values(), key=lambda item: item[2]):
-                self._queue.taker(item[0])(item)
-            self._changed = self._looked = time.monotonic()
-            self._open = True
-        if self._threaded:
+                self._put(item)
+            self._changed = self._space_checked = time.monotonic()
+        if self._thread is not None:
             self._thread.start()
 
     def poll(self) -> bool:
@@ -156,55 +154,88 @@ class Recorder:
         """
         if self._open:
             self._settle()
-            self._open = False
+            with self._gate:
+                self._open = False
             self._ending.set()
-            if self._threaded:
+            if self._thread is not None:
                 self._thread.join()
             with self._writing:
                 self._guarded(self._write_queued)
         self._note_missing()
         try:
-            self._writer.close()
+            if self._writer is not None:
+                self._writer.close()
         except RecordingError as error:
-            self._failure = str(error)
+            self.failure = str(error)
             raise
 
-    def figures(self) -> RecorderFigures:
-        """Return what was done so far."""
-        return RecorderFigures(
-            received=self._queue.received,
-            kept=self._writer.kept,
-            file_size=self._writer.size,
-            queued=len(self._queue),
-            queued_bytes=self._queue.size,
-            lost=self._queue.overflowed + (self._writer.unwritten(self._handed) if self._failure else 0),
-            failure=self._failure,
-        )
+    def discard(self) -> None:
+        """Remove the recording of a recorder that never began."""
+        for writer in self.writers:
+            writer.discard()
 
-    def overflowed(self) -> dict[str, int]:
-        """Return how many messages of each topic did not fit into the queue, where there are any."""
-        return {name: entry.overflowed for name, entry in self._queue.receptions.items() if entry.overflowed}
+    def figures(self) -> dict[str, int]:
+        """Return what was done so far, by the keys of the diagnostics; sizes in bytes.
 
-    def received_on(self, topic: str) -> int:
-        """Return how many messages of `topic` came since `begin`."""
-        entry = self._queue.receptions.get(topic)
-        return entry.received if entry is not None else 0
+        `kept` is in complete chunks on the disk; `lost` did not fit into the queue, or came after a failure.
+        """
+        received = sum(entry.received for entry in self.receptions.values())
+        overflowed = sum(entry.overflowed for entry in self.receptions.values())
+        kept = self._kept
+        wanted = received - overflowed if self.window is None else self._wanted
+        return {
+            'received': received,
+            'kept': kept,
+            'file_bytes': sum(writer.size for writer in self.writers),
+            'queued': len(self._queue),
+            'queued_bytes': self._queued_bytes,
+            'lost': overflowed + (wanted - kept if self.failure else 0),
+        }
+
+    def figures_by_topic(self) -> dict[str, int]:
+        """Return the same by topic: keys such as `missing.<topic>`."""
+        figures = {f'lost.{name}': entry.overflowed for name, entry in self.receptions.items()}
+        figures = {key: count for key, count in figures.items() if count}
+        figures |= {f'malformed.{name}': entry.count for name, entry in list(self.unobserved.items())}
+        for name, watch in self.watches.items():
+            figures |= {f'missing.{name}': watch.lost, f'misdated.{name}': watch.misdated}
+        return figures
 
     @property
     def last_stamp(self) -> int:
         """The latest stamp of all watched topics, ns."""
         return max((watch.last_stamp for watch in self.watches.values()), default=0)
 
+    @property
+    def _kept(self) -> int:
+        return sum(writer.kept for writer in self.writers)
+
+    @property
+    def _writer(self) -> BagWriter | None:
+        """The recording that is being made."""
+        return self.writers[-1] if self.writers and not self.writers[-1].closed else None
+
+    def _put(self, item: Item) -> None:
+        reception = self.receptions[item[0]]
+        reception.received += 1
+        size = len(item[1]) + ITEM_OVERHEAD
+        if self._queued_bytes + size > self._memory_limit:
+            reception.overflowed += 1
+        else:
+            self._queued_bytes += size
+            self._queue.append(item)
+
     def _settle(self) -> None:
         """Wait until messages cease, or until those come that arrived well after this call."""
         limit = time.monotonic() + _SETTLE_LIMIT
         latest = time.time_ns() + int(2e9 * _QUIET_PERIOD)
         before = -1
-        while self._queue.received != before and time.monotonic() < limit:
-            before = self._queue.received
+        while (received := self.figures()['received']) != before and time.monotonic() < limit:
+            before = received
             self._ending.wait(_QUIET_PERIOD)
-            if self._queue.newest_arrival > latest:
-                return
+            with self._gate:
+                if self._queue and self._queue[-1][2] > latest:
+                    return
 
     # The writing.
 
@@ -214,69 +245,105 @@ class Recorder:
 
     def _take_turn(self) -> None:
         self._guarded(self._write_queued)
-        now = self._turn_end = time.monotonic()
-        if self._writer.kept != self._kept_before or not self._writer.pending:
-            self._kept_before, self._changed = self._writer.kept, now
+        now, writer, kept = time.monotonic(), self._writer, self._kept
+        self._turn_end = now
+        if writer is None or not writer.pending or kept != self._kept_before:
+            self._kept_before, self._changed = kept, now
         elif now - self._changed > _FLUSH_PERIOD:
-            self._guarded(self._writer.flush)
-        if now - self._looked > _SPACE_PERIOD:
-            self._looked = now
-            self._guarded(self._look_at_space)
-        lost, self._lost_before = self._queue.overflowed - self._lost_before, self._queue.overflowed
-        if lost:
+            self._guarded(writer.flush)
+        if now - self._space_checked > _SPACE_PERIOD:
+            self._space_checked = now
+            self._guarded(self._check_space)
+        overflowed = sum(entry.overflowed for entry in self.receptions.values())
+        if lost := overflowed - self._lost_before:
+            self._lost_before = overflowed
             try:
                 self._on_loss(lost)
             except Exception as error:
-                # The border of the thread: what cannot be told of a loss costs no more messages.
+                # The border of the thread: what cannot be reported of a loss costs no more messages.
                 self._note_unobserved('marks of losses', b'', error)
 
     def _write_queued(self) -> None:
-        rest = len(self._queue)
-        while rest > 0:
-            self._write_batch(min(rest, _BATCH))
-            rest -= _BATCH
+        queue = self._queue
+        for _ in range(-(-len(queue) // _BATCH)):
+            batch = [queue.popleft() for _ in range(min(len(queue), _BATCH))]
+            try:
+                for item in batch:
+                    self._store(item)
+                    if item[0] in self.observers:
+                        self._observe(item[0], item[1])
+            finally:
+                with self._gate:
+                    self._queued_bytes -= sum(len(item[1]) + ITEM_OVERHEAD for item in batch)
 
-    def _write_batch(self, count: int) -> None:
-        take, write, observers = self._queue.pop, self._writer.write, self._observers
-        taken = taken_bytes = 0
+    def _store(self, item: Item) -> None:
+        """Write a message, or what the window selects: nothing without an event, then all it holds."""
+        if self.window is None:
+            self.writers[0].write(*item)
+            return
+        begins, items = self.window.add(item)
+        if (begins or not items) and self._writer is not None:
+            self._writer.close()
+        if begins:
+            self._open_writer()
+        for each in items:
+            self._wanted += 1
+            self.writers[-1].write(*each)
+
+    def _open_writer(self) -> None:
+        writer = self._new_writer(snapshot_folder(self.folder, len(self.writers) + 1))
+        writer.receptions, writer.excerpt = self.receptions, self.window is not None
+        for name, type_name, offers, latched in self._topics:
+            writer.add_topic(name, type_name, offers, latched=latched)
+        self.writers.append(writer)
+
+    def _observe(self, topic: str, raw: bytes) -> None:
         try:
-            for taken in range(1, count + 1):  # noqa: B007 - also read after an exception
-                topic, raw, received, sent = take()
-                taken_bytes += len(raw)
-                write(topic, raw, received, sent)
-                if topic in observers:
-                    try:
-                        observers[topic](raw, received)
-                    except Exception as error:
-                        # Anybody may publish anything: what is wrong with one message ends no recording.
-                        self._note_unobserved(topic, raw, error)
-        finally:
-            self._handed += taken
-            self._queue.free(taken, taken_bytes)
+            self.observers[topic](raw)
+        except Exception as error:
+            # Anybody may publish anything: what is wrong with one message ends no recording.
+            self._note_unobserved(topic, raw, error)
 
     def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
-        before = self.unobserved.get(topic)
-        count = 1 if before is None else before.count + 1
+        count = self.unobserved[topic].count + 1 if topic in self.unobserved else 1
         why = f'{type(error).__name__}: {error}'.splitlines()[0]
         self.unobserved[topic] = Unobserved(count, len(raw), why)
 
-    def _look_at_space(self) -> None:
-        shortage = self._space.shortage() if self._space is not None else ''
-        if shortage:
+    def _check_space(self) -> None:
+        if shortage := self._shortage():
             self._note_missing()
-            self._writer.stop(shortage)
+            if self._writer is not None:
+                self._writer.stop(shortage)
+            raise RecordingError(f'recording {self.folder} stopped: {shortage}')
+
+    def _shortage(self) -> str:
+        """Return what is wrong where the disk has less than the reserve, empty while there is enough."""
+        free = free_space(self.folder)
+        if free >= self._free_reserve:
+            return ''
+        return (
+            f'{free / 1e6:.0f} MB left on the disk of {self.folder}, less than the '
+            f'{self._free_reserve / 1e6:.0f} MB that free_reserve keeps'
+        )
 
     def _note_missing(self) -> None:
         for name, watch in self.watches.items():
-            self._queue.reception(name).missing = watch.lost
+            self.receptions[name].missing = watch.lost
 
     def _guarded(self, step: Callable[[], None]) -> None:
         try:
-            if not self._failure:
+            if not self.failure:
                 step()
         except Exception as error:
             # The border of the thread: a recorder that ends without a word would be the worst of all.
             known = isinstance(error, RecordingError)
-            self._failure = str(error) if known else f'recording stopped: {type(error).__name__}: {error}'
-        if self._failure:
-            self._handed += self._queue.discard()
+            self.failure = str(error) if known else f'recording stopped: {type(error).__name__}: {error}'
+        if self.failure:
+            with self._gate:
+                self._queue.clear()
+                self._queued_bytes = 0
+
+
+def free_space(folder: Path) -> int:
+    """Return the free bytes of the disk that holds `folder`, or will hold it."""
+    return shutil.disk_usage(next(place for place in (folder, *folder.parents) if place.exists())).free

@@ -1,31 +1,28 @@
 """A process that records four streams at 1 kHz until it is killed, without middleware.
 
-Arguments: the recording's folder, and a file of 8 bytes in which it tells how many samples it took.
+Arguments: the recording's folder, and a file of 8 bytes into which it writes how many samples it took.
 """
 
 import mmap
 import random
 import sys
 import time
+from functools import partial
+from pathlib import Path
 
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.recorder import Recorder
 
 TOPICS = ('/one', '/two', '/three', '/four')
-JOINT_STATE = 'sensor_msgs/msg/JointState'
-STRING = 'std_msgs/msg/String'
 SPLIT = SplitRule(duration=250_000_000)
 
 
 def main(folder, progress_file):
     with open(progress_file, 'r+b') as file:
         progress = mmap.mmap(file.fileno(), 8)
-    writer = BagWriter(folder, split=SPLIT)
-    writer.add_topic('/session', STRING, latched=True)
-    for topic in TOPICS:
-        writer.add_topic(topic, JOINT_STATE)
-    recorder = Recorder(writer)
-    session, receivers = recorder.latched_receiver('/session'), [recorder.receiver(name) for name in TOPICS]
+    recorder = Recorder(Path(folder), open_writer=partial(BagWriter, split=SPLIT))
+    session = recorder.add_topic('/session', 'std_msgs/msg/String', latched=True)
+    receivers = [recorder.add_topic(topic, 'sensor_msgs/msg/JointState') for topic in TOPICS]
     session(b'\0\1\0\0\2\0\0\0s\0', time.time_ns(), time.time_ns())
     recorder.begin()
     noise = random.Random(1)

@@ -77,7 +77,6 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
             written.append(step)
             continue
         writer.flush()
-        writer._wait_for_closing()
         safe, safe_sizes = len(written), {path: path.stat().st_size for path in pieces_of(folder)}
     kill(writer)
     cut(folder, safe_sizes, share)
@@ -91,9 +90,8 @@ def test_whatever_was_flushed_survives_a_cut_at_any_later_byte(
 
 def kill(writer):
     """Leave the files of a writer as SIGKILL would."""
-    writer._wait_for_closing()
-    writer._files[-1].writer.file.release_room()
-    writer._files[-1].writer.file.close()
+    writer._file.file.release_room()
+    writer._file.file.close()
 
 
 def cut(folder, safe_sizes, share):

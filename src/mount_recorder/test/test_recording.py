@@ -4,403 +4,117 @@ import itertools
 import threading
 import time
 import tracemalloc
-from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import pytest
-from mcap.reader import make_reader
-from read_back import loss_statement
+from read_back import loss_statement, read_back
 from ros_testing import wait_until
 from samples import PERIOD, START, sample
 from small_disk import small_disk
 
 from mount_recorder import recorder as recording
 from mount_recorder.bag_writer import BagWriter, RecordingError
-from mount_recorder.diagnosis import Counted, OnFull, RecorderState, judge
-from mount_recorder.queue import ReceivedQueue
-from mount_recorder.recorder import Recorder, RecorderFigures, Unobserved
-from mount_recorder.space import SpaceGuard
-from mount_recorder.stamp_watch import StampWatch
-from mount_ros.messages.scalars import stamp_of
+from mount_recorder.diagnosis import OnFull, judge
+from mount_recorder.event_window import ITEM_OVERHEAD
+from mount_recorder.recorder import Recorder, Unobserved, free_space
+from mount_recorder.watching import SampleWatch
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
+SIZE = len(sample(DISPLACEMENT, 0)) + ITEM_OVERHEAD
+QUIET = {'received': 0, 'lost': 0, 'free_bytes': 1 << 40, 'bytes_per_second': 0, 'folder': '/data/bag'}
 
 
-def recorder_of(folder, memory_limit=1 << 22, threaded=True, space=None, on_loss=lambda _: None, **options):
-    writer = BagWriter(folder, **options)
-    writer.add_topic('/displacement', DISPLACEMENT.type)
-    writer.add_topic('/latched', STRING)
-    return Recorder(writer, memory_limit=memory_limit, threaded=threaded, space=space, on_loss=on_loss)
+class SlowDisk(BagWriter):
+    """Writes nothing before `free` is set."""
+
+    free = None
+
+    def write(self, *message):
+        if self.free is not None:
+            self.free.wait()
+        super().write(*message)
+
+
+class Fed(SimpleNamespace):
+    """A recorder of two topics, and the functions that hand it messages, one per nanosecond."""
 
 
 @pytest.fixture
-def clocked():
-    """Return a function that makes a receiver take one message per nanosecond."""
-    times = itertools.count(START)
+def make(tmp_path):
+    def made(writer=BagWriter, **options):
+        recorder = Recorder(tmp_path / 'bag', open_writer=writer, **options)
+        times = itertools.count(START)
 
-    def clock(receive):
-        def receive_now(raw):
-            now = next(times)
-            receive(raw, now, now)
+        def clocked(receive):
+            def receive_now(raw):
+                now = next(times)
+                receive(raw, now, now)
 
-        return receive_now
+            return receive_now
 
-    return clock
+        receive = clocked(recorder.add_topic('/displacement', DISPLACEMENT.type))
+        latched = clocked(recorder.add_topic('/latched', STRING, latched=True))
+        watch = SampleWatch(SimpleNamespace(mark=lambda *_: None), '/displacement', 1000.0, trace=False)
+        recorder.watches['/displacement'], recorder.observers['/displacement'] = watch.stamps, watch.observe
+        return recorder, receive, latched
+
+    return made
+
+
+@pytest.fixture
+def slow(monkeypatch):
+    """Return the event that lets `SlowDisk` write."""
+    free = threading.Event()
+    monkeypatch.setattr(SlowDisk, 'free', free)
+    yield free
+    free.set()
 
 
 def messages_of(folder):
-    with (folder / f'{folder.name}_0.mcap').open('rb') as file:
-        return [
-            (channel.topic, message.data, message.log_time)
-            for _, channel, message in make_reader(file, validate_crcs=True).iter_messages()
-        ]
+    return [(kept.topic, kept.raw, kept.log_time) for kept in read_back(folder)]
 
 
-def verdict_of(recorder, on_full=OnFull.STOP, **state):
-    return judge(RecorderState('/data/bag', recorder.figures(), watches=recorder.watches, **state), on_full)
+def samples(*indices):
+    return [sample(DISPLACEMENT, index) for index in indices]
 
 
-def test_every_message_between_begin_and_end_is_written(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in range(5000):
-        receive(sample(DISPLACEMENT, index))
-    recorder.end()
-    assert [data for _, data, _ in messages_of(tmp_path / 'bag')] == [
-        sample(DISPLACEMENT, index) for index in range(5000)
-    ]
-    assert recorder.figures().lost == 0
-
-
-def test_stream_before_begin_is_dropped_and_latched_message_is_written_first(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    receive = clocked(recorder.receiver('/displacement'))
-    receive_latched = clocked(recorder.latched_receiver('/latched'))
+def test_all_between_begin_and_end_is_written_the_last_latched_message_before_first(make, tmp_path):
+    recorder, receive, receive_latched = make()
     receive_latched(b'first')
     receive_latched(b'last')
     receive(sample(DISPLACEMENT, 0))
     recorder.begin()
-    receive(sample(DISPLACEMENT, 1))
+    for raw in samples(*range(1, 5000)):
+        receive(raw)
     receive_latched(b'later')
-    recorder.end()
-    assert messages_of(tmp_path / 'bag') == [
-        ('/latched', b'last', START + 1),
-        ('/displacement', sample(DISPLACEMENT, 1), START + 3),
-        ('/latched', b'later', START + 4),
-    ]
-
-
-def test_message_that_is_under_way_at_the_end_is_taken(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    wait = recorder._ending.wait
-
-    def arrive_while_waiting(period):
-        if threading.current_thread() is threading.main_thread():
-            receive(sample(DISPLACEMENT, 7))
-        return wait(period)
-
-    recorder._ending.wait = arrive_while_waiting
-    recorder.end()
-    assert sample(DISPLACEMENT, 7) in [data for _, data, _ in messages_of(tmp_path / 'bag')]
-
-
-def test_messages_after_the_end_are_dropped(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    receive = clocked(recorder.receiver('/displacement'))
-    receive_latched = clocked(recorder.latched_receiver('/latched'))
-    recorder.begin()
     recorder.end()
     receive(sample(DISPLACEMENT, 0))
     receive_latched(b'late')
-    assert messages_of(tmp_path / 'bag') == []
-
-
-def test_recording_cannot_begin_twice(tmp_path):
-    recorder = recorder_of(tmp_path / 'bag')
-    recorder.begin()
-    recorder.end()
+    expected = [
+        ('/displacement', raw, START + 3 + index) for index, raw in enumerate(samples(*range(1, 5000)))
+    ]
+    written = sorted(messages_of(tmp_path / 'bag'), key=lambda message: message[2])
+    assert written == [('/latched', b'last', START + 1), *expected, ('/latched', b'later', START + 5002)]
+    assert recorder.figures()['lost'] == 0
     with pytest.raises(RecordingError, match='configure a new one'):
         recorder.begin()
 
 
-def test_full_queue_loses_and_counts_without_waiting(tmp_path, clocked):
-    size = len(sample(DISPLACEMENT, 0))
-    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size)
-    stuck = threading.Event()
-    recorder._writer.write = lambda *_: stuck.wait()
-    receive = clocked(recorder.receiver('/displacement'))
+def test_message_that_is_under_way_at_the_end_is_taken(make, tmp_path):
+    recorder, receive, _ = make()
     recorder.begin()
-    for index in range(1000):
-        receive(sample(DISPLACEMENT, index))
-    figures = recorder.figures()
-    stuck.set()
-    assert figures.received == 1000
-    assert figures.lost >= 980
-    assert figures.queued_bytes <= 10 * size
-    verdict = verdict_of(recorder)
-    assert verdict.level is Level.WARN
-    assert 'of 1000 messages lost' in verdict.sentence
+    under_way = threading.Timer(recording._QUIET_PERIOD / 2, receive, samples(7))
+    under_way.start()
     recorder.end()
+    assert [raw for _, raw, _ in messages_of(tmp_path / 'bag')] == samples(7)
 
 
-def test_recorder_without_a_thread_writes_when_it_is_polled(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag', threaded=False)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in range(100):
-        receive(sample(DISPLACEMENT, index))
-    assert recorder.figures().queued == 100
-    assert recorder.poll() is False
-    assert recorder.figures().queued == 0
-    receive(sample(DISPLACEMENT, 100))
-    recorder.end()
-    assert recorder.figures().lost == 0
-    assert [data for _, data, _ in messages_of(tmp_path / 'bag')] == [
-        sample(DISPLACEMENT, index) for index in range(101)
-    ]
-
-
-def test_recorder_without_a_thread_ignores_polls_before_and_after_its_time(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag', threaded=False)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.poll()
-    recorder.begin()
-    receive(sample(DISPLACEMENT, 0))
-    recorder.end()
-    size = (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size
-    recorder.poll()
-    assert (tmp_path / 'bag' / 'bag_0.mcap').stat().st_size == size
-
-
-def test_recorder_without_a_thread_says_why_it_has_failed(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag', threaded=False)
-
-    def fail(*_):
-        raise RecordingError('no space left')
-
-    recorder._writer.write = fail
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in range(100):
-        receive(sample(DISPLACEMENT, index))
-    recorder.poll()
-    recorder.end()
-    assert recorder.figures().lost == 100
-    assert recorder.figures().failure == 'no space left'
-
-
-def test_missing_samples_are_seen_while_they_are_recorded(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in (0, 1, 2, 5, 6, 10):
-        receive(sample(DISPLACEMENT, index))
-    recorder.end()
-    verdict = verdict_of(recorder)
-    assert verdict.level is Level.WARN
-    assert '/displacement 5' in verdict.sentence
-    assert verdict.figures['missing./displacement'] == 5
-    assert verdict.figures['last_stamp'] == START + 10 * PERIOD
-
-
-@pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
-def test_full_disk_is_an_error_or_a_warning_as_wished(tmp_path, clocked, on_full, level):
-    recorder = recorder_of(tmp_path / 'bag', open_file=small_disk((1 << 20) + 100_000))
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    index = 0
-    while not recorder.figures().failure:
-        receive(sample(DISPLACEMENT, index))
-        index += 1
-    recorder.end()
-    verdict = verdict_of(recorder, on_full)
-    assert verdict.level is level
-    assert 'no space left' in verdict.sentence
-    figures = recorder.figures()
-    assert figures.kept == len(messages_of(tmp_path / 'bag'))
-    assert figures.kept + figures.lost == figures.received
-    assert figures.queued_bytes == 0
-
-
-def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(tmp_path, clocked, monkeypatch):
-    monkeypatch.setattr('mount_recorder.recorder._FLUSH_PERIOD', 0.0)
-    recorder = recorder_of(tmp_path / 'bag')
-    recorder.begin()
-    clocked(recorder.receiver('/displacement'))(sample(DISPLACEMENT, 0))
-    waited = threading.Event()
-    for _ in range(1000):
-        if recorder.figures().kept:
-            break
-        waited.wait(0.01)
-    assert recorder.figures().kept == 1
-    recorder.end()
-
-
-def test_little_space_is_a_warning_with_what_is_left(tmp_path):
-    recorder = recorder_of(tmp_path / 'bag')
-    verdict = verdict_of(recorder, free=500_000_000, rate=2e6)
-    assert verdict.level is Level.WARN
-    assert '0.5 GB left' in verdict.sentence
-    verdict = verdict_of(recorder, free=5_000_000_000, rate=1e8)
-    assert verdict.level is Level.WARN
-    recorder.end()
-
-
-@pytest.mark.parametrize('kind', ['lost', 'missing', 'misdated', 'unobserved'])
-def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(kind):
-    window, standing, told = SlidingWindow(Counted()), ActiveFindings(), []
-    watch, figures = StampWatch(1000.0), RecorderFigures(0, 0, 0, 0, 0, 0, '')
-    unobserved = {}
-    for tenth in range(300):
-        found = 7 * min(max(tenth - 49, 0), 5)
-        figures = replace(figures, received=100 * tenth, lost=found if kind == 'lost' else 0)
-        watch.lost, watch.misdated = (found if kind == name else 0 for name in ('missing', 'misdated'))
-        if kind == 'unobserved' and found:
-            unobserved = {'/displacement': Unobserved(found, 7, 'too short')}
-        state = RecorderState('/data/bag', figures, watches={'/displacement': watch}, unobserved=unobserved)
-        earlier = window.earlier(tenth / 10, state.counted)
-        verdict = standing.keep(judge(state, OnFull.STOP, earlier))
-        told.append((verdict.level, verdict.sentence))
-    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
-    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
-    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
-    assert len(set(told)) == 2
-
-
-def test_one_warning_does_not_hide_another(tmp_path):
-    recorder = recorder_of(tmp_path / 'bag')
-    malformed = {'/displacement': Unobserved(1, 7, 'too short')}
-    verdict = verdict_of(recorder, free=500_000_000, rate=2e6, unobserved=malformed)
-    assert verdict.level is Level.WARN
-    assert '/displacement 1 (the last of 7 bytes; too short)' in verdict.sentence
-    assert '0.5 GB left' in verdict.sentence
-    recorder.end()
-
-
-def test_sound_recorder_says_how_many_topics_have_a_publisher(tmp_path):
-    recorder = recorder_of(tmp_path / 'bag')
-    verdict = verdict_of(recorder, publishers={'/displacement': 1, '/latched': 0})
-    assert verdict.level is Level.OK
-    assert '1 of 2 topics have a publisher' in verdict.sentence
-    assert verdict.figures['publishers./latched'] == 0
-    recorder.end()
-
-
-def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alone():
-    limit = 1 << 20
-    queue = ReceivedQueue(limit)
-    take = queue.taker('/topic')
-    tracemalloc.start()
-    for index in range(limit // 8):
-        take(('/topic', index.to_bytes(8, 'little'), START + index, START + index + 1))
-    held, _ = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert 0.5 * limit < held < limit
-    assert len(queue) + queue.overflowed == limit // 8
-
-
-def test_a_loss_that_cannot_be_told_ends_no_recording(tmp_path, clocked):
-    size = len(sample(DISPLACEMENT, 0))
-
-    def fail(count):
-        raise ValueError('no node to tell it')
-
-    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, on_loss=fail)
-    stuck, write = threading.Event(), recorder._writer.write
-    recorder._writer.write = lambda *item: stuck.wait() and write(*item)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in range(100):
-        receive(sample(DISPLACEMENT, index))
-    stuck.set()
-    told = wait_until(lambda: recorder.unobserved.get('marks of losses'), 'the failure to be told')
-    assert told == Unobserved(1, 0, 'ValueError: no node to tell it')
-    before = recorder.figures().kept
-    receive(sample(DISPLACEMENT, 100))
-    wait_until(lambda: recorder.figures().kept > before, 'the next message on the disk')
-    recorder.end()
-
-
-def test_losses_of_the_recorder_stand_in_the_file_by_topic(tmp_path, clocked):
-    size = len(sample(DISPLACEMENT, 0))
-    told = []
-    recorder = recorder_of(tmp_path / 'bag', memory_limit=10 * size, on_loss=told.append)
-    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
-    stuck, write = threading.Event(), recorder._writer.write
-    recorder._writer.write = lambda *item: stuck.wait() and write(*item)
-    receive, receive_other = (
-        clocked(recorder.receiver('/displacement')),
-        clocked(recorder.receiver('/latched')),
-    )
-    recorder.begin()
-    for index in range(100):
-        receive(sample(DISPLACEMENT, index))
-    lost = recorder.overflowed()['/displacement']
-    stuck.set()
-    wait_until(lambda: told, 'the announcement of the loss')
-    receive_other(b'text')
-    recorder.end()
-    assert (told, lost >= 80) == ([lost], True)
-    rows = loss_statement(tmp_path / 'bag')
-    assert rows['/displacement'] == {'received': 100, 'kept': 100 - lost, 'lost': lost, 'missing': 0}
-    assert rows['/latched'] == {'received': 1, 'kept': 1, 'lost': 0, 'missing': 0}
-
-
-def test_sound_recording_says_so_in_the_file(tmp_path, clocked):
-    recorder = recorder_of(tmp_path / 'bag')
-    recorder.watch('/displacement', DISPLACEMENT.rate, stamp_of)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.receiver('/latched')
-    recorder.begin()
-    for index in (0, 1, 4):
-        receive(sample(DISPLACEMENT, index))
-    recorder.end()
-    assert loss_statement(tmp_path / 'bag') == {
-        '/displacement': {'received': 3, 'kept': 3, 'lost': 0, 'missing': 2},
-        '/latched': {'received': 0, 'kept': 0, 'lost': 0, 'missing': 0},
-    }
-
-
-@pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
-def test_recording_is_closed_before_the_disk_is_full(tmp_path, clocked, monkeypatch, on_full, level):
-    monkeypatch.setattr('mount_recorder.recorder._SPACE_PERIOD', 0.0)
-    free = [250_000_000]
-    guard = SpaceGuard(tmp_path / 'bag', 200_000_000, lambda _: free[0])
-    recorder = recorder_of(tmp_path / 'bag', space=guard)
-    receive = clocked(recorder.receiver('/displacement'))
-    recorder.begin()
-    for index in range(10):
-        receive(sample(DISPLACEMENT, index))
-    wait_until(lambda: recorder.figures().kept, 'the first chunk')
-    free[0] = 199_000_000
-    wait_until(lambda: recorder.figures().failure, 'the end')
-    receive(sample(DISPLACEMENT, 10))
-    verdict = verdict_of(recorder, on_full)
-    assert verdict.level is level
-    assert '199 MB left' in verdict.sentence
-    assert 'closed and readable' in verdict.sentence
-    assert len(messages_of(tmp_path / 'bag')) == 10
-    recorder.end()
-    assert recorder.figures().lost == 1
-
-
-def test_space_is_that_of_the_disk_on_which_the_folder_will_be(tmp_path):
-    asked = []
-    guard = SpaceGuard(tmp_path / 'not' / 'yet' / 'made', 1, lambda place: asked.append(place) or 5)
-    assert guard.free() == 5
-    assert asked == [tmp_path]
-    assert SpaceGuard(tmp_path, 1 << 62).shortage()
-    assert not SpaceGuard(tmp_path, 0).shortage()
-
-
-def test_end_beside_a_running_graph_does_not_wait_for_silence(tmp_path):
-    recorder = recorder_of(tmp_path / 'bag')
-    receive = recorder.receiver('/displacement')
+def test_end_beside_a_running_graph_does_not_wait_for_silence(make):
+    recorder, *_ = make()
+    receive = recorder.add_topic('/other', STRING)
     recorder.begin()
     ended = threading.Event()
 
@@ -416,3 +130,189 @@ def test_end_beside_a_running_graph_does_not_wait_for_silence(tmp_path):
     ended.set()
     graph.join()
     assert duration < 0.9 * recording._SETTLE_LIMIT
+
+
+def test_full_queue_loses_without_waiting_and_counts_by_topic_in_figures_and_file(make, tmp_path, slow):
+    lost_at_once = []
+    recorder, receive, receive_latched = make(SlowDisk, memory_limit=10 * SIZE, on_loss=lost_at_once.append)
+    recorder.begin()
+    for raw in samples(*range(1000)):
+        receive(raw)
+    figures = recorder.figures()
+    assert (figures['received'], figures['lost'] >= 980) == (1000, True)
+    assert figures['queued_bytes'] <= 10 * SIZE
+    slow.set()
+    wait_until(lambda: lost_at_once, 'the announcement of the loss')
+    receive_latched(b'text')
+    recorder.end()
+    lost = recorder.figures()['lost']
+    assert lost_at_once == [lost] == [recorder.figures_by_topic()['lost./displacement']]
+    rows = loss_statement(tmp_path / 'bag')
+    assert rows['/displacement'] == {'received': 1000, 'kept': 1000 - lost, 'lost': lost, 'missing': 0}
+    assert rows['/latched'] == {'received': 1, 'kept': 1, 'lost': 0, 'missing': 0}
+
+
+def test_a_loss_that_cannot_be_reported_ends_no_recording(make, slow):
+    def fail(count):
+        raise ValueError('no node to report it')
+
+    recorder, receive, _ = make(SlowDisk, memory_limit=10 * SIZE, on_loss=fail)
+    recorder.begin()
+    for raw in samples(*range(100)):
+        receive(raw)
+    slow.set()
+    found = wait_until(lambda: recorder.unobserved.get('marks of losses'), 'the failure to be reported')
+    assert found == Unobserved(1, 0, 'ValueError: no node to report it')
+    before = recorder.figures()['kept']
+    receive(sample(DISPLACEMENT, 100))
+    wait_until(lambda: recorder.figures()['kept'] > before, 'the next message on the disk')
+    recorder.end()
+
+
+def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alone(make):
+    limit = 1 << 20
+    recorder, *_ = make(memory_limit=limit, threaded=False)
+    receive = recorder.add_topic('/other', STRING)
+    recorder.begin()
+    tracemalloc.start()
+    for index in range(limit // 8):
+        receive(index.to_bytes(8, 'little'), START + index, START + index + 1)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert 0.5 * limit < held < limit
+
+
+def test_recorder_without_a_thread_writes_when_it_is_polled(make, tmp_path):
+    recorder, receive, _ = make(threaded=False)
+    recorder.poll()
+    recorder.begin()
+    for raw in samples(*range(100)):
+        receive(raw)
+    assert recorder.figures()['queued'] == 100
+    assert recorder.poll() is False
+    assert recorder.figures()['queued'] == 0
+    receive(sample(DISPLACEMENT, 100))
+    recorder.end()
+    recorder.poll()
+    assert [raw for _, raw, _ in messages_of(tmp_path / 'bag')] == samples(*range(101))
+
+
+def test_missing_samples_are_seen_while_they_are_recorded_and_stand_in_the_file(make, tmp_path):
+    recorder, receive, _ = make()
+    recorder.begin()
+    for raw in samples(0, 1, 2, 5, 6, 10):
+        receive(raw)
+    recorder.end()
+    assert recorder.figures_by_topic() == {'missing./displacement': 5, 'misdated./displacement': 0}
+    assert recorder.last_stamp == START + 10 * PERIOD
+    row = {'received': 6, 'kept': 6, 'lost': 0, 'missing': 5}
+    assert loss_statement(tmp_path / 'bag')['/displacement'] == row
+
+
+@pytest.mark.parametrize('threaded', [True, False])
+def test_full_disk_ends_the_recording_and_counts_what_is_lost(make, tmp_path, threaded):
+    disk = partial(BagWriter, open_file=small_disk((1 << 20) + 100_000))
+    recorder, receive, _ = make(disk, threaded=threaded)
+    recorder.begin()
+    for index in itertools.count():
+        receive(sample(DISPLACEMENT, index))
+        if not threaded and index % 1000 == 0:
+            recorder._turn_end = 0.0
+            recorder.poll()
+        if recorder.failure:
+            break
+    recorder.end()
+    assert 'no space left' in recorder.failure
+    figures = recorder.figures()
+    assert figures['kept'] == len(messages_of(tmp_path / 'bag'))
+    assert figures['kept'] + figures['lost'] == figures['received']
+    assert figures['queued_bytes'] == 0
+
+
+def test_rare_messages_reach_the_disk_without_waiting_for_a_full_chunk(make):
+    recorder, receive, _ = make()
+    recorder.begin()
+    receive(sample(DISPLACEMENT, 0))
+    wait_until(lambda: recorder.figures()['kept'] == 1, 'the message on the disk')
+    recorder.end()
+
+
+def test_recording_is_closed_before_the_disk_is_full(make, tmp_path, monkeypatch):
+    free = 250_000_000
+    monkeypatch.setattr('mount_recorder.recorder.free_space', lambda _: free)
+    recorder, receive, _ = make(free_reserve=200_000_000)
+    recorder.begin()
+    for raw in samples(*range(10)):
+        receive(raw)
+    wait_until(lambda: recorder.figures()['kept'], 'the first chunk')
+    free = 199_000_000
+    wait_until(lambda: recorder.failure, 'the end')
+    receive(sample(DISPLACEMENT, 10))
+    assert '199 MB left' in recorder.failure
+    assert 'closed and readable' in recorder.failure
+    assert len(messages_of(tmp_path / 'bag')) == 10
+    recorder.end()
+    assert recorder.figures()['lost'] == 1
+    with pytest.raises(RecordingError, match='cannot be started: 199 MB'):
+        Recorder(tmp_path / 'another', free_reserve=200_000_000)
+
+
+def test_space_is_that_of_the_disk_on_which_the_folder_will_be(tmp_path, monkeypatch):
+    places = []
+    monkeypatch.setattr('shutil.disk_usage', lambda place: places.append(place) or SimpleNamespace(free=5))
+    assert free_space(tmp_path / 'not' / 'yet' / 'made') == 5
+    assert places == [tmp_path]
+
+
+# The verdict.
+
+
+@pytest.mark.parametrize(('on_full', 'level'), [(OnFull.STOP, Level.ERROR), (OnFull.CONTINUE, Level.WARN)])
+def test_failure_is_an_error_or_a_warning_as_wished(on_full, level):
+    verdict = judge(QUIET, {}, {}, failure='no space left', on_full=on_full)
+    assert verdict.level is level
+    assert 'no space left' in verdict.sentence
+    assert (verdict.figures['failed'], verdict.figures['fatal']) == (True, on_full is OnFull.STOP)
+
+
+@pytest.mark.parametrize(
+    ('figures', 'words'),
+    [
+        ({'free_bytes': 500_000_000, 'bytes_per_second': 2_000_000}, ['0.5 GB left']),
+        ({'free_bytes': 5_000_000_000, 'bytes_per_second': 100_000_000}, ['5.0 GB left']),
+        ({'lost': 3, 'received': 1000}, ['3 of 1000 messages lost']),
+        ({'missing./displacement': 5}, ['/displacement 5']),
+        (
+            {'malformed./displacement': 1, 'free_bytes': 500_000_000},
+            ['/displacement 1 (the last of 7 bytes; too short)', '0.5 GB left'],
+        ),
+    ],
+)
+def test_each_finding_is_a_warning_with_its_numbers_and_hides_no_other(figures, words):
+    verdict = judge({**QUIET, **figures}, {}, {'/displacement': Unobserved(1, 7, 'too short')})
+    assert verdict.level is Level.WARN
+    assert all(word in verdict.sentence for word in words)
+
+
+def test_sound_recorder_says_how_many_topics_have_a_publisher():
+    figures = {**QUIET, 'publishers./displacement': 1, 'publishers./latched': 0}
+    verdict = judge(figures, {}, {})
+    assert (verdict.level, verdict.sentence) == (Level.OK, 'recording; 1 of 2 topics have a publisher')
+    assert 'waiting for an event' in judge(figures, {}, {}, recording=False).sentence
+
+
+@pytest.mark.parametrize(
+    'key', ['lost', 'missing./displacement', 'misdated./displacement', 'malformed./displacement']
+)
+def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(key):
+    window, standing, verdicts = SlidingWindow({}), ActiveFindings(), []
+    for tenth in range(300):
+        figures = {**QUIET, 'received': 100 * tenth, key: 7 * min(max(tenth - 49, 0), 5)}
+        unobserved = {'/displacement': Unobserved(1, 7, 'too short')}
+        found = judge(figures, window.earlier(tenth / 10, figures), unobserved)
+        found = standing.keep(found)
+        verdicts.append((found.level, found.sentence))
+    warned = [tenth for tenth, (level, _) in enumerate(verdicts) if level is Level.WARN]
+    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
+    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
+    assert len(set(verdicts)) == 2

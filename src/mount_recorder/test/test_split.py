@@ -1,7 +1,6 @@
 """Recordings in several files: nothing lost, nothing twice, each file complete in itself."""
 
 import errno
-import threading
 
 import pytest
 import yaml
@@ -21,7 +20,6 @@ from mount_recorder.bag_writer import (
     SplitRule,
     checked_rule,
 )
-from mount_recorder.mcap_writer import McapWriter
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -59,21 +57,6 @@ def test_duration_begins_a_new_file_with_the_message_that_reaches_it(tmp_path):
     assert [times[0] for times in samples] == [START + 100 * number * PERIOD for number in range(4)]
 
 
-@pytest.mark.parametrize('step', [3600, -3600])
-def test_by_a_clock_a_step_of_the_log_times_neither_begins_a_file_nor_keeps_one_open(tmp_path, step):
-    now = 0
-    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=100 * PERIOD), clock=lambda: now)
-    writer.add_topic('/displacement', DISPLACEMENT.type)
-    for index in range(350):
-        ahead = round(1e9 * step) if 50 <= index < 250 else 0
-        writer.write('/displacement', sample(DISPLACEMENT, index), START + index * PERIOD + ahead)
-        if index % 10 == 9:
-            now += 10 * PERIOD
-            writer.flush()
-    writer.close()
-    assert [len(messages_in(path)) for path in pieces_of(tmp_path / 'bag')] == [110, 100, 100, 40]
-
-
 def test_latched_messages_stand_at_the_head_of_each_file_with_their_own_publish_time(tmp_path):
     heads = [messages_in(path)[0] for path in pieces_of(split_bag(tmp_path / 'bag'))]
     assert heads[1:] == [
@@ -90,12 +73,6 @@ def test_head_of_a_piece_names_what_it_repeats(tmp_path):
         records += [record for record in metadata if record.name == PIECE_RECORD]
     assert [record.metadata['number'] for record in records] == ['1', '2', '3']
     assert [yaml.safe_load(record.metadata['repeated']) for record in records] == [['/session']] * 3
-
-
-def test_whole_recording_counts_each_message_once(tmp_path):
-    kept = read_back(split_bag(tmp_path / 'bag'))
-    assert sum(entry.topic == '/displacement' for entry in kept) == COUNT
-    assert [text_in(entry.raw) for entry in kept if entry.topic == '/session'] == ['at 5', 'at 120']
 
 
 def test_each_file_alone_is_a_recording_for_every_reader(tmp_path):
@@ -129,44 +106,6 @@ def test_no_file_becomes_larger_than_the_size_asked_for(tmp_path):
     assert max(sizes) <= limit
     assert min(sizes[:-1]) > limit // 3, 'files are split long before they are full'
     assert len(read_back(folder, '/displacement')) == 20_000
-
-
-def test_writing_goes_on_while_a_full_file_is_brought_to_the_disk(tmp_path, monkeypatch):
-    released = threading.Event()
-    finish = McapWriter.finish
-
-    def finish_late(writer, records):
-        if writer.file.path.name == 'bag_0.mcap':
-            released.wait(30)
-        finish(writer, records)
-
-    monkeypatch.setattr(McapWriter, 'finish', finish_late)
-    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=10), chunk_size=1)
-    writer.add_topic('/text', STRING)
-    for time in range(15):
-        writer.write('/text', string('x'), time)
-    assert writer.kept == 15
-    assert len(list((tmp_path / 'bag').glob('*.mcap'))) == 2
-    released.set()
-    writer.close()
-    assert len(read_back(tmp_path / 'bag', '/text')) == 15
-
-
-def test_file_that_cannot_be_finished_is_named_at_the_end(tmp_path, monkeypatch):
-    def refuse(writer, records):
-        writer.file.close()
-        raise OSError(errno.EIO, 'broken')
-
-    writer = BagWriter(tmp_path / 'bag', split=SplitRule(duration=10))
-    writer.add_topic('/text', STRING)
-    writer.write('/text', string('x'), 0)
-    with monkeypatch.context() as patch:
-        patch.setattr(McapWriter, 'finish', refuse)
-        writer.write('/text', string('y'), 10)
-        writer._wait_for_closing()
-    with pytest.raises(RecordingError, match=r'bag_0\.mcap ends without its summary'):
-        writer.close()
-    assert len(read_back(tmp_path / 'bag', '/text')) == 2
 
 
 def test_disk_too_full_for_the_next_file_ends_the_recording_with_all_before_it(tmp_path):

@@ -27,7 +27,7 @@ def recorded(folder, messages):
     writer = BagWriter(folder)
     for topic in TOPICS:
         writer.add_topic(topic.name, topic.type)
-    writer.attach({topic.name: Reception(len(messages.get(topic, ()))) for topic in TOPICS})
+    writer.receptions = {topic.name: Reception(len(messages.get(topic, ()))) for topic in TOPICS}
     for topic, raws in messages.items():
         for index, raw in enumerate(raws):
             writer.write(topic.name, raw, START + index * 1_000_000)

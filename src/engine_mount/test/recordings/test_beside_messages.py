@@ -150,7 +150,7 @@ def lossy(folder, first=0, received=100, lost=40):
     writer = BagWriter(folder)
     writer.add_topic('/displacement', DISPLACEMENT.type)
     writer.add_topic('/note', 'std_msgs/msg/String')
-    writer.attach({'/displacement': Reception(received, lost), '/note': Reception(1)})
+    writer.receptions = {'/displacement': Reception(received, lost), '/note': Reception(1)}
     writer.write('/note', b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00', START + first * PERIOD)
     for index in range(first, first + received - lost):
         writer.write('/displacement', sample(DISPLACEMENT, index), START + index * PERIOD)
