@@ -48,7 +48,7 @@ ALLOWED = {
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.container.stored', 'np.cumsum'): 'whole numbers',
-    ('engine_mount.recordings.signals.even_grid', 'np.mean'): 'shares of whole numbers',
+    ('engine_mount.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('engine_mount.recordings.messages.stamps', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.messages.time_axis', 'np.interp'): 'times told to people',
     ('engine_mount.recordings.messages.stamps', '**'): 'rates of topics, for the eye',

@@ -10,8 +10,8 @@ import subprocess
 import pytest
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.losses import losses
 from mount_ros.testing import wait_until
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.

@@ -8,8 +8,8 @@ import threading
 import pytest
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.losses import losses
 from mount_ros.environment import prepare_environment
 from mount_ros.testing import wait_until
 

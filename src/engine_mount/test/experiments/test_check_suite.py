@@ -19,7 +19,7 @@ from engine_mount.experiments.check.session import CheckError, CheckOrder, run_t
 from engine_mount.experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
 from engine_mount.experiments.check.telling import Told, figures_of, table_of
 from engine_mount.experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import Truth
 from mount_bringup.graph.domain import DomainError
 from mount_bringup.graph.nodes import GraphError

@@ -17,7 +17,7 @@ from engine_mount.fleet.example.fleet import (
     whole_fleet,
 )
 from engine_mount.fleet.example.variations import VARIATIONS
-from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit import audit
 from engine_mount.recordings.bag.recording import ReadingError
 
 

@@ -20,12 +20,12 @@ from test_other_storages import written
 
 import engine_mount
 from engine_mount.recordings import ReadingError
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit import audit
 from engine_mount.recordings.bag.metadata import MetadataError, read_metadata
 from engine_mount.recordings.container.mcap_reading.chunks import CRC_PLACE, RECORD
 from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
 from engine_mount.recordings.container.mcap_reading.summary import Proof
+from engine_mount.recordings.losses import losses
 from engine_mount.recordings.messages.series import SeriesError
 from mount_ros.testing import mutated
 

@@ -13,11 +13,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StorageP
 from rosbags.typesys import Stores, get_typestore
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.edit.merge import merge
-from engine_mount.recordings.edit.recover import recover
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.merge import merge
 from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.recover import recover
 from mount_recorder.mcap_writer import McapWriter
 from mount_ros.topics import DISPLACEMENT
 

@@ -21,7 +21,7 @@ from engine_mount.drives.inputs.taken import (
 )
 from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.messages.series import Payloads
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.session import (
     SessionError,
     recorded_session,
     session_content,

@@ -12,7 +12,7 @@ from engine_mount.experiments.check.measures import BANDS, RACK
 from engine_mount.experiments.check.suite import Manoeuvre
 from engine_mount.experiments.policy.runs import first_extremum
 from engine_mount.experiments.recorded_drive.evaluation import rms_in_bands
-from engine_mount.recordings.events.switching_changes import Switching
+from engine_mount.recordings.switching import Switching
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods

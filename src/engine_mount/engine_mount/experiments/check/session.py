@@ -12,7 +12,7 @@ from engine_mount.drives.preflight import preflight
 from engine_mount.experiments.check.suite import Manoeuvre
 from engine_mount.experiments.check.trial import CORE, Result, Trial, broken_down, run_trial
 from engine_mount.fleet.runner import run_tasks
-from engine_mount.recordings.run.screen import Bar, Screen
+from engine_mount.recordings.screen import Bar, Screen
 from engine_mount.settings.mounts import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError

@@ -9,7 +9,7 @@ from typing import Any
 from engine_mount.experiments.check.judgement import Judged, Verdict, passed, verdicts_of, worst_first
 from engine_mount.experiments.check.session import CheckOrder
 from engine_mount.experiments.check.trial import Result
-from engine_mount.recordings.run.screen import Screen, Table
+from engine_mount.recordings.screen import Screen, Table
 
 HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
 _SIGNS = {'at_most': '≤', 'at_least': '≥'}

@@ -29,7 +29,7 @@ from engine_mount.identification.rack.given import (
     topic_in,
 )
 from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.place import open_run
 from engine_mount.signals.units.mapping import ColumnChoice
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
