@@ -11,10 +11,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from ros_testing import free_domain
 
-from engine_mount.faults.fault import SAFE, Reaction
-from engine_mount.faults.matrix import MATRIX
-from mount_ros.testing import free_domain
+from engine_mount.faults.case import MATRIX, SAFE, Reaction
 
 QUICK = (
     'can_silent',

@@ -26,7 +26,7 @@ from mount_sim.plant.places import PLACES, Places
 from mount_sim.plant.plant import Plant
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients
-from mount_sim.plant.vehicle import Engine, Vehicle
+from mount_sim.plant.vehicle import Vehicle
 
 
 class SimParameters(NamedTuple):
@@ -73,9 +73,7 @@ class SimParameters(NamedTuple):
     def plant(self) -> Plant:
         """The simulated truth; an unknown mount raises `ParameterError`."""
         parts: dict[str, Any] = {name: getattr(self, name) for name in Plant._fields}
-        parts['engine'] = Engine(self.vehicle.engine_mass, self.vehicle.elastomer)
-        parts['mount'] = seated_mount(self.mount)
-        return Plant(**parts)
+        return Plant(**{**parts, 'mount': seated_mount(self.mount)})
 
 
 class NodeParameters(NamedTuple):

@@ -96,12 +96,6 @@ def test_a_mount_without_electronics_carries_its_share(support):
     assert not np.array_equal(supported, without)
 
 
-def test_a_support_of_elastomer_is_a_mount_of_elastomer():
-    as_support, _ = drive(car(**{'places.rear.support': 'elastomer'}))
-    as_mount, _ = drive(car(mounts='left,right,rear', **{'mount_rear.mount': 'elastomer'}))
-    np.testing.assert_array_equal(as_support['left']['displacement'], as_mount['left']['displacement'])
-
-
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [

@@ -107,10 +107,6 @@ def test_several_faults_are_there_at_once_and_each_ends_by_itself():
     assert seen == [(False, False), (True, True), (False, True), (False, False)]
 
 
-def test_the_same_fault_twice_acts_twice():
-    assert Timed('coil_half@0', 'coil_half@0:1').at(0.0).through('current', 1.0) in (0.25, 0.5)
-
-
 def test_without_a_fault_everything_is_as_it_was(frame):
     faults = Timed().at(5.0)
     sent = [frame(0)]

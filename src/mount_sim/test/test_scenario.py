@@ -84,19 +84,6 @@ def test_the_sweep_shakes_the_wheel_from_1_to_50_hz_in_49_s(parameters):
     np.testing.assert_allclose(excitation.values[:], height, atol=1e-12)
 
 
-def test_a_sweep_takes_its_own_frequencies_rate_and_amplitude(parameters):
-    chosen = parameters(
-        scenario='sweep', sweep__first_frequency=5.0, sweep__last_frequency=9.0, sweep__rate=2.0,
-        sweep__velocity_amplitude=0.06, sweep__ramp_in=0.0,
-    )  # fmt: skip
-    excitation = build_excitation(chosen)
-    assert excitation.duration == pytest.approx(2.0)
-    velocity = np.diff(excitation.values[:]) / STEP_TIME
-    assert np.abs(velocity).max() == pytest.approx(0.06, rel=0.02)
-    crossings = np.flatnonzero(np.diff(excitation.values[:] > 0.0))  # exact zeros count once
-    assert len(crossings) == pytest.approx(2.0 * 0.5 * (5.0 + 9.0) * 2.0, abs=1)
-
-
 def test_an_impossible_sweep_is_refused(parameters):
     down = parameters(scenario='sweep', sweep__first_frequency=20.0, sweep__last_frequency=20.0)
     assert _refusal(down) == ('sweep.last_frequency (20 Hz) must lie above sweep.first_frequency (20 Hz)')
@@ -131,16 +118,6 @@ def test_a_tip_in_lifts_the_engine_once_and_adds_to_the_idle_force(parameters):
     both = build_excitation(parameters(timeline__duration=0.5, idle__amplitude=80.0, **pushed)).engine_forces
     np.testing.assert_array_equal(both[:], idle[:] + alone[:])
     np.testing.assert_array_equal(both[17:4242], both[:][17:4242])
-
-
-def test_a_tip_in_on_the_bench_is_refused(parameters):
-    refusal = _refusal(parameters(scenario='bench', tip_in__force=-20.0))
-    assert refusal.startswith('tip_in.force (-20 N) has no effect in scenario bench')
-
-
-def test_an_idle_force_on_the_bench_is_refused(parameters):
-    refusal = _refusal(parameters(scenario='bench', idle__amplitude=200.0))
-    assert refusal.startswith('idle.amplitude (200 N) has no effect in scenario bench')
 
 
 @pytest.fixture
@@ -194,3 +171,14 @@ def test_what_only_the_desk_can_read_is_refused(parameters, recording):
     assert 'scenario road needs a measured road' in _refusal(parameters(scenario='road'))
     chosen = parameters(scenario='recorded', recorded__file=recording, recorded__scale=-1.0)
     assert 'are for engine-mount drive, which makes the excitation of a recording' in _refusal(chosen)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'tip_in__force': -20.0}, 'tip_in.force (-20 N) has no effect in scenario bench'),
+        ({'idle__amplitude': 200.0}, 'idle.amplitude (200 N) has no effect in scenario bench'),
+    ],
+)
+def test_a_force_on_the_engine_is_refused_on_the_bench(parameters, changes, reason):
+    assert _refusal(parameters(scenario='bench', **changes)).startswith(reason)

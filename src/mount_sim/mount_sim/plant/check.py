@@ -18,7 +18,6 @@ from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.car import CarMemory, advance_car
 from mount_sim.plant.mounts import Contents
 from mount_sim.plant.plant import STATE, Plant, advance
-from mount_sim.plant.vehicle import Engine
 
 GROWTH_ALLOWED = 1e-6
 """Of a motion in one step, chosen: far above rounding, 2 % in a second."""
@@ -122,11 +121,11 @@ def _culprit(plant: Plant, seat: Seat, step_time: float) -> str:
     changed = [name for name in values if name.startswith(parts) and values[name] != defaults[name]]
     for name in changed:
         good, bad = defaults[name], values[name]
-        if not _is_stable(_with(plant, name, good), seat, step_time):
+        if not _is_stable(with_flattened(plant, {name: good}), seat, step_time):
             continue
         for _ in range(_BISECTIONS):
             middle = 0.5 * (good + bad)
-            if _is_stable(_with(plant, name, middle), seat, step_time):
+            if _is_stable(with_flattened(plant, {name: middle}), seat, step_time):
                 good = middle
             else:
                 bad = middle
@@ -137,11 +136,6 @@ def _culprit(plant: Plant, seat: Seat, step_time: float) -> str:
         )
     told = ', '.join(f'{name} ({values[name]:g} {_unit(plant, name)})' for name in changed)
     return f'{told} do not fit together; set them closer to their defaults'
-
-
-def _with(plant: Plant, name: str, value: float) -> Plant:
-    changed = with_flattened(plant, {name: value})
-    return changed._replace(engine=Engine(changed.vehicle.engine_mass, changed.vehicle.elastomer))
 
 
 def _unit(plant: Plant, path: str) -> str:

@@ -27,11 +27,10 @@ import numpy.typing as npt
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.quantity import Quantity
-from mount_sim.plant.vehicle import Elastomer, branch_step, elastomer_force
+from mount_sim.plant.vehicle import BRANCHES, Elastomer, elastomer_force, stretch_branches
 
 FloatArray = npt.NDArray[np.float64]
 
-_BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODY_NAMES = ('wheel', 'body', 'engine', 'roll', 'pitch')
 BODY_STATE = record_type(
     [
@@ -39,7 +38,7 @@ BODY_STATE = record_type(
         for name in _BODY_NAMES
         for what in (('angle', 'rate') if name in ('roll', 'pitch') else ('height', 'velocity'))
     ]
-    + _BRANCHES
+    + BRANCHES
 )
 """Heights (m), velocities (m/s), angles (rad) and their rates (rad/s); forces (N) of the rod's branches."""
 SUPPORT_STATE = record_type(
@@ -55,7 +54,7 @@ SUPPORT_STATE = record_type(
             'engine_height',
         )
     ]
-    + _BRANCHES
+    + BRANCHES
 )
 """Of one mount, SI: the chassis under it, its motion, force and acceleration of the last step, branches."""
 
@@ -145,8 +144,7 @@ def accelerated_engine_step(engine, supports, body, states, acceleration, engine
 
 @compiled
 def _note_force(support, state, beside):
-    branches = (state.slow_force, state.middle_force, state.fast_force)
-    state.mount_force = elastomer_force(support.elastomer, state.displacement, branches) + beside
+    state.mount_force = elastomer_force(support.elastomer, state.displacement, state) + beside
 
 
 @compiled
@@ -158,16 +156,14 @@ def _move_engine(engine, supports, body, states, engine_force, acceleration, dt)
         lift -= force
         rolling -= supports[k].y * force
         pitching += supports[k].x * force
-    branches = (body.slow_force, body.middle_force, body.fast_force)
-    pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, branches)
+    pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, body)
     body.engine_velocity += dt * (lift / engine.mass - acceleration)
     body.roll_rate += dt * rolling / engine.roll_inertia
     body.pitch_rate += dt * pitching / engine.pitch_inertia
     body.engine_height += dt * body.engine_velocity
     body.roll_angle += dt * body.roll_rate
     body.pitch_angle += dt * body.pitch_rate
-    slow, middle, fast = branch_step(engine.rod, branches, engine.rod_lever * body.pitch_rate * dt, dt)
-    body.slow_force, body.middle_force, body.fast_force = slow, middle, fast
+    stretch_branches(engine.rod, body, engine.rod_lever * body.pitch_rate * dt, dt)
     for k in range(len(supports)):
         _take_motion(supports[k], states[k], body, dt)
 
@@ -182,9 +178,7 @@ def _take_motion(support, state, body, dt):
         - support.x * body.pitch_rate
         - state.chassis_velocity
     )
-    branches = (state.slow_force, state.middle_force, state.fast_force)
-    slow, middle, fast = branch_step(support.elastomer, branches, state.velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(support.elastomer, state, state.velocity * dt, dt)
 
 
 def engine_stiffness(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray:

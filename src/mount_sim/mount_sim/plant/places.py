@@ -1,6 +1,6 @@
 """Where an engine on several mounts rests, and which parameters each mount may have for itself."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from mount_models.quantity import ParameterError, Quantity
@@ -87,12 +87,15 @@ def values_of_mount(values: Mapping[str, Any], name: str) -> dict[str, Any]:
     return found
 
 
-def check_support(name: str, support: str) -> str:
-    """Return the support of the place `name`, or raise `ParameterError`."""
-    if support not in SUPPORTS:
-        known = ', '.join(SUPPORTS)
-        raise ParameterError(f'places.{name}.support {support!r} is unknown; known are {known}')
-    return support
+def supported_places(places: Places, mounts: Collection[str]) -> list[str]:
+    """Return the places with a support without electronics, or raise `ParameterError`."""
+    for name, place in places._asdict().items():
+        if place.support not in SUPPORTS:
+            raise ParameterError(
+                f'places.{name}.support {place.support!r} is unknown; known are {", ".join(SUPPORTS)}'
+            )
+    named = places._asdict().items()
+    return [name for name, place in named if name not in mounts and place.support != 'none']
 
 
 def support_of(place: Place, vehicle: Vehicle) -> Support:

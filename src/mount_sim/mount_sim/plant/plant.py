@@ -22,11 +22,10 @@ from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
 from mount_sim.plant.vehicle import (
     ENGINE_STATE,
     VEHICLE_STATE,
-    Engine,
     Vehicle,
-    branch_step,
     elastomer_force,
     engine_step,
+    stretch_branches,
     vehicle_step,
 )
 
@@ -44,7 +43,6 @@ class Plant(NamedTuple):
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
     vehicle: Vehicle = Vehicle()
-    engine: Engine = Engine()
     electronics: ElectronicsParameters = ElectronicsParameters()
     hydromount: Hydromount = Hydromount()
     mount: SeatedMount = SeatedMount()
@@ -200,7 +198,7 @@ def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
             _advance_bench(law, now, values[index], dt)
         elif seat == _ACCELERATED_CHASSIS:
             beside = force_beside_elastomer(law, now, now.displacement, dt)
-            motion = engine_step(law.engine, now.engine, values[index], engine_forces[index], beside, dt)
+            motion = engine_step(law.vehicle, now.engine, values[index], engine_forces[index], beside, dt)
             take_motion(law, now, motion, dt)
         else:
             now.road_height = values[index]
@@ -244,15 +242,14 @@ def _rub(law, now, displacement, dt):
 @compiled
 def _advance_bench(law, now, displacement, dt):
     """The rack imposes the displacement; the mount answers with its force."""
-    elastomer = law.engine.elastomer
+    elastomer = law.vehicle.elastomer
     change = displacement - now.displacement
-    branches = branch_step(elastomer, (now.slow_force, now.middle_force, now.fast_force), change, dt)
-    now.slow_force, now.middle_force, now.fast_force = branches
+    stretch_branches(elastomer, now, change, dt)
     now.velocity = change / dt
     now.displacement = displacement
     _pump(law, now, change, dt)
     beside = force_beside_elastomer(law, now, displacement, dt)
-    now.mount_force = elastomer_force(elastomer, displacement, branches) + beside
+    now.mount_force = elastomer_force(elastomer, displacement, now) + beside
 
 
 @compiled

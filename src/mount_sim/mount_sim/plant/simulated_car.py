@@ -23,9 +23,9 @@ from mount_sim.plant.places import (
     ALONE,
     PLACES,
     check_hold,
-    check_support,
     mount_names,
     support_of,
+    supported_places,
     values_of_mount,
 )
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
@@ -214,11 +214,12 @@ class SimulatedCar:
         general = mount_parameters(values)
         names = mount_names(general.mounts)
         seat, step_time = excitation.seat, excitation.step_time
-        chosen = {name: mount_parameters(values, name) for name in names or (ALONE,)}
+        supported = supported_places(general.places, names) if names else []
+        chosen = {name: mount_parameters(values, name) for name in (*(names or (ALONE,)), *supported)}
         plants = {name: parameters.plant for name, parameters in chosen.items()}
-        if names:
-            chosen |= {name: mount_parameters(values, name) for name in supported_places(general, names)}
-            plants |= {name: _without_electronics(chosen[name], name) for name in chosen if name not in names}
+        for name in supported:
+            support = getattr(general.places, name).support
+            plants[name] = plants[name]._replace(mount=seated_mount(support))
         simulations = {name: PlantSimulation(plant, seat, step_time) for name, plant in plants.items()}
         for plant in plants.values():
             checked_plant(plant, seat, step_time)
@@ -260,14 +261,3 @@ class SimulatedCar:
 def mount_parameters(values: Mapping[str, Any], name: str = '') -> SimParameters:
     """Return the parameters of mount_sim as they hold for the mount `name`, or in general."""
     return with_flattened(SimParameters(), values_of_mount(values, name))
-
-
-def supported_places(parameters: SimParameters, mounts: tuple[str, ...]) -> list[str]:
-    """Return the places with a support without electronics."""
-    supports = {name: check_support(name, getattr(parameters.places, name).support) for name in PLACES}
-    return [name for name, support in supports.items() if name not in mounts and support != 'none']
-
-
-def _without_electronics(parameters: SimParameters, name: str):
-    support = getattr(parameters.places, name).support
-    return parameters.plant._replace(mount=seated_mount(support))

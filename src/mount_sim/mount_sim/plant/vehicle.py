@@ -23,13 +23,13 @@ from mount_models.quantity import Quantity
 
 FloatArray = npt.NDArray[np.float64]
 
-_BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
+BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODIES = ('wheel', 'body', 'chassis', 'engine')
 VEHICLE_STATE = record_type(
-    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + _BRANCHES
+    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + BRANCHES
 )
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
-ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
+ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *BRANCHES])
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
 
 
@@ -46,24 +46,23 @@ class Elastomer(NamedTuple):
 
 
 @compiled
-def elastomer_force(elastomer, displacement, branch_forces):
-    """Return the force (N) at `displacement` (m) with `branch_forces` (slow, middle, fast) in N."""
-    slow, middle, fast = branch_forces
-    return elastomer.static_stiffness * displacement + slow + middle + fast
+def elastomer_force(elastomer, displacement, state):
+    """Return the force (N) at `displacement` (m) with the forces of the branches in the record `state`."""
+    return (
+        elastomer.static_stiffness * displacement + state.slow_force + state.middle_force + state.fast_force
+    )
 
 
 @compiled
-def branch_step(elastomer, branch_forces, displacement_change, dt):
-    """Return the branch forces (slow, middle, fast) in N after `dt` seconds with `displacement_change` in m.
+def stretch_branches(elastomer, state, displacement_change, dt):
+    """Advance the forces of the branches in `state` by `dt` seconds with `displacement_change` in m.
 
     Exact for a constant velocity within the step.
     """
-    slow, middle, fast = branch_forces
-    return (
-        _maxwell_step(slow, elastomer.slow_stiffness, elastomer.slow_corner, displacement_change, dt),
-        _maxwell_step(middle, elastomer.middle_stiffness, elastomer.middle_corner, displacement_change, dt),
-        _maxwell_step(fast, elastomer.fast_stiffness, elastomer.fast_corner, displacement_change, dt),
-    )
+    e, change = elastomer, displacement_change
+    state.slow_force = _maxwell_step(state.slow_force, e.slow_stiffness, e.slow_corner, change, dt)
+    state.middle_force = _maxwell_step(state.middle_force, e.middle_stiffness, e.middle_corner, change, dt)
+    state.fast_force = _maxwell_step(state.fast_force, e.fast_stiffness, e.fast_corner, change, dt)
 
 
 @compiled
@@ -88,13 +87,6 @@ class Vehicle(NamedTuple):
     elastomer: Elastomer = Elastomer()
 
 
-class Engine(NamedTuple):
-    """Engine on its mount, on a chassis whose acceleration is given."""
-
-    engine_mass: Annotated[float, Quantity('kg', 'm_e: share of the engine on this mount', 1.0, 1e4)] = 80.0
-    elastomer: Elastomer = Elastomer()
-
-
 class MountMotion(NamedTuple):
     """Displacement (m), velocity (m/s) after a step; mount force (N), chassis acceleration (m/s^2) in it."""
 
@@ -112,8 +104,7 @@ def vehicle_step(vehicle, state, road_height, engine_force, friction_force, dt):
     the elastomer, at the present displacement.
     """
     displacement = state.engine_height - state.chassis_height
-    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
-    mount = elastomer_force(vehicle.elastomer, displacement, branch_forces) + friction_force
+    mount = elastomer_force(vehicle.elastomer, displacement, state) + friction_force
     tyre = vehicle.tyre_stiffness * (road_height - state.wheel_height)
     suspension = vehicle.suspension_stiffness * (
         state.wheel_height - state.body_height
@@ -133,23 +124,20 @@ def vehicle_step(vehicle, state, road_height, engine_force, friction_force, dt):
     state.engine_height += dt * state.engine_velocity
 
     velocity = state.engine_velocity - state.chassis_velocity
-    slow, middle, fast = branch_step(vehicle.elastomer, branch_forces, velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(vehicle.elastomer, state, velocity * dt, dt)
     return MountMotion(state.engine_height - state.chassis_height, velocity, mount, chassis_acceleration)
 
 
 @compiled
-def engine_step(engine, state, chassis_acceleration, engine_force, friction_force, dt):
+def engine_step(vehicle, state, chassis_acceleration, engine_force, friction_force, dt):
     """Advance `state`, a record of `ENGINE_STATE`, by `dt` seconds and return the `MountMotion`.
 
     `chassis_acceleration` in m/s^2, up; forces as in `vehicle_step`.
     """
-    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
-    mount = elastomer_force(engine.elastomer, state.displacement, branch_forces) + friction_force
-    state.velocity += dt * ((engine_force - mount) / engine.engine_mass - chassis_acceleration)
+    mount = elastomer_force(vehicle.elastomer, state.displacement, state) + friction_force
+    state.velocity += dt * ((engine_force - mount) / vehicle.engine_mass - chassis_acceleration)
     state.displacement += dt * state.velocity
-    slow, middle, fast = branch_step(engine.elastomer, branch_forces, state.velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(vehicle.elastomer, state, state.velocity * dt, dt)
     return MountMotion(state.displacement, state.velocity, mount, chassis_acceleration)
 
 
