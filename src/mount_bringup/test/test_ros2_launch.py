@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_bringup.graph.run import GRAPHS
 from mount_ros.testing import wait_until
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from engine_mount.recordings.audit.audit import TopicAudit, audit
 from engine_mount.recordings.audit.losses import Losses, losses
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.recorded_events import read_marks
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.screen import Table
 from engine_mount.recordings.run.session import (
     duration_of,

@@ -15,7 +15,7 @@ from engine_mount.fleet.catalogue.places import places
 from engine_mount.fleet.foreign import NOTHING_SAID, said_in
 from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 from engine_mount.fleet.worst import said_of, worst
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 
 REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
 CHANGES = parsed_changes({'highest_current': 0.7})

@@ -13,7 +13,7 @@ from engine_mount.recordings.audit.answers import Control, Setpoints, Silence, j
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
 from engine_mount.recordings.audit.report import as_json, sentences
-from engine_mount.recordings.messages.times import NO_TIMES
+from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (

@@ -89,7 +89,7 @@ def _told(folder: Path, console: Console) -> bool:
     from engine_mount.recordings.audit.audit import audit
     from engine_mount.recordings.audit.losses import losses
     from engine_mount.recordings.audit.report import sentences
-    from engine_mount.recordings.bag.recording import open_recording
+    from engine_mount.recordings.recording import open_recording
 
     recording = open_recording(folder)
     audits = audit(recording)

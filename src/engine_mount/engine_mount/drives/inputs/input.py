@@ -19,14 +19,14 @@ from engine_mount.drives.inputs.taken import (
     control_runs,
     quiet_at_first,
 )
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.series import Payloads
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.session import (
     SessionError,
     recorded_session,
     session_content,
     session_parameters,
 )
+from engine_mount.recordings.series import Payloads
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.chosen import control_parameters, with_recorded_policy
 from mount_bringup.settings import checked_settings, defaults_of_nodes

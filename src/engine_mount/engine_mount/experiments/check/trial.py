@@ -16,7 +16,7 @@ from engine_mount.experiments.check.suite import Manoeuvre
 from engine_mount.experiments.sensitivity.grid import TruthOnly
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import Losses, losses
-from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends
 from engine_mount.reports.drive.signals import FloatArray, Truth, load_drive

@@ -11,8 +11,8 @@ from engine_mount.fleet.catalogue.trace import Trace
 from engine_mount.recordings.audit.audit import TopicAudit, audit
 from engine_mount.recordings.audit.losses import losses
 from engine_mount.recordings.audit.peak_current import PeakCurrent
-from engine_mount.recordings.bag.column_parts import column_parts
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.columns import column_parts
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.session import recorded_sample_rate
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 

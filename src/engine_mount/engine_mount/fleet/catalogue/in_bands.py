@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine_mount.fleet.catalogue.band_pass import BandPass, FloatArray
-from engine_mount.recordings.messages.times import Times
+from engine_mount.recordings.times import Times
 
 _PIECE = 1 << 18  # samples, chosen
 

@@ -10,9 +10,8 @@ from typing import Any
 from engine_mount.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from engine_mount.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from engine_mount.fleet.catalogue.places import Place
-from engine_mount.recordings.bag.recording import ReadingError, Recording
 from engine_mount.recordings.events.recorded_events import event_time, recorded_events
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.run.session import (
     duration_of,
     session_parameters,
@@ -20,6 +19,7 @@ from engine_mount.recordings.run.session import (
     told_session,
     versions_told,
 )
+from engine_mount.recordings.series import SeriesError
 from engine_mount.settings.changes import changed_parameters
 from mount_bringup.chosen import Parameters
 from mount_sim.mount_choice import seat_of, simulated_mounts

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.messages.times import Times, distinct, is_in
+from engine_mount.recordings.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT
 
 _PAUSE = 500_000_000  # ns, chosen: a control that says nothing for so long may have been deactivated

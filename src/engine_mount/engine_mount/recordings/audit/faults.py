@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from engine_mount.recordings.audit.audit import CONTROL, TopicAudit
 from engine_mount.recordings.audit.node_reports import NodeReport, node_reports
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.recorded_events import recorded_marks
-from engine_mount.recordings.messages.time_axis import TimeAxis
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.time_axis import TimeAxis
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.automatic_marks import MarkKind
 from mount_recorder.topic_groups import registered_topic

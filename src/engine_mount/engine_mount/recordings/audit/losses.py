@@ -6,7 +6,7 @@ from typing import Any
 
 from engine_mount.recordings.audit.audit import TopicAudit
 from engine_mount.recordings.audit.faults import Fault, faults
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from mount_models.sampling import SETPOINT_TIMEOUT
 
 _SHOWN = 5  # faults named one by one

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from engine_mount.recordings.audit.audit import TopicAudit
-from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.columns import ColumnPart, column_parts
+from engine_mount.recordings.recording import Recording
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 

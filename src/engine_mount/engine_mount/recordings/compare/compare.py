@@ -5,7 +5,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.compare.alignment import (
     Alignment,
     Alignments,
@@ -25,6 +24,7 @@ from engine_mount.recordings.events.switching_changes import (
     paired_switchings,
     switching_times,
 )
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.session import recorded_sessions, session_differences
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT, EVENT, SESSION, Topic
 

@@ -18,8 +18,8 @@ from engine_mount.recordings.compare.alignment import (
 )
 from engine_mount.recordings.compare.signals import Column, Quantity, SignalDifference, signal_difference
 from engine_mount.recordings.compare.tolerances import Tolerances
-from engine_mount.recordings.messages.layout import OPTIONS, Layout, Numbers
-from engine_mount.recordings.messages.series import STAMP, STAMP_BYTES, Series, SeriesError
+from engine_mount.recordings.layout import OPTIONS, Layout, Numbers
+from engine_mount.recordings.series import STAMP, STAMP_BYTES, Series, SeriesError
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CONTROL_TRACE, CURRENT_FORCE_TABLE, JOINT_STATE
 

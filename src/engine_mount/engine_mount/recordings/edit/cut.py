@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.metadata import TopicInformation
-from engine_mount.recordings.bag.origin import ZERO_KEY, with_step
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.edit.inherited_statement import sources_of
 from engine_mount.recordings.edit.messages import Messages, read_messages, write_messages
-from engine_mount.recordings.messages.time_axis import TimeAxis
+from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, with_step
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.time_axis import TimeAxis
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import EVENT, Delivery

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 
 import yaml
 
-from engine_mount.recordings.bag.metadata import read_statement
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.metadata import read_statement
+from engine_mount.recordings.recording import Recording
 from mount_models.plain_yaml import plain_yaml
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 

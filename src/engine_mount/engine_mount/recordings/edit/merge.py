@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag.metadata import TopicInformation
-from engine_mount.recordings.bag.origin import with_step
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.edit.inherited_statement import sources_of, united
 from engine_mount.recordings.edit.messages import Messages, joined, read_messages, write_messages
-from engine_mount.recordings.messages.series import Times
+from engine_mount.recordings.metadata import TopicInformation, with_step
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.session import session_differences
+from engine_mount.recordings.series import Times
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import SESSION, Delivery

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.metadata import TopicInformation
-from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.container.stored import StoredTopic
 from engine_mount.recordings.edit.inherited_statement import Sources, inherited_statement
 from engine_mount.recordings.edit.verbatim import VerbatimBag
-from engine_mount.recordings.messages.series import Payloads, Times
+from engine_mount.recordings.metadata import TopicInformation
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.series import Payloads, Times
+from engine_mount.recordings.stored import StoredTopic
 from mount_recorder.losses import RECORDER_RECORD
 
 _LARGE = 500_000  # messages, chosen: about 100 MB

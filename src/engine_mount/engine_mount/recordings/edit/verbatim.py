@@ -8,9 +8,9 @@ from pathlib import Path
 
 from mcap.records import Attachment
 
-from engine_mount.recordings.bag.piece_topics import offers_of
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.container.stored import ACCOUNTS, StoredTopic
+from engine_mount.recordings.pieces import offers_of
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.stored import ACCOUNTS, StoredTopic
 from mount_recorder.bag_writer import LIBRARY, create_folder, file_entry
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE, McapWriter
 from mount_recorder.metadata import METADATA_NAME, TopicEntry, bag_description, embedded_record, metadata_text

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.audit.audit import TopicAudit
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.switching_changes import Switching, switching_times
+from engine_mount.recordings.recording import Recording
 from engine_mount.reports.drive.signals import DriveSignals, Seen
 from mount_control.delay import LOOP_DELAY, delay_at
 from mount_control.policy.contract import Policy

@@ -11,8 +11,8 @@ import numpy as np
 from engine_mount.recordings.audit.audit import TopicAudit
 from engine_mount.recordings.audit.losses import Losses
 from engine_mount.recordings.audit.peak_current import peak_current
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events.switching_changes import switching_times
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.screen import Screen, Table
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp

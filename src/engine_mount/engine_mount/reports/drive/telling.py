@@ -8,7 +8,7 @@ from typing import Any
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
 from engine_mount.recordings.audit.report import as_table, sentences
-from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.run.folder import RunFolder
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.reports.drive.evaluation import levels_of, samples_at_the_ends
