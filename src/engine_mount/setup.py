@@ -9,6 +9,7 @@ setup(
     package_data={
         'engine_mount.cli': ['completion/names.json'],
         'engine_mount.experiments': ['check/suite.yaml'],
+        'engine_mount.faults': ['faults.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],
         'engine_mount.view': ['page/*'],
     },

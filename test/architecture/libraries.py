@@ -30,6 +30,7 @@ LIBRARIES = {
     'hypothesis': Library('hypothesis', 'python3-hypothesis'),
     'lz4': Library('lz4'),
     'matplotlib': Library('matplotlib', 'python3-matplotlib'),
+    'psutil': Library('psutil', 'python3-psutil'),
     'mcap': Library('mcap'),
     'mcap_ros2': Library('mcap-ros2-support', 'mcap-ros2-support'),
     'moto': Library('moto'),

@@ -40,7 +40,7 @@ ELSEWHERE = {
     'engine-mount record --': _RECORD,
     'engine-mount view': _VIEW,
     'engine-mount status': _VIEW,
-    'engine-mount identify friction --train': 'it takes long; test/cli/test_identify_friction.py',
+    'engine-mount identify friction --train': 'long: src/engine_mount/test/cli/test_identify_friction.py',
 }
 """{beginning of the commands: where they are run}."""
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from engine_mount.faults.fault import SAFE, Reaction
-from engine_mount.faults.matrix import MATRIX
+from engine_mount.faults.case import MATRIX, SAFE, Reaction
 from mount_ros.testing import free_domain
 
 QUICK = (

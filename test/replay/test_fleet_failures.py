@@ -14,12 +14,11 @@ from pathlib import Path
 import pytest
 
 from engine_mount.drives.replay import parsed_changes
-from engine_mount.fleet.away import IN_A_ROW
-from engine_mount.fleet.catalogue import index as indexing
+from engine_mount.fleet import job
 from engine_mount.fleet.catalogue.index import indexed
 from engine_mount.fleet.columns import WritingError
+from engine_mount.fleet.job import OUTAGES
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if import run
 from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 from engine_mount.signals.sources import remote
 from engine_mount.signals.sources.patience import Patience
@@ -41,23 +40,22 @@ SMALLER = 300_000  # bytes: a file of a recording is larger, those of a result a
 PATIENCE = 120.0  # s
 GOES_ON = 'the same command goes on where it stopped'
 GIVEN_UP = (
-    rf'given up after {IN_A_ROW} recordings in a row \(what was done stands, and {GOES_ON}\): '
+    rf'given up after {OUTAGES} recordings in a row \(what was done stands, and {GOES_ON}\): '
     r's3://drives/2026/.* \(2 attempts within'
 )
 COMMAND = """
-import os, signal, sys
-from engine_mount.fleet.what_if import run
+import os, sys
+from engine_mount.fleet import job
 
-run._WRITTEN_AFTER = 0.0
-take, taken = run._Run._take, []
+keep, kept = job.TableJob._keep, []
 
 def interrupted(self, *given):
-    if len(taken) == {done}:
+    if len(kept) == {done}:
         os.kill({process}, {blow})
-    taken.append(take(self, *given))
+    kept.append(keep(self, *given))
 
 if __name__ == '__main__':
-    run._Run._take = interrupted
+    job.TableJob._keep = interrupted
     from engine_mount.cli.command import main
     main(sys.argv[1:])
 """
@@ -75,16 +73,14 @@ def drives(tmp_path_factory):
 def whole(drives):
     """Return the bytes of the table of a run that nothing ended."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run, 'run_tasks', in_this_process)
+        patch.setattr(job, 'run_tasks', in_this_process)
         return replayed(drives, drives.parent / 'whole').result.read_bytes()
 
 
 @pytest.fixture
 def inside(monkeypatch):
-    """Let tasks run in this process, one after the other, and what is written be written at once."""
-    monkeypatch.setattr(run, 'run_tasks', in_this_process)
-    monkeypatch.setattr(indexing, 'run_tasks', in_this_process)
-    monkeypatch.setattr(run, '_WRITTEN_AFTER', 0.0)
+    """Let tasks run in this process, one after the other."""
+    monkeypatch.setattr(job, 'run_tasks', in_this_process)
 
 
 @pytest.fixture
@@ -132,11 +128,11 @@ def replayed(place, out, **options):
 def at(count, action):
     """Return what takes the progress of a run and calls `action` once, when `count` recordings are done."""
 
-    def told(progress):
+    def report(progress):
         if progress.done == count:
             action()
 
-    return told
+    return report
 
 
 @pytest.mark.parametrize(
@@ -182,7 +178,7 @@ def test_a_store_that_is_away_for_a_while_is_waited_for(away, whole, tmp_path):
         wait_until(lambda: away.refused >= 3)
         away.away = False
 
-    outcome = replayed('s3://drives/2026', tmp_path / 'result', workers=1, told=at(DONE, goes))
+    outcome = replayed('s3://drives/2026', tmp_path / 'result', workers=1, progress=at(DONE, goes))
     assert away.refused >= 3
     assert outcome.not_fetched == []
     assert outcome.result.read_bytes() == whole
@@ -195,7 +191,7 @@ def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_pat
         away.away = True
 
     with pytest.raises(StoreAwayError, match=GIVEN_UP):
-        replayed('s3://drives/2026', tmp_path / 'result', told=at(DONE, goes))
+        replayed('s3://drives/2026', tmp_path / 'result', progress=at(DONE, goes))
     away.away = False
     outcome = replayed('s3://drives/2026', tmp_path / 'result')
     assert outcome.before == DONE
@@ -206,11 +202,11 @@ def test_an_index_whose_store_stays_away_goes_on_where_it_was(away, tmp_path, in
     monkeypatch.setattr(remote, 'Patience', lambda: Patience(attempts=2, first=1e-3))
     expected = indexed(['s3://drives/2026'], tmp_path / 'whole').recordings
 
-    def told(done, of):
-        away.away = done >= DONE
+    def stop(progress):
+        away.away = progress.done >= DONE
 
     with pytest.raises(StoreAwayError, match=GIVEN_UP):
-        indexed(['s3://drives/2026'], tmp_path / 'catalogue', told=told)
+        indexed(['s3://drives/2026'], tmp_path / 'catalogue', progress=stop)
     away.away = False
     again = indexed(['s3://drives/2026'], tmp_path / 'catalogue')
     assert again.read == len(NAMES) - DONE
@@ -230,9 +226,13 @@ def test_a_scratch_disk_without_room_is_told_and_tried_again(away, whole, tmp_pa
 
 
 def test_a_result_without_room_is_told_and_gone_on_with(drives, whole, tmp_path, inside, limited):
-    sentence = rf'00000\d\.parquet cannot be written: File too large; .*{GOES_ON}$'
+    sentence = rf'journal\.jsonl cannot be written: File too large; .*{GOES_ON}$'
     with pytest.raises(WritingError, match=sentence):
-        replayed(drives, tmp_path / 'result', told=at(DONE, lambda: limited(1000)))
+        replayed(
+            drives,
+            tmp_path / 'result',
+            progress=at(DONE, lambda: limited((tmp_path / 'result' / 'journal.jsonl').stat().st_size + 100)),
+        )
     limited(None)
     again = replayed(drives, tmp_path / 'result')
     assert again.before == DONE
@@ -241,15 +241,15 @@ def test_a_result_without_room_is_told_and_gone_on_with(drives, whole, tmp_path,
 
 def test_a_catalogue_without_room_is_told_and_gone_on_with(drives, tmp_path, inside, limited):
     expected = indexed([drives], tmp_path / 'whole').recordings
-    journal = tmp_path / 'catalogue' / '.unfinished.jsonl'
+    journal = tmp_path / 'catalogue' / 'journal.jsonl'
 
-    def told(done, of):
-        if done == DONE:
+    def stop(progress):
+        if progress.done == DONE:
             limited(journal.stat().st_size + 100)
 
-    sentence = rf'unfinished\.jsonl cannot be written: File too large; .*{GOES_ON}$'
+    sentence = rf'journal\.jsonl cannot be written: File too large; .*{GOES_ON}$'
     with pytest.raises(WritingError, match=sentence):
-        indexed([drives], tmp_path / 'catalogue', told=told)
+        indexed([drives], tmp_path / 'catalogue', progress=stop)
     limited(None)
     again = indexed([drives], tmp_path / 'catalogue')
     assert again.read == len(NAMES) - DONE

@@ -9,23 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import psutil
 from rclpy.client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from engine_mount.faults.observers import Observers, Told, since
-from engine_mount.faults.processes import (
-    SHARED_MEMORY,
-    Process,
-    descendants,
-    process_of,
-    shared_memory_of_others,
-)
 from mount_bringup.graph.domain import DomainError, can_port, domain_lock
 from mount_bringup.graph.nodes import CONTROL, SIM, SIMULATED
 from mount_ros.nodes.process import tied
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
+SHARED_MEMORY = Path('/dev/shm')
 START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
 _SETTLED = 0.3  # s, chosen: of current without a break counts as damping
 _LOOK_PERIOD = 0.005  # s
@@ -84,7 +79,7 @@ class GraphUnderTest:
         self._executor.add_node(operator)
         self._shared: set[str] = set()
         self._of_others = set(os.listdir(SHARED_MEMORY))
-        self._processes: set[Process] = set()
+        self._processes: set[psutil.Process] = set()
         command = [*place.drive, *_DRIVE, '--out', str(self.folder), '--namespace', namespace]
         command += ['--domain', str(place.domain), '--priority', str(place.priority), *options]
         self._log = place.folder / f'{namespace}.log'
@@ -119,14 +114,13 @@ class GraphUnderTest:
         said = {name: file.read_text(errors='replace') for name, file in logs.items()}
         return {'supervisor': self.output, **said}
 
-    def nodes(self) -> dict[str, Process]:
+    def nodes(self) -> dict[str, psutil.Process]:
         """Return {node: process} of those that the command has started and that still run."""
-        processes = [each for each in descendants(self.process.pid) if each.alive]
         return {
             node.name: each
-            for each in processes
+            for each in _family(self.process.pid)
             for node in SIMULATED
-            if f'from {node.package}.node' in each.command
+            if f'from {node.package}.node' in _command(each)
         }
 
     def damping(self) -> bool:
@@ -161,9 +155,9 @@ class GraphUnderTest:
 
     def note_what_it_holds(self) -> None:
         """Remember its processes and the files of shared memory that they hold."""
-        for process in [process_of(self.process.pid), *descendants(self.process.pid)]:
+        for process in _family(self.process.pid):
             self._processes.add(process)
-            self._shared |= process.shared_memory()
+            self._shared |= _shared_memory(process)
 
     def call(self, kind: Any, service: str, request: Any, limit: float = PATIENCE) -> Any:
         """Return the answer of a service of the graph, None if there is none."""
@@ -195,18 +189,20 @@ class GraphUnderTest:
             time.sleep(_LOOK_PERIOD)
         left = tuple(self._left_behind())
         for process in self._alive():
-            os.kill(process.pid, signal.SIGKILL)  # ours, and it would disturb all that follows
+            process.kill()  # ours, and it would disturb all that follows
         self._executor.shutdown()
         return Ending(code, self.output, left, tuple(self._tracebacks()))
 
-    def _alive(self) -> list[Process]:
-        return [each for each in self._processes if each.alive]
+    def _alive(self) -> list[psutil.Process]:
+        return [each for each in self._processes if _runs(each)]
 
     def _left_behind(self) -> list[str]:
-        left = [f'process {each.pid}: {each.command:.80}' for each in self._alive()]
+        left = [f'process {each.pid}: {_command(each):.80}' for each in self._alive()]
         files = {name for name in self._shared - self._of_others if (SHARED_MEMORY / name).exists()}
         if files:  # the middleware of other graphs takes up what one has left
-            files -= shared_memory_of_others(os.getpid())
+            files -= set().union(
+                *(_shared_memory(each) for each in psutil.process_iter() if each.pid != os.getpid())
+            )
         left += [str(SHARED_MEMORY / name) for name in sorted(files)]
         try:
             with domain_lock(self.domain, self.namespace):
@@ -218,3 +214,37 @@ class GraphUnderTest:
     def _tracebacks(self) -> list[str]:
         files = [self._log, *sorted(self.folder.glob('log/*.log'))]
         return [file.name for file in files if _TRACEBACK in file.read_text(errors='replace')]
+
+
+def _family(pid: int) -> list[psutil.Process]:
+    """Return a process and all that it has started, those that have these, and so on, that still run."""
+    try:
+        process = psutil.Process(pid)
+        return [each for each in (process, *process.children(recursive=True)) if _runs(each)]
+    except psutil.NoSuchProcess:
+        return []
+
+
+def _runs(process: psutil.Process) -> bool:
+    """Return whether it still runs; a zombie does not, nor a later process of the same number."""
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def _command(process: psutil.Process) -> str:
+    """Return its command line, empty when it has ended."""
+    try:
+        return ' '.join(process.cmdline())
+    except psutil.Error:
+        return ''
+
+
+def _shared_memory(process: psutil.Process) -> set[str]:
+    """Return the names of the files of shared memory that it has mapped."""
+    try:
+        paths = [Path(each.path.removesuffix(' (deleted)')) for each in process.memory_maps()]
+    except psutil.Error:
+        return set()
+    return {path.name for path in paths if path.parent == SHARED_MEMORY}

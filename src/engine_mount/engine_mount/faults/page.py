@@ -4,8 +4,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from engine_mount.faults.fault import SAFE, FaultCase, Reaction
-from engine_mount.faults.outcome import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
+from engine_mount.faults.case import SAFE, FaultCase, Reaction
+from engine_mount.faults.judge import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
 from engine_mount.recordings.run.screen import Table
 
 Rows = Mapping[FaultCase, Outcome]
@@ -85,7 +85,7 @@ def _cells(case: FaultCase, outcome: Outcome) -> list[str]:
         outcome.detected_by or '-',
         _milliseconds(outcome.detected_s),
         _milliseconds(outcome.zero_s),
-        '-' if outcome.coil_current is None else f'{outcome.coil_current:.2f}',
+        '-' if outcome.coil_current_a is None else f'{outcome.coil_current_a:.2f}',
         _RUN_FOLDER.sub('bags/.../', outcome.sentence) or '-',
         f'{outcome.recovery}; NOT AS REQUIRED: {wrong}' if wrong else outcome.recovery,
     ]

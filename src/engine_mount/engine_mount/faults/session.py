@@ -11,12 +11,12 @@ from functools import partial
 from rclpy.context import Context
 from rclpy.node import Node
 
-from engine_mount.faults.fault import FaultCase, Reaction
+from engine_mount.faults.case import FaultCase, Reaction
 from engine_mount.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
-from engine_mount.faults.injections import NonsenseTakenError, shim_environment
-from engine_mount.faults.kept import lost_while
+from engine_mount.faults.injection import NonsenseTakenError, shim_environment
+from engine_mount.faults.judge import Outcome, tells
 from engine_mount.faults.observers import observers
-from engine_mount.faults.outcome import Outcome, tells
+from engine_mount.faults.recording_loss import lost_while
 from engine_mount.faults.trial import tried
 from mount_bringup.graph.domain import can_port
 from mount_bringup.graph.shutdown import ending_signals

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,12 +57,12 @@ def table_of(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> 'p
     Raises `ValueError` for a name that is no column.
     """
     pyarrow = required('pyarrow', TABLES)
-    known = {column.name for column in columns}
+    known = {column.name: column.type for column in columns}
     plain = []
     for row in rows:
-        if unknown := sorted(row.keys() - known):
+        if unknown := sorted(row.keys() - known.keys()):
             raise ValueError(f'{", ".join(unknown)}: no such column; there are {", ".join(sorted(known))}')
-        plain.append({name: _known(value) for name, value in row.items()})
+        plain.append({name: _plain(value, known[name]) for name, value in row.items()})
     return pyarrow.Table.from_pylist(plain, schema=schema_of(columns))
 
 
@@ -93,5 +94,7 @@ def writing(file: Path) -> Iterator[None]:
         ) from error
 
 
-def _known(value: Any) -> Any:
+def _plain(value: Any, kind: str) -> Any:
+    if kind == TIME and isinstance(value, str):  # of a journal
+        return datetime.fromisoformat(value)
     return None if isinstance(value, float) and math.isnan(value) else value

@@ -51,9 +51,8 @@ class Said:
 
     @property
     def mark(self) -> str:
-        """A short text that is another one where anything else is said; '' where nothing is."""
-        told = self.told
-        return f'-{hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:8]}' if told else ''
+        """A short text that is another one where anything else is said."""
+        return f'-{hashlib.sha256(json.dumps(self.told, sort_keys=True).encode()).hexdigest()[:8]}'
 
 
 NOTHING_SAID = Said()

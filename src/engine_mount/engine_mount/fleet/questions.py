@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from engine_mount.fleet.columns import TABLES
-from engine_mount.fleet.what_if.result import ORDER
+from engine_mount.fleet.job import ORDER
 from engine_mount.signals.extras import required
 
 if TYPE_CHECKING:

@@ -1,31 +1,59 @@
-"""Many independent tasks on several processes, whose results come as they are done."""
+"""Many independent tasks on processes of this machine or on a Dask cluster; results come as they are done."""
 
+import contextlib
+import ctypes
+import logging
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from multiprocessing import resource_tracker
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 from engine_mount.fleet.interrupts import remembered_interrupts
-from engine_mount.fleet.processes import LOCAL, LocalWorkers, processes_for
-from engine_mount.fleet.worker import Batch, WorkerLostError
 
 Item = TypeVar('Item')
 Result = TypeVar('Result')
 
+LOCAL = 'local'
 LOSSES = 3
-"""So many workers may be lost with a task before it is given up; chosen."""
-_LOOK = 0.1  # s, chosen: what arrives ends the wait at once
-_AHEAD = 4  # batches per thread that are handed over at a time, chosen: one runs, the others wait
-_BATCH = 0.25  # s, chosen: to hand over a batch costs some 7 ms of processor time, here and at the worker
-_MOST = 16  # tasks in a batch, chosen: so many begin anew where an interrupt or a lost worker ends it
+"""Workers that may be lost with a task before it is given up; chosen."""
+
+_LOST = f'{LOSSES} workers were lost with it: killed, or out of memory'
+_POLL = 0.1  # s, chosen: between two looks at an interrupt; a result ends the wait at once
+_AHEAD = 4  # tasks per worker that are handed over at a time, chosen
+_NICENESS = 10  # chosen: the user of the machine comes first
+_MEMORY_CHECK = 0.1  # s, chosen
+_PR_SET_PDEATHSIG = 1  # Linux, linux/prctl.h
+_CONNECT, _CLOSE = 10.0, 10.0  # s, chosen: limits for the scheduler of a cluster
+_OF_WORKERS = (
+    'OMP_NUM_THREADS',
+    'OPENBLAS_NUM_THREADS',
+    'MKL_NUM_THREADS',
+    'NUMBA_NUM_THREADS',
+    'PYTHONSAFEPATH',
+)
+_LOGGERS = ('distributed', 'distributed.client', 'tornado', 'tornado.application', 'asyncio')
+_GROUP_LIMIT = Path('/sys/fs/cgroup/memory.max')  # cgroups(7)
+
+
+class SchedulerLostError(ConnectionError):
+    """A Dask cluster does not answer, or no longer does; the text says which."""
 
 
 @dataclass(frozen=True)
 class Done(Generic[Result]):
-    """The task at `place` of what was given: its result, or the reason why there is none.
+    """The task at `place` of a sequence: its result, or the reason why there is none.
 
-    `error` is what it raised; None where its workers were lost.
+    `error` is the exception of the task; None where its workers were lost.
     """
 
     place: int
@@ -42,141 +70,255 @@ def run_tasks(
     workers: int = 0,
     memory: int = 0,
 ) -> Iterator[Done[Result]]:
-    """Return each task as it is done, in any order: `work` is a function of a module, without state.
+    """Yield `work(item)` of each item as it is done, in any order.
 
-    `scheduler` is `local` (processes of this machine, `workers` of them, 0 for one on each core, each of
-    which is replaced beyond `memory` bytes, 0 for its share of the machine's) or the address of a Dask
-    cluster, tcp://HOST:PORT. A task that raises is a `Done` with its reason; one whose worker is lost is run
-    again, at the end and alone, and given up when `LOSSES` workers were lost with it. Few tasks are handed
-    over at a time, short ones several together: who takes results slowly holds the others up. Raises
-    `SchedulerLostError` where the cluster does not answer or no longer does; what was returned until then
-    stands.
+    `scheduler` is `local` (`workers` processes of this machine, 0 for one on each core; each ends beyond
+    `memory` bytes, 0 for its share of the machine's) or the address of a Dask cluster, tcp://HOST:PORT. One
+    that raises is a `Done` with its reason. A task whose worker is lost is run again, at the end and alone,
+    and given up after `LOSSES` workers. Raises `SchedulerLostError` where the cluster does not answer, and
+    `ChildProcessError` where no process can start.
     """
     if not items:
         return
-    with (
-        remembered_interrupts() as raise_lost,
-        _workers(scheduler, workers, len(items), memory) as hands,
-    ):
-        yield from _Stream(hands, work, items, raise_lost).results()
-
-
-class Workers(Protocol):
-    """What does tasks: processes of this machine, or a cluster."""
-
-    @property
-    def threads(self) -> int:
-        """How many tasks are done at a time."""
-
-    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> Any:
-        """Hand over some tasks that one worker does in turn; return what `arrived` knows them by."""
-
-    def arrived(self, limit: float) -> list[tuple[Any, Batch[Any] | BaseException]]:
-        """Return what is done within `limit` s: a batch, why there is none, or `WorkerLostError`."""
-
-    def close(self) -> None:
-        """End what was started."""
-
-
-@contextmanager
-def _workers(scheduler: str, workers: int, tasks: int, memory: int) -> Iterator[Workers]:
-    with ExitStack() as stack:
-        opened: Workers
+    with remembered_interrupts() as raise_lost:
         if scheduler == LOCAL:
-            opened = LocalWorkers(processes_for(workers, tasks), memory)
+            yield from _run_here(work, items, processes_for(workers, len(items)), memory, raise_lost)
         else:
-            from engine_mount.fleet.cluster import ClusterWorkers, quiet_dask
-
-            stack.enter_context(quiet_dask())
-            opened = ClusterWorkers(scheduler)
-        stack.callback(opened.close)
-        yield opened
+            yield from _run_on_cluster(work, items, scheduler, raise_lost)
 
 
-class _Stream(Generic[Item, Result]):
-    """The tasks of one call on its workers."""
+def processes_for(workers: int, tasks: int) -> int:
+    """Return how many processes of this machine work at a time; `workers` 0 is one for each core."""
+    return min(workers or len(os.sched_getaffinity(0)), tasks)
 
-    def __init__(
-        self,
-        workers: Workers,
-        work: Callable[[Item], Result],
-        items: Sequence[Item],
-        raise_lost: Callable[[], None],
-    ):
-        self._workers, self._work, self._items = workers, work, items
-        self._raise_lost = raise_lost
-        self._waiting = deque(range(len(items)))
-        self._under_way: dict[Any, list[int]] = {}  # future: places of its items
-        self._seconds = _BATCH  # of a task in the batch that was done last
-        self._alone: dict[int, int] = {}  # place: workers lost with it; to be done at the end
 
-    def results(self) -> Iterator[Done[Result]]:
-        """Return all tasks as they are done, those last whose worker was lost."""
-        self._fill()
-        while self._under_way:
-            yield from self._arrived()
-            self._fill()
-        # alone, so that no task is blamed for the worker that another one took along
-        for place in sorted(self._alone):
-            done: list[Done[Result]] = []
-            while not done:
-                self._submit([place])
-                done = list(self._arrived())
-            yield from done
+def _run_here(
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int,
+    memory: int,
+    raise_lost: Callable[[], None],
+) -> Iterator[Done[Result]]:
+    waiting = deque(range(len(items)))
+    suspects: list[int] = []  # under way when a worker was lost
+    while waiting:
+        under_way: dict[Future[Any], int] = {}
+        done = 0
+        with _pool(workers, memory) as submit, contextlib.suppress(BrokenProcessPool):
+            while waiting or under_way:
+                while waiting and len(under_way) < _AHEAD * workers:
+                    future = submit(work, items[waiting[0]])
+                    under_way[future] = waiting.popleft()
+                for future in wait(under_way, _POLL, FIRST_COMPLETED).done:
+                    result = _done(under_way[future], future)
+                    del under_way[future]
+                    done += 1
+                    yield result
+                raise_lost()
+        if under_way and not done:
+            _check_start(memory)
+        suspects += under_way.values()
+    for place in sorted(
+        suspects
+    ):  # alone, so that no task is blamed for the worker that another one took along
+        yield _done_alone(work, items, place, memory, raise_lost)
 
-    def _fill(self) -> None:
-        """Hand over what waits, as far as there is room; towards the end fewer at once: all end together."""
-        threads = self._workers.threads
-        while self._waiting and len(self._under_way) < _AHEAD * threads:
-            share = len(self._waiting) // (_AHEAD * threads)
-            count = max(min(int(_BATCH / self._seconds), _MOST, share), 1)
-            self._submit([self._waiting.popleft() for _ in range(count)])
 
-    def _submit(self, places: list[int]) -> None:
-        future = self._workers.submit(self._work, [self._items[place] for place in places])
-        self._under_way[future] = places
+def _done_alone(
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    place: int,
+    memory: int,
+    raise_lost: Callable[[], None],
+) -> Done[Result]:
+    for _ in range(LOSSES - 1):
+        with _pool(1, memory) as submit, contextlib.suppress(BrokenProcessPool):
+            future = submit(work, items[place])
+            while not wait([future], _POLL).done:
+                raise_lost()
+            return _done(place, future)
+    return Done(place, None, _LOST)
 
-    def _arrived(self) -> Iterator[Done[Result]]:
-        for future, result in self._next():
-            places = self._under_way.pop(future)
-            if isinstance(result, WorkerLostError):
-                yield from self._given_up(places)
-            elif isinstance(result, BaseException):  # a worker cannot load its task, or send its result
-                yield from self._failed(places, result)
+
+def _check_start(memory: int) -> None:
+    """Raise `ChildProcessError` where a worker cannot even do nothing."""
+    with _pool(1, memory) as submit:
+        try:
+            submit(abs, 0).result()
+        except BrokenProcessPool:
+            raise ChildProcessError(
+                'no worker process could start: a script that starts workers needs the line '
+                "if __name__ == '__main__'; else check the memory of this machine"
+            ) from None
+
+
+def _done(place: int, future: Any) -> Done[Any]:
+    """Return the outcome of a task; raises `BrokenProcessPool`."""
+    try:
+        result, error = future.result()
+    except (BrokenProcessPool, CancelledError):
+        raise
+    except Exception as raised:  # a worker cannot load its task, or send its result
+        result, error = None, raised
+    return (
+        Done(place, result) if error is None else Done(place, None, f'{type(error).__name__}: {error}', error)
+    )
+
+
+@contextlib.contextmanager
+def _pool(workers: int, memory: int) -> Iterator[Callable[[Callable[[Any], Any], Any], Future[Any]]]:
+    """Give the function that hands a task to `workers` processes over pipes, which end with the block."""
+    import cloudpickle  # only where tasks leave this process
+
+    before = set(multiprocessing.active_children())
+    limit = memory or _memory_of_machine() // (os.cpu_count() or 1)
+    context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
+    pool = ProcessPoolExecutor(workers, context, _prepare_worker, (os.getpid(), limit))
+
+    def submit(work: Callable[[Any], Any], item: Any) -> Future[Any]:
+        with _environment_of_workers():
+            return pool.submit(_perform, cloudpickle.dumps((work, item)))
+
+    try:
+        yield submit
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - before:
+            child.kill()
+            child.join()
+
+
+@contextlib.contextmanager
+def _environment_of_workers() -> Iterator[None]:
+    """Set for processes that start meanwhile: one thread, no imports from the working directory, no Ctrl-C.
+
+    Threads and processes inherit which signals are blocked: Ctrl-C reaches this process alone.
+    """
+    before = {name: os.environ.get(name) for name in _OF_WORKERS}
+    os.environ.update(dict.fromkeys(_OF_WORKERS, '1'))
+    resource_tracker.ensure_running()  # its start, with the first process, would unblock the signal
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
             else:
-                yield from self._told(places, result)
-
-    def _told(self, places: list[int], batch: Batch[Result]) -> Iterator[Done[Result]]:
-        """Return what came of a batch; what stands behind a task that raised waits again."""
-        done = len(batch.results)
-        for place, result in zip(places, batch.results, strict=False):
-            yield Done(place, result)
-        if batch.error is not None:
-            yield Done(places[done], None, _reason(batch.error), batch.error)
-            done += 1
-        self._waiting.extendleft(reversed(places[done:]))
-        self._seconds = max(batch.seconds / done, _BATCH / _MOST)
-
-    def _failed(self, places: list[int], error: BaseException) -> Iterator[Done[Result]]:
-        """Return the failure of a task; of several together each is done again, alone."""
-        if len(places) == 1:
-            yield Done(places[0], None, _reason(error), error)
-        else:
-            self._alone |= dict.fromkeys(places, 0)
-
-    def _given_up(self, places: list[int]) -> Iterator[Done[Result]]:
-        """Count the loss of a worker with tasks, and return those that are given up."""
-        for place in places:
-            self._alone[place] = self._alone.get(place, 0) + 1
-            if self._alone[place] >= LOSSES:
-                yield Done(place, None, f'{LOSSES} workers were lost with it: killed, or out of memory')
-
-    def _next(self) -> list[tuple[Any, Batch[Result] | BaseException]]:
-        """Return what has arrived, one at least; raises `KeyboardInterrupt` where one was lost."""
-        while not (arrived := self._workers.arrived(_LOOK)):
-            self._raise_lost()
-        return arrived
+                os.environ[name] = value
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
-def _reason(error: BaseException) -> str:
-    return f'{type(error).__name__}: {error}'
+def _memory_of_machine() -> int:
+    """Return how many bytes this machine has, or its group of processes may take."""
+    whole = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE')
+    with contextlib.suppress(OSError, ValueError):  # no group, or one without a limit
+        return min(whole, int(_GROUP_LIMIT.read_text(encoding='ascii')))
+    return whole
+
+
+def _prepare_worker(starter: int, memory: int) -> None:
+    """Tie this process to its starter, lower its priority, and end it beyond `memory` bytes."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != starter:  # it ended before
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.nice(_NICENESS)
+    threading.Thread(target=_limit_memory, args=(memory,), name='memory', daemon=True).start()
+
+
+def _limit_memory(memory: int) -> None:
+    page = os.sysconf('SC_PAGE_SIZE')
+    while True:
+        with open('/proc/self/statm', encoding='ascii') as file:  # proc(5)
+            if int(file.read().split()[1]) * page > memory:
+                os.kill(os.getpid(), signal.SIGKILL)
+        time.sleep(_MEMORY_CHECK)
+
+
+def _perform(task: bytes) -> tuple[Any, Exception | None]:
+    """Return the result of a pickled task, or its error in a form that other processes can load."""
+    work, item = pickle.loads(task)
+    try:
+        return work(item), None
+    except Exception as error:
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:  # an exception of a library may raise anything there
+            return None, RuntimeError(f'{type(error).__name__}: {error}')
+        return None, error
+
+
+def _run_on_cluster(
+    work: Callable[[Item], Result], items: Sequence[Item], address: str, raise_lost: Callable[[], None]
+) -> Iterator[Done[Result]]:
+    import cloudpickle
+    from distributed import KilledWorker, as_completed
+
+    left = len(items)
+    with _quiet_dask(), _client(address) as client:
+        try:
+            futures = client.map(_perform, [cloudpickle.dumps((work, item)) for item in items], pure=False)
+            places = {future.key: place for place, future in enumerate(futures)}
+            arriving = as_completed(futures, loop=client.loop)
+            del futures  # a result is dropped from the cluster once it is here
+            while left:
+                arrived = arriving.next_batch(block=False)
+                if not arrived:
+                    with arriving.thread_condition:
+                        arriving.thread_condition.wait(_POLL)
+                    raise_lost()
+                for future in arrived:
+                    place = places[future.key]
+                    try:
+                        done: Done[Result] = _done(place, future)
+                    except CancelledError:
+                        client.nthreads()  # raises where the scheduler was lost
+                        done = Done(place, None, _LOST)
+                    yield Done(place, None, _LOST) if isinstance(done.error, KilledWorker) else done
+                    left -= 1
+        except OSError as error:
+            raise SchedulerLostError(
+                f'the scheduler ({address}) was lost with {left} tasks under way; what was done until then '
+                f'stands ({error})'
+            ) from None
+
+
+@contextlib.contextmanager
+def _client(address: str) -> Iterator[Any]:
+    """Give a client of the cluster at `address`.
+
+    It is left within `_CLOSE` s: after an interrupt inside Dask its `close` was seen to wait for ever.
+    """
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_CONNECT, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise SchedulerLostError(f'{address}: no Dask scheduler answers there ({error})') from None
+
+    def close() -> None:
+        with contextlib.suppress(Exception):
+            client.close()
+
+    try:
+        yield client
+    finally:
+        closing = threading.Thread(target=close, daemon=True)
+        closing.start()
+        closing.join(_CLOSE)
+
+
+@contextlib.contextmanager
+def _quiet_dask() -> Iterator[None]:
+    """Keep Dask's log to itself: what a user needs to know comes with the results."""
+    import distributed  # noqa: F401  # it sets its levels when it is loaded
+
+    loggers = [logging.getLogger(name) for name in _LOGGERS]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

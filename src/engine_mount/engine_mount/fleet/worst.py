@@ -11,10 +11,10 @@ from typing import Any
 
 from engine_mount.fleet.catalogue.columns import FOREIGN
 from engine_mount.fleet.foreign import Said, said_in
+from engine_mount.fleet.job import ORDER
 from engine_mount.fleet.questions import QueryError, query, tables_of
 from engine_mount.fleet.what_if.asked import AskedError, recordings_asked
 from engine_mount.fleet.what_if.columns import DISPLACEMENT
-from engine_mount.fleet.what_if.result import ORDER
 from engine_mount.signals.sources.source import SourceError
 
 COUNT = 10

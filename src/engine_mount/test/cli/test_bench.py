@@ -8,7 +8,7 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from engine_mount.cli.bench import bench, fleet, fleet_workers
+from engine_mount.cli.bench import bench, fleet
 from engine_mount.cli.bench.chain_runs import Place, relay_in_turn
 from engine_mount.cli.bench.comparison import Comparison
 from engine_mount.cli.bench.processes import children, memory, processor_time
@@ -46,17 +46,14 @@ def test_an_unknown_group_is_refused_with_the_known_ones():
 @pytest.mark.slow
 def test_the_stages_of_a_replayed_second_stand_beside_all_of_it(monkeypatch):
     monkeypatch.setattr(fleet, '_RECORDINGS', 1)
-    monkeypatch.setattr(fleet_workers, '_REPEATED', 6)
+    monkeypatch.setattr(fleet, '_REPLAYS', 6)
     figures = fleet.fleet_figures(lambda _: None, seconds=4.0, rounds=1)
     whole = figures.pop('fleet')
     assert (whole.other_name, whole.other) == ('real time', 1.0)
     stages = [figures.pop(f'fleet_{name}') for name in ('open', 'beside', 'columns', 'control')]
     assert all(stage.other == whole.ours > 0.0 for stage in stages)
-    workers = {
-        f'fleet_{what}{start}' for what in ('worker', 'workers', 'processes') for start in ('', '_started')
-    }
-    assert set(figures) == workers
-    assert all(figure.ours > 0.0 for name, figure in figures.items() if name.endswith('_started'))
+    assert set(figures) == {'fleet_workers'}
+    assert figures['fleet_workers'].ratio > 0.0
 
 
 def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain):

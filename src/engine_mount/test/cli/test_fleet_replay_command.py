@@ -9,8 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
+from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if import one, run
+from engine_mount.fleet.what_if import one
 from engine_mount.signals.sources.source import SourceError
 
 REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
@@ -24,7 +25,7 @@ def fleet(tmp_path, monkeypatch):
     shutil.copytree(REFERENCES / 'gap', folder / 'gap')
     (folder / 'broken.mcap').write_bytes(b'not a recording')
     monkeypatch.setattr(
-        run,
+        job,
         'run_tasks',
         lambda work, items, **_: (Done(place, work(each)) for place, each in enumerate(items)),
     )

@@ -6,11 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from engine_mount.faults.fault import FaultCase, Reaction
-from engine_mount.faults.injections import Unchanged
-from engine_mount.faults.matrix import MATRIX
+from engine_mount.faults.case import MATRIX, FaultCase, Reaction
+from engine_mount.faults.judge import Course, judged, tells
 from engine_mount.faults.observers import Heard, Observers, Seen, Told
-from engine_mount.faults.outcome import Course, judged, tells
 from engine_mount.faults.page import write_page
 from mount_ros.nodes.diagnostics import Level
 from mount_sim.electronics.faults.kinds import FAULTS
@@ -20,7 +18,7 @@ COURSE = Course(begun=10.0, cleared=10.6, damping_again=11.0, over=11.0)
 
 
 def case(reaction: Reaction, **options) -> FaultCase:
-    return FaultCase('name', 'meaning', Unchanged(), reaction, 'no frames', **options)
+    return FaultCase('name', 'meaning', reaction, words='no frames', **options)
 
 
 def observed(zero_at: float | None, until: float = 10.6, told: tuple[Told, ...] = ()) -> Observers:
@@ -44,7 +42,7 @@ def test_a_safe_reaction_in_time_is_as_required():
     assert (outcome.detected_by, outcome.sentence) == ('mount_driver', SENTENCE)
     assert outcome.zero_s == pytest.approx(0.025, abs=1e-3)
     assert outcome.detected_s == outcome.zero_s
-    assert outcome.coil_current == 0.0
+    assert outcome.coil_current_a == 0.0
     assert outcome.recovered
 
 
@@ -81,7 +79,7 @@ def test_the_current_of_the_coil_is_the_last_that_was_seen_of_it_however_late_th
     last = [each for each in seen.seen if each.time < 10.6]
     held_up = [each._replace(time=10.59, coil_current=1.0) for each in last[-100:-1]]  # all came at once
     seen.seen = [*last[:-100], *held_up, last[-1]]
-    assert judged(case(Reaction.SAFE_WHILE), COURSE, seen).coil_current == 0.0
+    assert judged(case(Reaction.SAFE_WHILE), COURSE, seen).coil_current_a == 0.0
 
 
 def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
@@ -151,7 +149,7 @@ def test_the_page_has_a_row_for_each_fault_and_says_what_is_wrong(tmp_path):
     sentence = 'no frames: 1 | 2; look (log: /home/me/runs/faults_12_3/log/mount_init.log)'
     good = judged(case(Reaction.TOLD), COURSE, observed(None, told=(told(10.1, sentence),)))
     wrong = judged(case(Reaction.SAFE_WHILE), COURSE, observed(None))
-    bad = FaultCase('other', 'meaning', Unchanged(), Reaction.SAFE_WHILE)
+    bad = FaultCase('other', 'meaning', Reaction.SAFE_WHILE)
     write_page({case(Reaction.TOLD): good, bad: wrong}, tmp_path / 'faults.md')
     page = (tmp_path / 'faults.md').read_text()
     assert '| `name` | meaning | mount_driver | 100 |' in page

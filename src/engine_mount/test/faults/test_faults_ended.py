@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engine_mount.faults import session
+from engine_mount.faults.case import MATRIX
 from engine_mount.faults.graph import Place
-from engine_mount.faults.matrix import MATRIX
 from mount_ros.testing import free_domain
 
 

@@ -1,10 +1,9 @@
-"""What several tests of engine_mount.drives need."""
+"""What several tests of the fleet need."""
 
 import pytest
 
-from engine_mount.fleet.catalogue import index as indexing
+from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if import run
 
 
 @pytest.fixture
@@ -17,6 +16,5 @@ def inside(monkeypatch):
             read.append(item.uri)
             yield Done(place, work(item))
 
-    monkeypatch.setattr(indexing, 'run_tasks', run_tasks)
-    monkeypatch.setattr(run, 'run_tasks', run_tasks)
+    monkeypatch.setattr(job, 'run_tasks', run_tasks)
     return read

@@ -10,18 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pytest
 
 import engine_mount
+from engine_mount.fleet.catalogue import reading
 from engine_mount.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
 from engine_mount.fleet.catalogue.in_bands import in_bands
 from engine_mount.fleet.catalogue.index import indexed
-from engine_mount.fleet.catalogue.journal import Journal
 from engine_mount.fleet.catalogue.places import places
 from engine_mount.fleet.catalogue.reading import read_place, rows_at
-from engine_mount.fleet.catalogue.stored import CatalogueError, read_catalogue
 from engine_mount.fleet.columns import schema_of
+from engine_mount.signals.sources.source import SourceError
 
 REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
 
@@ -73,8 +72,8 @@ def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_pat
 
 
 def test_events_have_their_recording_and_their_time(drives, tmp_path, inside):
-    table_of([drives], tmp_path / 'catalogue')
-    recordings, events = read_catalogue(tmp_path / 'catalogue')
+    made = indexed([drives], tmp_path / 'catalogue')
+    recordings, events = made.recordings, made.events
     assert events.schema.equals(schema_of(EVENTS))
     assert set(events['uri'].to_pylist()) <= set(recordings['uri'].to_pylist())
     gap = [row for row in events.to_pylist() if row['recording'] == 'a/gap']
@@ -120,13 +119,13 @@ def test_an_index_that_was_stopped_goes_on_and_ends_with_the_same_tables(drives,
     whole = table_of([drives], tmp_path / 'whole')
     inside.clear()
 
-    def stop(done, of):
-        if done == 2:
+    def stop(progress):
+        if progress.done == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        table_of([drives], tmp_path / 'stopped', told=stop)
-    journal = tmp_path / 'stopped' / '.unfinished.jsonl'
+        table_of([drives], tmp_path / 'stopped', progress=stop)
+    journal = tmp_path / 'stopped' / 'journal.jsonl'
     with journal.open('a') as file:
         file.write('["cut off in the mid')
     done = list(inside)
@@ -134,19 +133,18 @@ def test_an_index_that_was_stopped_goes_on_and_ends_with_the_same_tables(drives,
     gone_on = table_of([drives], tmp_path / 'stopped')
     assert (len(done), len(inside), set(done) & set(inside)) == (2, 2, set())
     assert gone_on.equals(whole)
-    assert not journal.exists()
 
 
 def test_what_could_not_be_fetched_is_tried_again(drives, tmp_path, inside, monkeypatch):
-    place = next(iter(places([str(drives / 'a')]).values()))
-    shutil.move(drives / 'a' / 'gap', tmp_path / 'away')
-    rows = read_place(place)
-    assert rows.recordings[0]['fingerprint'] == ''
-    assert 'no such file or folder' in rows.recordings[0]['reason']
-    with Journal(tmp_path) as journal:
-        journal.add(place.uri, rows)
-    shutil.move(tmp_path / 'away', drives / 'a' / 'gap')
-    assert indexed([drives / 'a'], tmp_path).read == 1
+    def away(uri):
+        raise SourceError('the store does not answer')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(reading, 'local_copy', away)
+        row = row_of(table_of([drives / 'a'], tmp_path / 'catalogue'), 'gap')
+    assert (row['kind'], row['fingerprint'], row['reason']) == ('unreadable', '', 'the store does not answer')
+    again = indexed([drives / 'a'], tmp_path / 'catalogue')
+    assert (again.read, again.unreadable) == (1, 0)
 
 
 @pytest.mark.slow
@@ -157,14 +155,14 @@ import os, signal
 from engine_mount.fleet.catalogue.index import indexed
 if __name__ == '__main__':
     indexed([{str(drives)!r}], {str(tmp_path / 'killed')!r}, workers=1,
-          told=lambda done, of: done == 2 and os.kill(os.getpid(), signal.SIGKILL))
+          progress=lambda now: now.done == 2 and os.kill(os.getpid(), signal.SIGKILL))
 """
     script = tmp_path / 'script.py'
     script.write_text(program)
     assert subprocess.run([sys.executable, str(script)]).returncode == -signal.SIGKILL
-    told = []
-    killed = table_of([drives], tmp_path / 'killed', workers=1, told=lambda done, of: told.append(of))
-    assert told[0] == 2
+    progress = []
+    killed = table_of([drives], tmp_path / 'killed', workers=1, progress=progress.append)
+    assert progress[0].done == 2
     assert killed.equals(table_of([drives], tmp_path / 'whole', workers=1))
 
 
@@ -178,14 +176,15 @@ def test_each_mount_of_a_car_has_a_row_with_the_work_of_its_pads(tmp_path):
     ]
     made = make_one(replace(order, seconds=1.0))
     place = next(iter(places([str(made)]).values()))
-    rows = read_place(place)
-    assert [row['mount'] for row in rows.recordings] == ['left', 'right']
-    assert {row['simulated_mount'] for row in rows.recordings} == {'left,right'}
-    assert {row['mount'] for row in rows.events} == {'left', 'right'}
-    assert all(row['switched_on'] == 1 for row in rows.recordings)
+    answer = read_place(place)
+    recordings, events = answer.rows['recordings'], answer.rows['events']
+    assert [row['mount'] for row in recordings] == ['left', 'right']
+    assert {row['simulated_mount'] for row in recordings} == {'left,right'}
+    assert {row['mount'] for row in events} == {'left', 'right'}
+    assert all(row['switched_on'] == 1 for row in recordings)
     truth = engine_mount.open(made)['/left/sim/truth']
     work = 1e-3 * np.abs(truth['friction_force'] * truth['velocity']).sum()
-    assert rows.recordings[0]['pad_energy_j'] == pytest.approx(work, rel=0.1)
+    assert recordings[0]['pad_energy_j'] == pytest.approx(work, rel=0.1)
 
 
 def test_a_copy_elsewhere_has_the_same_row_but_for_its_address(drives, tmp_path):
@@ -238,14 +237,6 @@ def test_a_sine_is_in_its_own_band_alone():
     assert all(other.rms < 2e-5 for other in found.values())
 
 
-def test_the_length_of_a_piece_does_not_change_what_is_in_bands(monkeypatch):
-    stamps = np.arange(5_000) * 1_000_000
-    values = np.random.default_rng(1).normal(size=5_000)
-    whole = in_bands(stamps, values, 1000.0, BANDS)
-    monkeypatch.setattr('engine_mount.fleet.catalogue.in_bands._PIECE', 333)
-    assert np.allclose(in_bands(stamps, values, 1000.0, BANDS), whole, rtol=1e-12)
-
-
 def test_too_short_a_signal_is_in_no_band():
     assert np.isnan(in_bands(np.arange(10) * 1_000_000, np.ones(10), 1000.0, BANDS)).all()
 
@@ -262,13 +253,8 @@ def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():
         assert column.unit == units.get(suffix, ''), column.name
 
 
-def test_a_folder_that_is_no_catalogue_is_refused(tmp_path):
-    with pytest.raises(CatalogueError, match='holds no catalogue; engine-mount fleet index'):
-        read_catalogue(tmp_path)
-
-
-def test_a_catalogue_with_other_columns_is_made_anew(drives, tmp_path, inside):
+def test_a_journal_of_other_columns_is_not_taken(drives, tmp_path, inside):
     table_of([drives], tmp_path / 'catalogue')
-    file = tmp_path / 'catalogue' / 'recordings.parquet'
-    pa.parquet.write_table(pa.parquet.read_table(file).drop(['mode']), file)
+    journal = tmp_path / 'catalogue' / 'journal.jsonl'
+    journal.write_text(journal.read_text().replace('"mode"', '"modus"', 1))
     assert indexed([drives], tmp_path / 'catalogue').read == 4

@@ -13,12 +13,11 @@ import pytest
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import parsed_changes
-from engine_mount.fleet.runner import Done
+from engine_mount.fleet.job import OrderError
 from engine_mount.fleet.what_if import compared, one, run
 from engine_mount.fleet.what_if.asked import AskedError, recordings_asked
 from engine_mount.fleet.what_if.closed_loop import both_motions, compared_motion
 from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
-from engine_mount.fleet.what_if.result import ResultError
 from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 from engine_mount.recordings.edit.cut import cut
 from engine_mount.recordings.run.place import open_run
@@ -40,20 +39,6 @@ def fleet(tmp_path):
         shutil.copytree(REFERENCES / name, folder / name)
     (folder / 'broken.mcap').write_bytes(b'not a recording')
     return folder
-
-
-@pytest.fixture
-def serial(monkeypatch):
-    """Tasks one after the other in this process; which recordings came is what the fixture gives."""
-    replayed = []
-
-    def tasks(work, items, **_):
-        for place, item in enumerate(items):
-            replayed.append(item.recording)
-            yield Done(place, work(item))
-
-    monkeypatch.setattr(run, 'run_tasks', tasks)
-    return replayed
 
 
 def order_of(fleet):
@@ -124,14 +109,14 @@ def test_without_an_effect_nothing_differs():
     assert math.isnan(row['setpoint_difference_first_at_s'])
 
 
-def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, serial):
+def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, inside):
     table = replay_fleet(order_of(fleet), tmp_path / 'result').table.to_pylist()
     assert [row['recording'] for row in table] == ['broken.mcap', *NAMES]
     assert [bool(row['reason']) for row in table] == [True, False, False, False]
     assert str(tmp_path) not in table[0]['reason']
 
 
-def test_a_recording_with_another_policy_is_told_apart_from_one_that_failed(fleet, tmp_path, serial):
+def test_a_recording_with_another_policy_is_told_apart_from_one_that_failed(fleet, tmp_path, inside):
     changes = parsed_changes({'continuous_viscous.full_amplitude': 0.0006})
     outcome = replay_fleet(FleetOrder([str(fleet)], changes), tmp_path / 'result')
     rows = outcome.table.to_pylist()
@@ -149,23 +134,23 @@ def test_a_recording_of_several_mounts_counts_once_as_failed_before_replayed():
     assert run._outcomes(rows) == {'another policy': 1, 'replayed': 1, 'failed': 1}
 
 
-def test_another_order_into_the_same_result_is_refused(fleet, tmp_path, serial):
+def test_another_order_into_the_same_result_is_refused(fleet, tmp_path, inside):
     replay_fleet(order_of(fleet), tmp_path / 'result')
     other = FleetOrder([str(fleet)], parsed_changes({'highest_current': 0.8}))
-    with pytest.raises(ResultError, match=r'another order: changes was .*0\.7.* now it is .*0\.8'):
+    with pytest.raises(OrderError, match=r'another order: changes was .*0\.7.* now it is .*0\.8'):
         replay_fleet(other, tmp_path / 'result')
 
 
-def test_the_same_order_again_reads_nothing_again(fleet, tmp_path, serial):
+def test_the_same_order_again_reads_nothing_again(fleet, tmp_path, inside):
     first = replay_fleet(order_of(fleet), tmp_path / 'result')
     content = first.result.read_bytes()
-    serial.clear()
+    inside.clear()
     again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert (serial, again.before, again.figures()['failed']) == ([], 4, 1)
+    assert (inside, again.before, again.figures()['failed']) == ([], 4, 1)
     assert again.result.read_bytes() == content
 
 
-def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, serial, monkeypatch):
+def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, inside, monkeypatch):
     whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
     there = one.local_copy
 
@@ -179,23 +164,23 @@ def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, serial, monkeypa
     assert [row['reason'] for row in first.not_fetched] == ['the store does not answer']
     assert first.table.num_rows == 4
     monkeypatch.setattr(one, 'local_copy', there)
-    serial.clear()
+    inside.clear()
     again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert serial == ['opening']
+    assert inside == [str(fleet / 'opening')]
     assert again.result.read_bytes() == whole
 
 
-def test_a_recording_that_changed_is_replayed_again_and_has_its_new_rows_alone(fleet, tmp_path, serial):
+def test_a_recording_that_changed_is_replayed_again_and_has_its_new_rows_alone(fleet, tmp_path, inside):
     whole = replay_fleet(order_of(fleet), tmp_path / 'result')
     content = whole.result.read_bytes()
-    serial.clear()
+    inside.clear()
     os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))  # of the same size
     again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert (serial, again.before) == (['gap'], 3)
+    assert (inside, again.before) == ([str(fleet / 'gap')], 3)
     assert again.result.read_bytes() == content
 
 
-def test_a_recording_that_changed_and_cannot_be_fetched_has_one_row(fleet, tmp_path, serial, monkeypatch):
+def test_a_recording_that_changed_and_cannot_be_fetched_has_one_row(fleet, tmp_path, inside, monkeypatch):
     replay_fleet(order_of(fleet), tmp_path / 'result')
     os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))
     monkeypatch.setattr(one, 'local_copy', out_of_order)
@@ -208,22 +193,21 @@ def out_of_order(uri):
     raise SourceError('out of order')
 
 
-def test_the_same_order_from_another_folder_is_the_same(fleet, tmp_path, serial, monkeypatch):
+def test_the_same_order_from_another_folder_is_the_same(fleet, tmp_path, inside, monkeypatch):
     replay_fleet(order_of(fleet), tmp_path / 'result')
-    serial.clear()
+    inside.clear()
     monkeypatch.chdir(tmp_path)
     assert replay_fleet(FleetOrder(['./fleet/'], CHANGES), tmp_path / 'result').before == 4
-    assert serial == []
+    assert inside == []
 
 
 KILLED = """
 import os, signal, sys
-from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if import run
-from engine_mount.drives.loop.recording import record_core
+from pathlib import Path
 from engine_mount.drives.replay import parsed_changes
-
-run._WRITTEN_AFTER = 0.0
+from engine_mount.fleet import job
+from engine_mount.fleet.runner import Done
+from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 
 def tasks(work, items, **_):
     for place, item in enumerate(items):
@@ -231,22 +215,20 @@ def tasks(work, items, **_):
             os.kill(os.getpid(), signal.SIGKILL)
         yield Done(place, work(item))
 
-run.run_tasks = tasks
-run.replay_fleet(
-    run.FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7})), run.Path(sys.argv[2])
-)
+job.run_tasks = tasks
+replay_fleet(FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7})), Path(sys.argv[2]))
 """
 
 
-def test_a_command_that_is_killed_goes_on_where_it_was_with_nothing_lost_or_twice(fleet, tmp_path, serial):
+def test_a_command_that_is_killed_goes_on_where_it_was_with_nothing_lost_or_twice(fleet, tmp_path, inside):
     whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
     killed = subprocess.run([sys.executable, '-c', KILLED, str(fleet), str(tmp_path / 'result')], check=False)
     assert killed.returncode == -signal.SIGKILL
-    (tmp_path / 'result' / 'parts' / '.000002.parquet.1').write_bytes(b'PAR1 half')
-    (tmp_path / 'result' / 'parts' / '000003.parquet').write_bytes(b'')  # as after a loss of power
-    serial.clear()
+    with (tmp_path / 'result' / 'journal.jsonl').open('a') as journal:
+        journal.write('["a line that the power failure cut of')
+    inside.clear()
     again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert serial == ['opening', 'rough']
+    assert inside == [str(fleet / name) for name in ('opening', 'rough')]
     assert again.before == 2
     assert again.result.read_bytes() == whole
 
@@ -271,14 +253,14 @@ def children(process):
 
 killed = []
 
-def told(progress):
+def report(progress):
     if not killed:
         killed.append(children(os.getpid())[0])
         os.kill(killed[0], signal.SIGKILL)
 
 if __name__ == '__main__':
     order = FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7}))
-    outcome = replay_fleet(order, Path(sys.argv[2]), workers=2, told=told)
+    outcome = replay_fleet(order, Path(sys.argv[2]), workers=2, progress=report)
     assert not outcome.not_fetched
     assert killed
     assert outcome.workers <= 2  # a process that takes the place of another is no further one
@@ -286,7 +268,7 @@ if __name__ == '__main__':
 
 
 @pytest.mark.slow
-def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, tmp_path, serial):
+def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, tmp_path, inside):
     whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
     script = tmp_path / 'with_dask.py'
     script.write_text(WITH_DASK, encoding='utf-8')

@@ -23,8 +23,8 @@ parameters = {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}
 session = session_text({'parameters': parameters})
 recording.record_core(recording.Path(sys.argv[1]) / 'drive', parameters, session)
 for place in places([sys.argv[1]]).values():
-    row, = read_place(place).recordings
-    replayed, = replay_one(place, {'mount_control': {'highest_current': 0.7}}).rows
+    row, = read_place(place).rows['recordings']
+    replayed, = replay_one(place, {'mount_control': {'highest_current': 0.7}}).rows['result']
     print(row['reason'] or 'indexed', replayed['outcome'], len(before), sorted(compiled_so_far() - before))
 """
 

@@ -5,15 +5,16 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 
 from engine_mount.cli.bench.comparison import Comparison
-from engine_mount.cli.bench.fleet_workers import worker_figures
 from engine_mount.drives.inputs.taken import QUIET_AT_FIRST
 from engine_mount.fleet.catalogue.places import Place, places
 from engine_mount.fleet.example.fleet import make_one, whole_fleet
 from engine_mount.fleet.example.variations import VARIATIONS
+from engine_mount.fleet.runner import run_tasks
 from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
 from engine_mount.fleet.what_if.one import replay_one
 from engine_mount.recordings.columns import column_parts
@@ -24,6 +25,8 @@ from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 _RECORDINGS = 3  # chosen: the plain ones of the first drives; all topics of the simulator are in them
 _SECONDS = 20.0  # s, chosen: of each excitation
 _ROUNDS = 7
+_REPLAYS = 160  # of a run with workers, chosen: several seconds, beside which their start is short
+_WORKERS = 2  # chosen: every machine that works on a fleet has two cores
 _CHANGE = {'mount_control': {'highest_current': 2.0}}
 _COLUMNS = {
     DISPLACEMENT.name: DISPLACEMENT.names,
@@ -37,7 +40,8 @@ def fleet_figures(
 ) -> dict[str, Comparison]:
     """Return what a recorded second costs and where it goes, and how that grows with the workers.
 
-    It is processor time (s), of all beside real time and of the stages beside all; then `worker_figures`.
+    It is processor time (s), of all beside real time and of the stages beside all; then
+    the recorded time over the wall time of many replays by one worker and by two, with their start.
     `seconds` is the length of the excitations. A second counts where the controller was at work, as in the
     figures of `fleet replay`; what a process does once, such as to load the compiled laws, does not.
     """
@@ -45,14 +49,17 @@ def fleet_figures(
         for order in islice(whole_fleet(Path(folder)), 0, _RECORDINGS * len(VARIATIONS), len(VARIATIONS)):
             make_one(replace(order, seconds=seconds))
         found = list(places([folder]).values())
-        recorded = sum(row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows)
+        recorded = sum(
+            row['duration_s'] for place in found for row in replay_one(place, _CHANGE).rows['result']
+        )
         times = [_stages(found) for _ in range(rounds)]
-        workers = worker_figures(found, _CHANGE, say)
+        rates = [_rate(found, workers, say) for workers in (1, _WORKERS)]
     whole, *stages = (statistics.median(each) / recorded for each in zip(*times, strict=True))
     figures = {'fleet': Comparison('a recorded second in fleet replay', whole, 'real time', 1.0)}
     for (name, what), stage in zip(_STAGES.items(), stages, strict=True):
         figures[f'fleet_{name}'] = Comparison(f'of it {what}', stage, 'all of it', whole)
-    return figures | workers
+    what = f'{_WORKERS} workers in fleet replay, with their start'
+    return figures | {'fleet_workers': Comparison(what, rates[1], 'one worker', rates[0], 'times real time')}
 
 
 _STAGES = {
@@ -61,6 +68,18 @@ _STAGES = {
     'columns': 'its columns out of the chunks',
     'control': 'two controllers, and figures',
 }
+
+
+def _rate(found: Sequence[Place], workers: int, say: Callable[[str], None]) -> float:
+    """Return the recorded time over the wall time of `_REPLAYS` replays."""
+    say(f'measuring: fleet, workers: {workers}')
+    items = [found[place % len(found)] for place in range(_REPLAYS)]
+    begin = time.monotonic()
+    answers = [
+        done.result for done in run_tasks(partial(replay_one, changes=_CHANGE), items, workers=workers)
+    ]
+    rows = [row for answer in answers if answer is not None for row in answer.rows['result']]
+    return float(sum(row['duration_s'] for row in rows)) / (time.monotonic() - begin)
 
 
 def _stages(found: Sequence[Place]) -> tuple[float, ...]:

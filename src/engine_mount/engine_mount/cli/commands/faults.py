@@ -48,8 +48,8 @@ def faults(
 ) -> None:
     """Bring every fault into the real graph and tell what the graph does about it."""
     from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.faults.case import MATRIX
     from engine_mount.faults.graph import Place
-    from engine_mount.faults.matrix import MATRIX
     from engine_mount.faults.page import table, write_page
     from engine_mount.faults.session import run_faults
     from engine_mount.recordings.run.folder import make_run_folder

@@ -8,7 +8,7 @@ from typing import Any
 from engine_mount.cli.bench.bench import GROUPS
 from engine_mount.experiments.registry import ALL, experiment_named
 from engine_mount.experiments.registry import listed as listed_experiments
-from engine_mount.faults.matrix import MATRIX
+from engine_mount.faults.case import MATRIX
 from mount_bringup.settings import defaults_of_nodes
 from mount_control.policy.registry import POLICIES
 from mount_control.settings import parameter_sets

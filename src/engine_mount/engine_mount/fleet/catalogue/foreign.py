@@ -32,7 +32,7 @@ def foreign_rows(path: Path, place: Place, said: Said) -> Rows:
         there = columns_in(path, said)
         row['columns'] = json.dumps({one.name: one.unit for one in there}, ensure_ascii=False)
     except ValueError as error:
-        return unreadable(place, named(str(error), path, place), place.fingerprint)
+        return unreadable(place, named(str(error), path, place))
     try:
         mapped = mapped_in(path, said)
     except ValueError as error:

@@ -38,10 +38,9 @@ class Rows:
     events: list[Row] = field(default_factory=list)
 
 
-def unreadable(place: Place, reason: str, fingerprint: str) -> Rows:
+def unreadable(place: Place, reason: str) -> Rows:
     """Return the row of a recording of which nothing can be told."""
-    row = {**place_of(place), 'kind': UNREADABLE, 'reason': reason[:_LONGEST], 'mount': ''}
-    return Rows([row | {'fingerprint': fingerprint}])
+    return Rows([{**place_of(place), 'kind': UNREADABLE, 'reason': reason[:_LONGEST], 'mount': ''}])
 
 
 def rows_of(recording: Recording, path: Path, place: Place) -> Rows:
@@ -67,7 +66,6 @@ def place_of(place: Place) -> Row:
         'uri': place.uri,
         'recording': place.recording,
         'size_bytes': place.size,
-        'fingerprint': place.fingerprint,
     }
 
 

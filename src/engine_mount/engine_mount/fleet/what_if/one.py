@@ -6,12 +6,12 @@ import os
 import platform
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
+from engine_mount.fleet.job import Answer, Row
 from engine_mount.fleet.what_if.columns import ANOTHER_POLICY, DISPLACEMENT, FAILED, REPLAYED, SETPOINTS
 from engine_mount.fleet.what_if.compared import (
     Recorded,
@@ -27,44 +27,42 @@ from mount_control.settings import NoEffectError
 from mount_recorder.versions import versions
 
 Changes = Mapping[str, Mapping[str, Any]]
-Row = dict[str, Any]
 
 _OF_THE_MACHINE = ('processor', 'machine', 'c_library')  # no number of a row depends on them
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """The rows of one recording, one for each mount, and what they took.
-
-    `fetched`: whether the recording was there to be read; `busy`: time of the processor in s; `worker`: the
-    process that did it.
-    """
-
-    rows: tuple[Row, ...]
-    fetched: bool
-    busy: float
-    worker: str
-
-
 def replay_one(
     asked: Place, changes: Changes, closed_loop: bool = False, said: Said = NOTHING_SAID
-) -> Replayed:
+) -> Answer:
     """Return the rows of one recording with `changes` {node: {parameter: value}}; nothing is remembered.
 
-    `said` is what is said of files of others. What cannot be replayed, and what cannot be fetched, is a row
+    `said` is what is said of foreign files. What cannot be replayed, and what cannot be fetched, is a row
     with its reason. Raises `StoreAwayError` where the store does not answer.
     """
     begin, worker = time.process_time(), f'{platform.node()}/{os.getpid()}'
     common = {'recording': asked.recording, 'size_bytes': asked.size, **told_of(changes, closed_loop)}
+    fingerprint = asked.fingerprint
     try:
         with local_copy(asked.uri) as path:
-            rows = tuple({**common, **row} for row in _rows(asked, path, changes, closed_loop, said))
-        fetched = True
+            rows = [common | row for row in _rows(asked, path, changes, closed_loop, said)]
     except StoreAwayError:
         raise
     except OSError as error:
-        rows, fetched = ({**common, 'mount': '', 'reason': str(error), 'outcome': FAILED},), False
-    return Replayed(rows, fetched, time.process_time() - begin, worker)
+        rows, fingerprint = [failed_row(asked, str(error), changes, closed_loop)], ''
+    failed = any(row['outcome'] == FAILED for row in rows)
+    return Answer({'result': rows}, fingerprint, failed, time.process_time() - begin, worker)
+
+
+def failed_row(asked: Place, reason: str, changes: Changes, closed_loop: bool) -> Row:
+    """Return the row of a recording that could not be read."""
+    return {
+        'recording': asked.recording,
+        'mount': '',
+        'size_bytes': asked.size,
+        'reason': reason,
+        'outcome': FAILED,
+        **told_of(changes, closed_loop),
+    }
 
 
 def told_of(changes: Changes, closed_loop: bool) -> Row:

@@ -59,7 +59,7 @@ def index(
             scheduler=scheduler,
             workers=workers,
             memory=memory * 1_000_000,
-            told=lambda done, of: show(done / max(of, 1), detail=f'{done} of {of} recordings'),
+            progress=lambda now: show(now.done / max(now.of, 1), detail=f'{now.done} of {now.of} recordings'),
         )
     figures = {
         'catalogue': str(out),

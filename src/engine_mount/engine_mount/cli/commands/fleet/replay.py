@@ -61,7 +61,8 @@ def replay(
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.foreign import said_in
-    from engine_mount.fleet.what_if.run import Advance, FleetOrder, replay_fleet
+    from engine_mount.fleet.job import Progress
+    from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
     from engine_mount.reports.json_file import write_json
 
     changes = changes_of([*(settings or []), *([f'policy={policy}'] if policy else [])])
@@ -71,10 +72,10 @@ def replay(
     order = FleetOrder(places, changes, closed_loop, said_in(map_files or [], dbc))
     with resumable(), TerminalScreen(console).bar('replaying') as show:
 
-        def told(progress: Advance) -> None:
+        def report(progress: Progress) -> None:
             show(progress.done / progress.of, detail=_progress_text(progress))
 
-        outcome = replay_fleet(order, out, scheduler=scheduler, workers=workers, told=told)
+        outcome = replay_fleet(order, out, scheduler=scheduler, workers=workers, progress=report)
     figures = outcome.figures()
     _print(figures, out, console)
     if figures['failed']:

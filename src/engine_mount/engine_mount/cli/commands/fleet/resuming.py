@@ -11,7 +11,7 @@ _GOES_ON = 'the same command goes on where it stopped'
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
     """Say how the work goes on after Ctrl-C (`Interrupted`) and a lost cluster (`SchedulerLostError`)."""
-    from engine_mount.fleet.cluster import SchedulerLostError
+    from engine_mount.fleet.runner import SchedulerLostError
 
     try:
         yield

@@ -9,11 +9,11 @@ from mount_ros.testing import free_domain
 
 
 @pytest.mark.slow
-def test_an_intruder_ends_with_its_input_though_no_graph_listens_any_more():
+def test_a_rogue_sender_ends_with_its_input_though_no_graph_listens_any_more():
     """A graph that detects it as it appears has ended before it is matched."""
     with free_domain() as domain:
         ended = subprocess.run(
-            [sys.executable, '-m', 'engine_mount.faults.intruder', 'air_gap', str(domain), 'nowhere'],
+            [sys.executable, '-m', 'engine_mount.faults.rogue_sender', 'air_gap', str(domain), 'nowhere'],
             input='go\n',
             capture_output=True,
             text=True,
