@@ -39,7 +39,7 @@ from engine_mount.recordings.stored import (
     StoredMessages,
     StoredTopic,
 )
-from engine_mount.recordings.unpacking import mapped, plain
+from engine_mount.recordings.unpacking import plain
 
 _AT_ONCE = 1 << 20  # bytes of chunks that are unpacked together, chosen
 _BEGIN = len(MCAP0_MAGIC)
@@ -72,7 +72,7 @@ class McapFile(StoredFile):
         self._channels: dict[int, Channel] = {}
         self._data_end = 0  # where the messages end, by the file's own account
         self._data_proof: list[bool | None] = []
-        self._data = mapped(path)
+        self._data = _mapped(path)
         summary = read_summary(self._data)
         self.proven = bool(summary.sound)
         begins_well = self._data[:_BEGIN] == MCAP0_MAGIC
@@ -379,6 +379,16 @@ class McapFile(StoredFile):
 
     def _warn(self, sentence: str) -> None:
         self.warnings.append(f'{self.path.name}: {sentence}')
+
+
+def _mapped(path: Path) -> mmap.mmap:
+    try:
+        with path.open('rb') as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError as error:
+        raise StorageError(f'{path} cannot be read: {error.strerror or error}') from None
+    except ValueError:
+        raise StorageError(f'{path} is empty') from None
 
 
 def _groups(chunks: list[Chunk]) -> Iterator[list[Chunk]]:

@@ -51,7 +51,16 @@ _LARGEST_CHUNK = 1 << 32  # bytes; more is a damaged length
 _TAG_PLACE = _CHUNK.size - 4
 _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
 _PLAIN = re.compile(rb'\x06(?=.{4}\x00{4}.{28}\x00{4})', re.DOTALL)
+_SUMMARY: dict[int, Callable] = {
+    Opcode.SCHEMA: Schema.read,
+    Opcode.CHANNEL: Channel.read,
+    Opcode.STATISTICS: Statistics.read,
+    Opcode.CHUNK_INDEX: ChunkIndex.read,
+    Opcode.METADATA_INDEX: MetadataIndex.read,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex.read,
+}
 _FOOTER_SIZE = 20  # bytes behind opcode and length
+_CHUNKS_AT_ONCE = 256  # chosen: whose heads are in memory at once
 _AT_ONCE = 1 << 22  # bytes, chosen: little of a long file is in memory
 
 
@@ -121,37 +130,34 @@ def read_summary(data: mmap.mmap) -> Summary:
         return Summary(None)
     if checksum(data, footer.summary_start, len(data) - len(MCAP0_MAGIC) - 4) != footer.summary_crc:
         return Summary(False)
-    summary = Summary(True, footer.summary_start)
+    found: dict[int, list] = {opcode: [] for opcode in _SUMMARY}
     position = footer.summary_start
     while position + RECORD.size <= place:
         opcode, length = RECORD.unpack_from(data, position)
         begin, position = position + RECORD.size, position + RECORD.size + length
-        if position > place or not _add_to_summary(summary, opcode, data, data[begin:position]):
+        if opcode not in _SUMMARY:
+            continue
+        record = parsed(_SUMMARY[opcode], data[begin:position])
+        if record is None or position > place:
             return Summary(False)
-    summary.chunks.sort(key=lambda chunk: chunk.position)
-    return summary
-
-
-def _add_to_summary(summary: Summary, opcode: int, data: mmap.mmap, content: bytes) -> bool:
-    """Add a record; return False where one that is needed is not readable."""
-    if opcode == Opcode.CHUNK_INDEX:
-        index = parsed(ChunkIndex.read, content)
-        chunk = index and indexed_chunk(data, index)
-        summary.chunks += [chunk] if chunk else []
-        return chunk is not None
-    if opcode == Opcode.SCHEMA and (schema := parsed(Schema.read, content)):
-        summary.schemas[schema.id] = schema
-    elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, content)):
-        summary.channels[channel.id] = channel
-    elif opcode == Opcode.METADATA_INDEX and (metadata := parsed(MetadataIndex.read, content)):
-        summary.beside.append(metadata)
-    elif opcode == Opcode.ATTACHMENT_INDEX and (attachment := parsed(AttachmentIndex.read, content)):
-        summary.beside.append(attachment)
-    elif opcode == Opcode.STATISTICS and (statistics := parsed(Statistics.read, content)):
-        summary.statistics = statistics
-    else:
-        return opcode not in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)
-    return True
+        found[opcode].append(record)
+    chunks = []
+    for index in sorted(found[Opcode.CHUNK_INDEX], key=lambda index: index.chunk_start_offset):
+        chunk = indexed_chunk(data, index)
+        if chunk is None:
+            return Summary(False)
+        chunks.append(chunk)
+        if len(chunks) % _CHUNKS_AT_ONCE == 0:
+            data.madvise(mmap.MADV_DONTNEED)
+    return Summary(
+        True,
+        footer.summary_start,
+        {schema.id: schema for schema in found[Opcode.SCHEMA]},
+        {channel.id: channel for channel in found[Opcode.CHANNEL]},
+        chunks,
+        next(iter(found[Opcode.STATISTICS]), None),
+        found[Opcode.METADATA_INDEX] + found[Opcode.ATTACHMENT_INDEX],
+    )
 
 
 def checksum(data: mmap.mmap, begin: int, end: int) -> int:

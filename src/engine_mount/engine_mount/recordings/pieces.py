@@ -4,6 +4,7 @@ What the files declare counts more than the description beside them: there it is
 """
 
 import re
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from engine_mount.recordings.metadata import (
 )
 from engine_mount.recordings.sqlite_file import SqliteFile
 from engine_mount.recordings.stored import StorageError, StoredFile, StoredTopic
+from engine_mount.recordings.unpacking import COMPRESSED_SUFFIXES, unpack
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_recorder.bag_writer import PIECE_RECORD
 from mount_recorder.metadata import METADATA_NAME
@@ -76,8 +78,19 @@ def find_pieces(path: Path) -> Pieces:
 
 
 def open_piece(path: Path) -> StoredFile:
-    """Open one file of a recording; raises `StorageError`."""
-    return SqliteFile(path) if '.db3' in path.suffixes else McapFile(path)
+    """Open one file of a recording, unpacked where it is packed as a whole; raises `StorageError`."""
+    if path.suffix not in COMPRESSED_SUFFIXES:
+        return SqliteFile(path) if path.suffix == '.db3' else McapFile(path)
+    with tempfile.TemporaryDirectory(prefix='engine_mount_') as folder:
+        try:
+            unpack(path, Path(folder, path.stem))
+        except OSError as error:
+            raise StorageError(
+                f'{path} cannot be unpacked: {error.strerror}; make room in {tempfile.gettempdir()}'
+            ) from None
+        file = open_piece(Path(folder, path.stem))  # it stays open
+    file.path = path
+    return file
 
 
 def _description(folder: Path) -> tuple[BagInformation | None, str]:

@@ -1,16 +1,15 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
-import contextlib
 import copy
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from engine_mount.recordings.collector import RECEIVED, SENT, STAMPS, Collector
 from engine_mount.recordings.definitions import Definition
 from engine_mount.recordings.metadata import (
     ZERO_KEY,
@@ -28,16 +27,13 @@ from engine_mount.recordings.pieces import (
     open_piece,
     repeated_topics,
 )
-from engine_mount.recordings.series import Payloads, Series, SeriesError
+from engine_mount.recordings.series import Payloads, Series, SeriesError, TopicTimes
 from engine_mount.recordings.stored import HEAD, StorageError, StoredFile, StoredMessages
 from engine_mount.recordings.time_axis import TimeAxis, anchors
 from engine_mount.recordings.times import NO_TIMES, Times, shared
-from engine_mount.recordings.topic_times import TimesCollector, TopicTimes
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
-
-_RECEIVED, _STAMPS = '/received', '/stamps'  # no names of fields
 
 
 class ReadingError(ValueError):
@@ -188,20 +184,15 @@ class Recording:
         for name, series in self._series.items():
             if name in wanted:
                 wanted[name] -= wanted[name] if series.loaded else series.columns.keys()
-        rows: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in wanted if wanted[name]}
-        for part in self.parts(rows):
-            rows[part.topic].append(_columns_of(part, wanted[part.topic]))
         known: list[Times] = []
-        for name in list(rows):
-            found = rows.pop(name)
-            columns = {
-                column: np.concatenate([row.pop(column) for row in found])
-                for column in (_RECEIVED, _STAMPS, *wanted[name])
-                if found and all(column in row for row in found)
-            }
-            received, stamps = columns.pop(_RECEIVED, NO_TIMES), columns.pop(_STAMPS, None)
+        collected = self._collect(
+            {name: {RECEIVED, STAMPS, *names} for name, names in wanted.items() if names}
+        )
+        for name, collector in collected.items():
+            found = collector.columns
+            received, stamps = found.pop(RECEIVED, NO_TIMES), found.pop(STAMPS, None)
             series = self._series.setdefault(name, self._make_series(name, partial(self._read_one, name)))
-            series.add_columns(columns, received, None if stamps is None else shared(stamps, known))
+            series.add_columns(found, received, None if stamps is None else shared(stamps, known))
 
     def release(self) -> None:
         """Forget what was read of the topics: it is read again where it is needed."""
@@ -318,33 +309,35 @@ class Recording:
 
     def _times_of(self, names: Iterable[str], received: str) -> dict[str, TopicTimes]:
         """Return the times of topics, those of arrival of the topic `received`."""
-        collectors: dict[str, TimesCollector] = {}
-        for name in names:
-            kind = self.topics[name].type
-            kept = {'log_time'} if name == received else set()
-            if registered_topic(name, kind) is CURRENT_SETPOINT:
-                kept = {'log_time', 'publish_time'}
-            collectors[name] = TimesCollector(name, kind, *self._definitions[name], kept)
-        columns: dict[str, tuple[str, ...]] = {}
-        for name, block in self._blocks(list(collectors)):
-            definition = self._definitions[name][0]
-            if name not in columns and definition is not None and definition.has_stamp:
-                columns[name] = self._names_in(name, block.at(slice(1)))
-            collectors[name].add(block)
-        found: dict[str, TopicTimes] = {}
+        wanted: dict[str, set[str]] = {name: {STAMPS} for name in names}
+        for name, columns in wanted.items():
+            if registered_topic(name, self.topics[name].type) is CURRENT_SETPOINT:
+                columns |= {RECEIVED, SENT}
+            elif name == received:
+                columns.add(RECEIVED)
+        times: dict[str, TopicTimes] = {}
         known: list[Times] = []
-        for name in list(collectors):
-            one = collectors.pop(name).finish(columns.get(name, ()))
-            stamps = None if one.stamps is None else shared(one.stamps, known)
-            found[name] = replace(one, stamps=stamps)
-            self._note_damage(name, one.count)
-        return found
+        for name, collector in self._collect(wanted).items():
+            found, obstacle = collector.columns, collector.obstacles.get(STAMPS, '')
+            stamps = found.get(STAMPS, None if obstacle else NO_TIMES)
+            times[name] = TopicTimes(
+                name,
+                self.topics[name].type,
+                collector.count,
+                None if stamps is None else shared(stamps, known),
+                found.get(RECEIVED),
+                found.get(SENT),
+                collector.names,
+                obstacle.removeprefix(f'{name}: ').removesuffix('; use receive_times'),
+            )
+        return times
 
-    def _names_in(self, name: str, block: StoredMessages) -> tuple[str, ...]:
-        try:
-            return self._make_series(name, (Payloads([block.payloads()]), block.heads)).names
-        except SeriesError:
-            return ()
+    def _collect(self, wanted: Mapping[str, Iterable[str]]) -> dict[str, Collector]:
+        """Return columns and times of topics, read in one pass."""
+        found = {name: Collector(wanted[name], self.topics[name].message_count) for name in wanted}
+        for part in self.parts(wanted):
+            found[part.topic].add(part)
+        return found
 
     def _make_axis(self, arrivals: Mapping[str, Arrivals]) -> TimeAxis:
         """Return the time axis; `arrivals` are samples of topics, those of others are read."""
@@ -418,12 +411,3 @@ class Recording:
                         if name in watched:
                             last[name] = found.message(-1)
                         yield name, found
-
-
-def _columns_of(part: Series, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return times and columns of messages, without what they do not have."""
-    found = {_RECEIVED: part.receive_times}
-    for name in (_STAMPS, *names):
-        with contextlib.suppress(SeriesError):
-            found[name] = part.stamps if name == _STAMPS else part[name]
-    return found

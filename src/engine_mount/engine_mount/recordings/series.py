@@ -4,6 +4,7 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ _SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
 STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
 """Where the stamp stands in a message: paths, and places in their runs of numbers."""
 STAMP_BYTES = 8
+STAMP_END = HEAD + STAMP_BYTES
+_LITTLE_ENDIAN = (0, 1)  # the first bytes of a message: plain CDR
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 
 
@@ -132,7 +135,12 @@ class Series:
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        found = [NO_TIMES]
+        found, rows = [NO_TIMES], self.payloads.rows
+        if rows is not None and rows.shape[1] >= STAMP_END and self._definition.has_stamp:
+            beginnings = np.ascontiguousarray(rows[:, :STAMP_END])
+            if (beginnings[:, :2] == _LITTLE_ENDIAN).all():
+                times = beginnings.view('V4,<i4,<u4')[:, 0]
+                return np.asarray(times['f1'].astype(np.int64) * 1_000_000_000 + times['f2'])
         for layout, rows in self._layouts:
             if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
                 raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
@@ -293,6 +301,26 @@ class Series:
                 raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
             found.append(numbers.column(rows, place).astype(np.float64))
         return np.concatenate(found)
+
+
+@dataclass(frozen=True)
+class TopicTimes:
+    """Times in ns in the order of the recording; `obstacle` is the reason where `stamps` are None.
+
+    `receive_times` and `publish_times` are None where nobody needs them.
+    """
+
+    topic: str
+    type: str
+    count: int
+    stamps: Times | None
+    receive_times: Times | None
+    publish_times: Times | None
+    names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
+    obstacle: str = ''
+
+    def __len__(self) -> int:
+        return self.count
 
 
 def _names_in(layout: Layout) -> list[str]:

@@ -1,8 +1,7 @@
 """Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP.
 
 The source is never touched. What its writer had not yet brought into the database when it ended stands in a
-log beside it; with one, a copy is read, in which sqlite puts both together. A file packed as a whole is read
-from an unpacked copy.
+log beside it; with one, a copy is read, in which sqlite puts both together.
 """
 
 import shutil
@@ -22,7 +21,7 @@ from engine_mount.recordings.stored import (
     StoredTopic,
     stored_messages,
 )
-from engine_mount.recordings.unpacking import COMPRESSED_SUFFIXES, plain, unpack
+from engine_mount.recordings.unpacking import plain
 
 _AT_ONCE = 5000  # rows, chosen
 # A column may hold any type, whatever was declared; a name or a text that is no UTF-8 is a `ValueError`.
@@ -69,24 +68,19 @@ class SqliteFile(StoredFile):
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
 
     def _connect(self) -> sqlite3.Connection:
-        packed = self.path.suffix in COMPRESSED_SUFFIXES
-        if not packed and not self._logs:
+        if not self._logs:
             return sqlite3.connect(f'{self.path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
         folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        copy = folder / (self.path.stem if packed else self.path.name)
         try:
-            if packed:
-                with copy.open('wb') as target:
-                    unpack(self.path, target)
-            for file in () if packed else (self.path, *self._logs):
+            for file in (self.path, *self._logs):
                 shutil.copyfile(file, folder / file.name)
         except OSError as error:
             raise StorageError(
                 f'{self.path} cannot be copied to be read: {error.strerror}; '
                 f'make room in {tempfile.gettempdir()}'
             ) from None
-        return sqlite3.connect(copy)
+        return sqlite3.connect(folder / self.path.name)
 
     def _read_topics(self) -> None:
         cursor = self._base.execute('SELECT * FROM topics')

@@ -1,9 +1,7 @@
 """Compressed bytes unpacked within a limit: a few kilobytes of them can stand for gigabytes."""
 
-import mmap
-import tempfile
+import contextlib
 from pathlib import Path
-from typing import IO
 
 import zstandard
 
@@ -56,44 +54,23 @@ def plain(messages: StoredMessages) -> StoredMessages:
     return stored_messages(messages.heads, [_plain(bytes(raw)) for raw in messages.payloads()])
 
 
-def mapped(path: Path) -> mmap.mmap:
-    """Return the bytes of a file, unpacked if its name ends in `.zstd` or `.zst`; raises `StorageError`."""
-    try:
-        with path.open('rb') as file:
-            if path.suffix not in COMPRESSED_SUFFIXES:
-                return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-            with tempfile.TemporaryFile() as target:
-                unpack(path, target)
-                target.flush()
-                return mmap.mmap(target.fileno(), 0, access=mmap.ACCESS_READ)
-    except OSError as error:
-        raise StorageError(f'{path} cannot be read: {error.strerror or error}') from None
-    except StorageError:
-        raise
-    except ValueError:
-        raise StorageError(f'{path} is empty') from None
-
-
-def unpack(path: Path, target: IO[bytes]) -> None:
+def unpack(path: Path, target: Path) -> None:
     """Unpack a file; what is cut off there is missing in `target`.
 
     Raises `StorageError` where it unpacks to more than its limit.
     """
     size = path.stat().st_size
     limit = unpacking_limit(size)
-    with path.open('rb') as source:
-        stream = zstandard.ZstdDecompressor().stream_reader(source)
-        try:
-            while piece := stream.read(_PIECE):
-                limit -= len(piece)
-                if limit < 0:
-                    raise StorageError(
-                        f'{path} unpacks to more than {unpacking_limit(size)} bytes (limit for {size} '
-                        'packed bytes): if it is what you expect, unpack it by zstd first'
-                    )
-                target.write(piece)
-        except zstandard.ZstdError:
-            pass  # the file within shows where it ends
+    with path.open('rb') as source, target.open('wb') as written, contextlib.suppress(zstandard.ZstdError):
+        # where it ends too early, the file within shows it
+        for piece in zstandard.ZstdDecompressor().read_to_iter(source, write_size=_PIECE):
+            limit -= len(piece)
+            if limit < 0:
+                raise StorageError(
+                    f'{path} unpacks to more than {unpacking_limit(size)} bytes (limit for {size} '
+                    'packed bytes): if it is what you expect, unpack it by zstd first'
+                )
+            written.write(piece)
 
 
 def _plain(raw: bytes) -> bytes:

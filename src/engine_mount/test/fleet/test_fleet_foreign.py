@@ -129,8 +129,8 @@ def test_tables_of_a_fleet_and_what_lies_in_a_run_are_no_files_of_others(drives,
 
 
 def test_a_recording_of_this_project_is_opened_once(drives, said, tmp_path, inside, monkeypatch):
-    opened, opens = [], Recording._open
-    monkeypatch.setattr(Recording, '_open', lambda self: (opened.append(self.path), opens(self))[1])
+    opened, opens = [], Recording.__init__
+    monkeypatch.setattr(Recording, '__init__', lambda self, path: (opened.append(path), opens(self, path))[1])
     indexed([drives / 'run'], tmp_path / 'catalogue', said)
     assert opened == [drives / 'run' / 'recording']
     opened.clear()

@@ -23,7 +23,7 @@ from engine_mount.recordings.audit.node_reports import NodeReport, node_reports
 from engine_mount.recordings.metadata import read_statement
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.run.session import recorded_sample_rate
-from engine_mount.recordings.series import SeriesError
+from engine_mount.recordings.series import SeriesError, TopicTimes
 from engine_mount.recordings.time_axis import TimeAxis
 from engine_mount.recordings.times import (
     NO_TIMES,
@@ -37,7 +37,6 @@ from engine_mount.recordings.times import (
     stamp_jitter,
     stamp_statistics,
 )
-from engine_mount.recordings.topic_times import TopicTimes
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.stamp_watch import FARTHEST
