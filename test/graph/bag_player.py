@@ -16,7 +16,7 @@ import yaml
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_ros.messages.cdr import message_class
 
 DEPTH = 1000  # rosbag2 takes the default of the middleware where discovery told none

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 
 PLAYER = Path(__file__).with_name('bag_player.py')
 REFERENCE = Path(__file__).resolve().parents[2] / 'bags' / 'reference' / 'rough'

@@ -7,7 +7,7 @@ import pytest
 
 from engine_mount.drives.inputs.input import Notes, recorded_parameters
 from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
 from engine_mount.recordings.session import (
     recorded_session,

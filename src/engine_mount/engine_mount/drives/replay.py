@@ -12,8 +12,8 @@ from engine_mount.drives.inputs.foreign import DEFAULT_TABLE, ForeignOrder, chos
 from engine_mount.drives.inputs.input import ReplayError, ReplayInput, replay_input
 from engine_mount.drives.inputs.parameter_changes import without
 from engine_mount.drives.output import write_replay
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.place import open_mount
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import (
     SessionError,
     recorded_session,

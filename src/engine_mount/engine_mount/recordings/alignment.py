@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.series import Series, SeriesError, Times
-from engine_mount.recordings.messages.time_axis import TimeAxis
-from engine_mount.recordings.messages.times import distinct, is_in
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Series, SeriesError, Times
 from engine_mount.recordings.session import recorded_sample_rate
+from engine_mount.recordings.time_axis import TimeAxis
+from engine_mount.recordings.times import distinct, is_in
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 

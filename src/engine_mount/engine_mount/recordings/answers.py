@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.times import Times, distinct, is_in
+from engine_mount.recordings.columns import ColumnPart, column_parts
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT

@@ -22,11 +22,17 @@ from engine_mount.recordings.answers import (
     setpoint_latency,
     spanned,
 )
-from engine_mount.recordings.bag.metadata import read_statement
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.columns import TopicTimes
-from engine_mount.recordings.messages.series import SeriesError
-from engine_mount.recordings.messages.stamps import (
+from engine_mount.recordings.metadata import read_statement
+from engine_mount.recordings.node_reports import CONTROL, NodeReport, node_reports
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import SeriesError, TopicTimes
+from engine_mount.recordings.session import recorded_sample_rate
+from engine_mount.recordings.time_axis import TimeAxis
+from engine_mount.recordings.times import (
+    NO_TIMES,
+    Times,
+    distinct,
+    is_in,
     misdated,
     missing_samples,
     redated,
@@ -34,10 +40,6 @@ from engine_mount.recordings.messages.stamps import (
     stamp_jitter,
     stamp_statistics,
 )
-from engine_mount.recordings.messages.time_axis import TimeAxis
-from engine_mount.recordings.messages.times import NO_TIMES, Times, distinct, is_in
-from engine_mount.recordings.node_reports import CONTROL, NodeReport, node_reports
-from engine_mount.recordings.session import recorded_sample_rate
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.stamp_watch import FARTHEST

@@ -18,11 +18,11 @@ import yaml
 from mcap.records import Attachment
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.metadata import TopicInformation, read_statement
-from engine_mount.recordings.bag.piece_topics import offers_of
-from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.container.stored import ACCOUNTS, StoredTopic
-from engine_mount.recordings.messages.series import Payloads, Times
+from engine_mount.recordings.metadata import TopicInformation, read_statement
+from engine_mount.recordings.pieces import offers_of
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.series import Payloads, Times
+from engine_mount.recordings.stored import ACCOUNTS, StoredTopic
 from mount_models.plain_yaml import plain_yaml
 from mount_recorder.bag_writer import LIBRARY, create_folder, file_entry
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement

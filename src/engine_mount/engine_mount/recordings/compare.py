@@ -14,10 +14,10 @@ from engine_mount.recordings.alignment import (
     paired_topics,
     registered_in,
 )
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.difference import SHOWN, SignalDifference, few, signal_sentences
 from engine_mount.recordings.events import recorded_marks
 from engine_mount.recordings.matched_topic import SWITCH, MatchedTopic, TopicComparison
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sessions, session_differences
 from engine_mount.recordings.switching import SwitchingChange, paired_switchings, switching_times
 from engine_mount.recordings.tolerances import Tolerances

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag.metadata import TopicInformation
-from engine_mount.recordings.bag.origin import ZERO_KEY, with_step
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.bag_copy import BagCopy, read_messages
+from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, with_step
+from engine_mount.recordings.recording import Recording
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import EVENT, Delivery

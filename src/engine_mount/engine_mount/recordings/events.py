@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.series import Series, SeriesError
-from engine_mount.recordings.messages.time_axis import TimeAxis
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.switching import switching_places
+from engine_mount.recordings.time_axis import TimeAxis
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.messages.event import Mark, read_mark
 from mount_ros.topics import CONTROL_TRACE, EVENT

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from engine_mount.recordings.audit import TopicAudit
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events import recorded_marks
 from engine_mount.recordings.node_reports import CONTROL, node_reports
+from engine_mount.recordings.recording import Recording
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.automatic_marks import MarkKind
 from mount_recorder.topic_groups import registered_topic

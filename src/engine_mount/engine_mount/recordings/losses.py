@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from engine_mount.recordings.audit import TopicAudit
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.faults import Fault, faults
+from engine_mount.recordings.recording import Recording
 from mount_models.sampling import SETPOINT_TIMEOUT
 
 _SHOWN = 5  # faults named one by one

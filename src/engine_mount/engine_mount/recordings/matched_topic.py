@@ -16,7 +16,7 @@ from engine_mount.recordings.alignment import (
     samples_of,
 )
 from engine_mount.recordings.difference import Column, Places, Quantity, SignalDifference, signal_difference
-from engine_mount.recordings.messages.series import STAMP, Series, SeriesError
+from engine_mount.recordings.series import STAMP, Series, SeriesError
 from engine_mount.recordings.tolerances import Tolerances
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CONTROL_TRACE, CURRENT_FORCE_TABLE, JOINT_STATE

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag.metadata import TopicInformation
-from engine_mount.recordings.bag.origin import with_step
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.bag_copy import BagCopy, Messages, joined, read_messages
+from engine_mount.recordings.metadata import TopicInformation, with_step
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import session_differences
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic

@@ -3,8 +3,8 @@
 import sys
 from dataclasses import dataclass
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.series import SeriesError
 from mount_ros.messages.verdicts import NodeVerdict, verdicts_in
 from mount_ros.topics import DIAGNOSTICS
 

@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording, open_recording
+from engine_mount.recordings.recording import ReadingError, Recording, open_recording
 
 _AT_ONCE = 1 << 20  # bytes, chosen
 

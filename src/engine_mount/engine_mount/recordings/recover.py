@@ -10,11 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.bag.metadata import read_statement
-from engine_mount.recordings.bag.piece_topics import repeated_topics
-from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.bag_copy import BagCopy
-from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
+from engine_mount.recordings.mcap_file import McapFile
+from engine_mount.recordings.metadata import read_statement
+from engine_mount.recordings.pieces import repeated_topics
+from engine_mount.recordings.recording import Recording, open_recording
 from mount_recorder.losses import RECORDER_RECORD
 
 Progress = Callable[[int, int], None]  # messages done, messages in all
@@ -93,7 +93,8 @@ def _copy(recording: Recording, bag: BagCopy, progress: Progress | None) -> int:
         pending = set(names)
         for block in file.blocks(file.topics.keys()):
             stored += len(block)
-            rows = zip(block.heads.tolist(), map(bytes, block.payloads()), strict=True)
+            heads = block.heads[['topic', 'sequence', 'log_time', 'publish_time']].tolist()
+            rows = zip(heads, map(bytes, block.payloads()), strict=True)
             for (number, sequence, log_time, publish_time), raw in rows:
                 name = file.topics[number].name
                 if name in watched:
@@ -132,7 +133,7 @@ def _balance(recording: Recording, bag: BagCopy, stored: int) -> Recovery:
 def _expected(recording: Recording) -> int | None:
     """Return how many messages there once were, None if no reliable source tells."""
     if recording.proven:
-        return sum(sum(file.message_counts().values()) for file in recording.files)
+        return sum(sum(file.message_counts.values()) for file in recording.files)
     information = recording.information
     return information.message_count if information is not None and recording.described else None
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import yaml
 
-from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.bag_copy import Messages, in_log_order, read_messages
 from engine_mount.recordings.compare import Comparison, compare
 from engine_mount.recordings.difference import time_text as moment_text
-from engine_mount.recordings.messages.series import Payloads
-from engine_mount.recordings.messages.times import Times, distinct
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
+from engine_mount.recordings.times import Times, distinct
 from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.session import session_message, session_text, time_text

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from engine_mount.recordings.audit import TopicAudit, audit
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.events import read_marks
 from engine_mount.recordings.losses import Losses, losses
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
 from engine_mount.recordings.session import (
     duration_of,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.messages.series import Series, SeriesError, Times
+from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.series import Series, SeriesError, Times
 from engine_mount.signals.signal import SECOND, Signal, SignalError, check_count
 
 

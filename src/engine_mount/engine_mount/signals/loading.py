@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from engine_mount.recordings.bag.recording import ReadingError, open_recording
+from engine_mount.recordings.recording import ReadingError, open_recording
 from engine_mount.signals.bag_field import read_field
 from engine_mount.signals.npy_file import read_npy
 from engine_mount.signals.signal import Signal, SignalError

@@ -17,7 +17,7 @@ from engine_mount.experiments.sensitivity import experiment as sensitivity
 from engine_mount.experiments.sensitivity.grid import Job, run_all, run_job
 from engine_mount.experiments.sweep import experiment as sweep
 from engine_mount.experiments.sweep.evaluation import defined_peak
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_models.damper import DamperError, damper_curve
 from mount_models.quantity import ParameterError
 

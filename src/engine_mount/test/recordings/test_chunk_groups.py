@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 
 import engine_mount
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.merge import merge

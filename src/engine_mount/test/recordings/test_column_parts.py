@@ -5,7 +5,7 @@ import pytest
 from recorded_drive import PERIOD, START, joint_state, sample, write_drive
 
 import engine_mount
-from engine_mount.recordings.bag.column_parts import column_parts
+from engine_mount.recordings.columns import column_parts
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import engine_mount
-from engine_mount.recordings.bag.origin import origin
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.cut import CutError, cut
 from engine_mount.recordings.events import (
@@ -20,6 +19,7 @@ from engine_mount.recordings.events import (
     recorded_events,
 )
 from engine_mount.recordings.merge import MergeError, merge
+from engine_mount.recordings.metadata import origin
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 400

@@ -11,7 +11,7 @@ from recorded_drive import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
-from engine_mount.recordings.bag.metadata import QosError, read_metadata, read_qos, read_statement
+from engine_mount.recordings.metadata import QosError, read_metadata, read_qos, read_statement
 from engine_mount.recordings.switching import switching_times
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.metadata import OfferedQos, qos_text

@@ -13,7 +13,7 @@ from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_a
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.audit_report import as_json, sentences
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.messages.times import NO_TIMES
+from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (

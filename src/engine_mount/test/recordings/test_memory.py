@@ -6,7 +6,7 @@ import numpy as np
 from recorded_drive import PERIOD, START, joint_state
 
 import engine_mount
-from engine_mount.recordings.container.mcap_reading import mcap_file
+from engine_mount.recordings import mcap_file
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import COIL_TEMPERATURE, DISPLACEMENT, JOINT_STATE
 

@@ -16,8 +16,8 @@ import engine_mount
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.merge import merge
-from engine_mount.recordings.messages.series import SeriesError
 from engine_mount.recordings.recover import recover
+from engine_mount.recordings.series import SeriesError
 from mount_recorder.mcap_writer import McapWriter
 from mount_ros.topics import DISPLACEMENT
 
@@ -178,7 +178,7 @@ def test_times_are_those_of_the_chunks_where_the_statistics_tell_of_others(tmp_p
     assert honest.warnings == []
     assert lying.proven
     assert lying.time_range == honest.time_range
-    assert any('statistics tell of other times' in warning for warning in lying.warnings)
+    assert any('statistics state other times' in warning for warning in lying.warnings)
     assert lying['displacement'].time[0] == honest['displacement'].time[0]
 
 

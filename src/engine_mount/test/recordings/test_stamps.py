@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine_mount.recordings.messages.stamps import misdated, missing_samples, redated, stamp_statistics
+from engine_mount.recordings.times import misdated, missing_samples, redated, stamp_statistics
 from mount_recorder.stamp_watch import StampWatch
 
 RATE = 1000.0

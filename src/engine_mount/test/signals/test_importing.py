@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.recordings.bag.recording import open_recording
 from engine_mount.recordings.cut import cut
+from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.importing.importing import ImportOrder, import_recording

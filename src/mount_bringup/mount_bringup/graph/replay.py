@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.place import open_run, recording_place
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from mount_bringup.chosen import chosen_control, with_recorded_policy
 from mount_bringup.graph.domain import chosen_domain

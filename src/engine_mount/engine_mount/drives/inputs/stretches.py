@@ -25,8 +25,8 @@ from engine_mount.drives.inputs.taken import (
     looked_up,
     places_in,
 )
-from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.columns import ColumnPart, column_parts
+from engine_mount.recordings.recording import Recording
 from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic

@@ -15,8 +15,8 @@ from engine_mount.experiments.check.evaluation import Beside, Driven, figures_of
 from engine_mount.experiments.check.suite import Manoeuvre
 from engine_mount.experiments.sensitivity.grid import TruthOnly
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.bag.recording import Recording, open_recording
 from engine_mount.recordings.losses import Losses, losses
+from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends
 from engine_mount.reports.drive.signals import FloatArray, Truth, load_drive

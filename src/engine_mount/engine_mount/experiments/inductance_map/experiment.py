@@ -26,7 +26,7 @@ from engine_mount.experiments.harness.fixed_gaps import (
     measure_actuator,
 )
 from engine_mount.experiments.inductance_map import REFERENCE, TITLE
-from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.recording import Recording, open_recording
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import (
     crossing_current_from_gap,

@@ -10,9 +10,9 @@ from engine_mount.fleet.catalogue.motion import Motion
 from engine_mount.fleet.catalogue.trace import Trace
 from engine_mount.recordings.answers import PeakCurrent
 from engine_mount.recordings.audit import TopicAudit, audit, control_spans
-from engine_mount.recordings.bag.column_parts import column_parts
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.losses import losses
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sample_rate
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.bag.column_parts import ColumnPart
+from engine_mount.recordings.columns import ColumnPart
 from engine_mount.recordings.switching import switching_places
 
 _ACTIVE = 'damping_active'

@@ -21,7 +21,7 @@ from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
 from engine_mount.fleet.what_if.compared import Recorded, changed_parameters
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import session_parameters
 from engine_mount.settings.options import with_sample_rate
 from engine_mount.signals.even_grid import evenly_spaced

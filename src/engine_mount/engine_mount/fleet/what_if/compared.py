@@ -17,7 +17,7 @@ from engine_mount.drives.inputs.stretches import STRETCH, OutOfOrderError, Stret
 from engine_mount.drives.inputs.taken import Column, ControlRun, Notes, ReplayError, quiet_at_first
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.chosen import control_parameters
 from mount_control.settings import check_effect

@@ -10,8 +10,8 @@ import numpy as np
 
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, control_spans
-from engine_mount.recordings.bag.recording import Recording
 from engine_mount.recordings.losses import Losses
+from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Screen, Table
 from engine_mount.recordings.switching import switching_times
 from engine_mount.reports.drive.evaluation import tracking_error

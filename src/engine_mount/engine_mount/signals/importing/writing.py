@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.told_units import units_text
+from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.importing.topics import PREFIX, RecordedAs
 from engine_mount.signals.signal import FloatArray
 from mount_recorder.bag_writer import BagWriter

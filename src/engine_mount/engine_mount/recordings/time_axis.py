@@ -1,14 +1,11 @@
-"""The one time that people are told: s from the first displacement sample of a recording."""
+"""The one time axis shown to users: s from the first displacement sample of a recording."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.messages.series import SeriesError
-from engine_mount.recordings.messages.stamps import misdated
-from engine_mount.recordings.messages.times import Times
+from engine_mount.recordings.times import Times, misdated
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
@@ -62,39 +59,11 @@ class TimeAxis:
         return int(_related(np.array([self.zero + round(1e9 * seconds)]), self._stamps, self._received)[0])
 
 
-class Arrivals(Protocol):
-    """Samples of a topic: when they were taken and when they came in, ns."""
-
-    @property
-    def stamps(self) -> Times | None: ...
-    @property
-    def receive_times(self) -> Times | None: ...
-
-
 def anchors(types: Mapping[str, str]) -> list[str]:
     """Return which of the topics {name: type} may tell the time of a recording, the best first."""
     return [
         name for topic in _ANCHORS for name, kind in types.items() if registered_topic(name, kind) is topic
     ]
-
-
-def axis_of(
-    types: Mapping[str, str], arrivals: Callable[[str], Arrivals], inherited: Sequence[int], first: int
-) -> TimeAxis:
-    """Return the axis of a recording with the topics {name: type} that have messages, read by `arrivals`.
-
-    `inherited` are the zeros (ns) of what it was made from, `first` is its first log time (ns).
-    """
-    for name in anchors(types):
-        found = arrivals(name)
-        try:
-            stamps, received = found.stamps, found.receive_times
-        except SeriesError:  # of a foreign topic
-            continue
-        if stamps is not None and received is not None and len(stamps):
-            return TimeAxis(stamps, received, inherited)
-    only = np.array([first])
-    return TimeAxis(only, only, inherited)
 
 
 def _in_order(stamps: Times, received: Times) -> tuple[Times, Times]:

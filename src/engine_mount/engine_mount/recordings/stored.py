@@ -13,14 +13,23 @@ from mount_recorder.bag_writer import PIECE_RECORD
 from mount_recorder.losses import RECORDER_RECORD
 
 ACCOUNTS = ('rosbag2', RECORDER_RECORD, PIECE_RECORD)
-"""Metadata in which a recording tells of itself; one that is made of it has its own."""
+"""Metadata in which a recording describes itself; a recording made of it has its own."""
 
-HEAD = np.dtype([('topic', '<i8'), ('sequence', '<u4'), ('log_time', '<i8'), ('publish_time', '<i8')])
-"""What is told of a message beside its bytes: the number of its topic in the file, times in ns."""
+HEAD = np.dtype(
+    [
+        ('opcode', '<u1'),
+        ('length', '<i8'),
+        ('topic', '<u2'),
+        ('sequence', '<u4'),
+        ('log_time', '<i8'),
+        ('publish_time', '<i8'),
+    ]
+)
+"""What is known of a message beside its bytes, as MCAP stores it: the number of its topic, times in ns."""
 
 
 class StorageError(ValueError):
-    """A file holds no recording that can be read; the text says why."""
+    """A file holds no recording that can be read; the text gives the reason."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +60,10 @@ class StoredMessages:
     def __len__(self) -> int:
         return len(self.heads)
 
-    def of(self, topics: NDArray[np.int64]) -> 'StoredMessages':
+    def of(self, topics: Collection[int]) -> 'StoredMessages':
         """Return the messages of these topics alone."""
         number = self.heads['topic']
-        wanted = number == topics[0] if len(topics) == 1 else np.isin(number, topics)
+        wanted = np.logical_or.reduce([number == topic for topic in topics])
         return self if wanted.all() else self.at(np.flatnonzero(wanted))
 
     def at(self, places: NDArray[np.int64] | slice) -> 'StoredMessages':
@@ -66,21 +75,9 @@ class StoredMessages:
         raw = self.data[int(self.begins[place]) : int(self.ends[place])].tobytes()
         return raw, int(self.heads[place]['publish_time'])
 
-    def counts(self) -> dict[int, int]:
-        """Return the number of messages by topic."""
-        topics, counts = np.unique(self.heads['topic'], return_counts=True)
-        return dict(zip(topics.tolist(), counts.tolist(), strict=True))
-
-    def time_range(self) -> tuple[int, int]:
-        """Return the first and the last log time (ns) of messages, of which there is one at least."""
-        times = self.heads['log_time']
-        return int(times.min()), int(times.max())
-
     def beginnings(self, size: int) -> NDArray[np.uint8] | None:
         """Return the first `size` bytes of each message as rows, None if one of them is shorter."""
-        if (self.ends - self.begins < size).any():
-            return None
-        return rows_at(self.data, self.begins, size)
+        return None if (self.ends - self.begins < size).any() else rows_at(self.data, self.begins, size)
 
     def payloads(self) -> NDArray[np.uint8] | list[bytes]:
         """Return the bytes as rows if all messages have one length, else one by one."""
@@ -93,59 +90,49 @@ class StoredMessages:
 
 
 class StoredFile(ABC):
-    """One file of a recording; topics are told apart by numbers of its own.
+    """One file of a recording; each topic has a number in it.
 
     It is `whole` if nothing is known to be missing, `damaged` if messages are known to be lost inside of it,
-    and `proven` if what it says of itself can be relied upon.
+    and `proven` if its own account of its content can be relied upon.
     """
 
     whole: bool
     damaged: bool
     proven: bool
-    _times: tuple[int, int] | None
+    time_range: tuple[int, int] | None  # log times in ns, None without messages
 
     def __init__(self, path: Path):
         self.path = path
         self.topics: dict[int, StoredTopic] = {}
-        self.metadata: dict[str, dict[str, str]] = {}  # the last record of each name
-        self.records: list[tuple[str, dict[str, str]]] = []  # all of them
+        self.records: list[tuple[str, dict[str, str]]] = []  # of metadata
         self.warnings: list[str] = []
         self.lost_beside: list[str] = []  # names of metadata and attachments that are known to be lost
-        self._counts: dict[int, int] = {}
-        self._times = None
+        self.message_counts: dict[int, int] = {}  # by topic: as written where proven, else as readable
+        self.time_range = None
 
-    def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by topic: as written where that is proven, else as readable."""
-        return dict(self._counts)
-
-    def time_range(self) -> tuple[int, int] | None:
-        """Return the earliest and the latest log time (ns), None for a file without messages."""
-        return self._times
+    @property
+    def metadata(self) -> dict[str, dict[str, str]]:
+        """The last record of each name."""
+        return dict(self.records)
 
     @abstractmethod
     def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
         """Yield the messages of `topics` in the order of the file, unpacked where each is packed."""
 
     def attachments(self) -> Iterator[Attachment]:
-        """Yield what is attached, without what is damaged."""
+        """Yield the attachments without the damaged ones."""
         return iter(())
 
 
 def stored_messages(heads: np.ndarray, raws: list[bytes]) -> StoredMessages:
     """Return messages from their heads (n,) and their bytes one by one."""
-    ends = np.cumsum([len(raw) for raw in raws], dtype=np.int64)
-    begins = ends - np.array([len(raw) for raw in raws], np.int64)
-    return StoredMessages(heads, np.frombuffer(b''.join(raws), np.uint8), begins, ends)
-
-
-def united(one: tuple[int, int] | None, other: tuple[int, int]) -> tuple[int, int]:
-    """Return the range of time that holds two others."""
-    return other if one is None else (min(one[0], other[0]), max(one[1], other[1]))
+    lengths = np.array([len(raw) for raw in raws], np.int64)
+    ends = np.cumsum(lengths)
+    return StoredMessages(heads, np.frombuffer(b''.join(raws), np.uint8), ends - lengths, ends)
 
 
 def rows_at(data: NDArray[np.uint8], begins: NDArray[np.int64], width: int) -> NDArray[np.uint8]:
     """Return `width` bytes from each of `begins` on, which the caller knows to be inside of `data`."""
     if not (width and len(begins)):
         return np.empty((len(begins), width), np.uint8)
-    windows = np.lib.stride_tricks.as_strided(data, (data.size - width + 1, width), (1, 1), writeable=False)
-    return windows[begins]
+    return np.lib.stride_tricks.sliding_window_view(data, width)[begins]

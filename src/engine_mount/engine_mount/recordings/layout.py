@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from engine_mount.recordings.messages.definitions import NUMBERS, STRING, Definition
+from engine_mount.recordings.definitions import NUMBERS, STRING, Definition
 
 HEAD = 4  # bytes: kind of encoding and options
 OPTIONS = slice(2, HEAD)  # bytes of the head that say nothing of the content

@@ -1,19 +1,16 @@
-"""Columns of topics part by part, for recordings that are longer than the memory."""
+"""Chosen columns of topics, part by part, for recordings that are longer than the memory."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine_mount.recordings.messages.series import Column
-from engine_mount.recordings.messages.times import Times
-
-if TYPE_CHECKING:
-    from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Column
+from engine_mount.recordings.times import Times
 
 PART = 1 << 13
-"""Messages of a topic in a part, chosen: where nothing asks for more or fewer."""
+"""Messages of a topic in a part at most, chosen: where nothing asks for fewer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +31,9 @@ class ColumnPart:
 
 
 def column_parts(
-    recording: 'Recording', columns: Mapping[str, tuple[str, ...]], size: int = PART
+    recording: Recording, columns: Mapping[str, tuple[str, ...]], size: int = PART
 ) -> Iterator[ColumnPart]:
-    """Yield columns of topics, {topic: names}, in the order of the files, some `size` messages at a time."""
+    """Yield columns of topics, {topic: names}, in the order of the files, at most `size` messages each."""
     wanted = {recording.resolve(topic): names for topic, names in columns.items()}
     for series in recording.parts(wanted, size):
         found = {name: series[name] for name in wanted[series.topic] if name in series.names}

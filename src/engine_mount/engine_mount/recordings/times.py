@@ -1,4 +1,4 @@
-"""What the stamps of a topic with a fixed rate tell: samples missing, repeated, out of order.
+"""Times of messages in ns; samples that are missing, repeated or out of order by their stamps.
 
 The step between neighbouring stamps is rounded to whole sample periods. So a clock of the electronics
 that runs a little fast or slow, as every clock does, is not taken for lost samples, and where the rate
@@ -18,9 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.messages.times import NO_TIMES, Times, distinct, is_in, ordered
 from mount_recorder.stamp_watch import FARTHEST, LONGEST_PAUSE
 
+Times = NDArray[np.int64]
+
+NO_TIMES: Times = np.empty(0, np.int64)
 _NANOSECONDS = 1_000_000_000
 _LEAST_SAMPLES = 10
 _MOSTLY = 0.9  # share, chosen
@@ -29,6 +31,42 @@ _FOLLOWS = 0.05  # chosen: share of a stamp's distance by which the grid follows
 _NEAR = 3  # periods, chosen: a stamp farther off than that is no late one
 _MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
 _AROUND = 5  # samples, chosen: before and behind; so many stamps in a row may be misdated
+
+
+def distinct(times: Times) -> Times:
+    """Return the distinct times, rising; `np.unique` hashes them, which takes ten times as long."""
+    if bool((times[1:] > times[:-1]).all()):
+        return times
+    times = ordered(times)
+    return times[np.append(True, times[1:] > times[:-1])]
+
+
+def ordered(times: Times) -> Times:
+    """Return times sorted; no copy where they are."""
+    return times if bool((times[1:] >= times[:-1]).all()) else np.sort(times)
+
+
+def each_once(times: Times) -> tuple[Times, 'slice | NDArray[np.intp]']:
+    """Return the distinct times, rising, and where the first of each stands; no copies where they rise."""
+    if bool((times[1:] > times[:-1]).all()):
+        return times, slice(None)
+    return np.unique(times, return_index=True)
+
+
+def shared(times: Times, known: list[Times]) -> Times:
+    """Return the array in `known` that equals `times`, which is added if there is none."""
+    for each in known:
+        if np.array_equal(each, times):
+            return each
+    known.append(times)
+    return times
+
+
+def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
+    """Return which of the times are among `known`, which rise."""
+    if not len(known):
+        return np.zeros(len(times), bool)
+    return known[np.minimum(np.searchsorted(known, times), len(known) - 1)] == times
 
 
 @dataclass(frozen=True)

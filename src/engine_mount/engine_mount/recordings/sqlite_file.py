@@ -1,8 +1,7 @@
 """Reads one file of a bag in sqlite3 storage, rosbag2's own before MCAP.
 
 The source is never touched. What its writer had not yet brought into the database when it ended stands in a
-log beside it; with one, a copy is read, in which sqlite puts both together. A file packed as a whole is read
-from an unpacked copy.
+log beside it; with one, a copy is read, in which sqlite puts both together.
 """
 
 import shutil
@@ -14,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.container.stored import (
+from engine_mount.recordings.stored import (
     HEAD,
     StorageError,
     StoredFile,
@@ -22,9 +21,9 @@ from engine_mount.recordings.container.stored import (
     StoredTopic,
     stored_messages,
 )
-from engine_mount.recordings.container.unpacking import COMPRESSED_SUFFIXES, plain, unpack
+from engine_mount.recordings.unpacking import plain
 
-_AT_ONCE = 1000  # rows
+_AT_ONCE = 5000  # rows, chosen
 # A column may hold any type, whatever was declared; a name or a text that is no UTF-8 is a `ValueError`.
 _UNREADABLE = (sqlite3.Error, ValueError, TypeError, KeyError, OverflowError)
 _LOGS = ('-wal', '-journal')  # behind the name of the database
@@ -41,7 +40,7 @@ class SqliteFile(StoredFile):
         if not path.is_file():
             raise StorageError(f'{path} cannot be read: no such file')
         try:
-            self._base = self._connected()
+            self._base = self._connect()
             self._read_topics()
         except _UNREADABLE as error:
             raise StorageError(f'{path} is no readable sqlite3 bag: {error}') from None
@@ -56,40 +55,32 @@ class SqliteFile(StoredFile):
         return self.proven and not self.damaged
 
     def blocks(self, topics: Collection[int]) -> Iterator[StoredMessages]:
-        marks = ','.join(map(str, sorted(topics)))
-        wanted = f'topic_id IN ({marks}) ORDER BY timestamp, id'
-        query = f'SELECT topic_id, timestamp, data FROM messages WHERE {wanted}'
+        wanted = f'topic_id IN ({",".join(map(str, topics))}) ORDER BY timestamp, id'
         try:
-            cursor = self._base.execute(query)
+            cursor = self._base.execute(f'SELECT topic_id, timestamp, data FROM messages WHERE {wanted}')
             while rows := cursor.fetchmany(_AT_ONCE):
-                yield plain(_messages(rows))
+                numbers, times, raws = zip(*rows, strict=True)
+                heads = np.zeros(len(rows), HEAD)  # it has one time of a message, and no number
+                heads['topic'], heads['log_time'], heads['publish_time'] = numbers, times, times
+                yield plain(stored_messages(heads, list(raws)))
         except _UNREADABLE as error:
             self.damaged = True
             self.warnings.append(f'{self.path.name}: the rest of its messages is not readable ({error})')
 
-    def _connected(self) -> sqlite3.Connection:
-        packed = self.path.suffix in COMPRESSED_SUFFIXES
-        if not packed and not self._logs:
+    def _connect(self) -> sqlite3.Connection:
+        if not self._logs:
             return sqlite3.connect(f'{self.path.absolute().as_uri()}?mode=ro&immutable=1', uri=True)
         folder = Path(tempfile.mkdtemp(prefix='engine_mount_'))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        copy = folder / (self.path.stem if packed else self.path.name)
         try:
-            if packed:
-                with self.path.open('rb') as source, copy.open('wb') as target:
-                    unpack(source, target, self.path.suffix)
-            for file in () if packed else (self.path, *self._logs):
+            for file in (self.path, *self._logs):
                 shutil.copyfile(file, folder / file.name)
         except OSError as error:
-            what = (
-                'cannot be unpacked'
-                if packed
-                else 'was not closed and cannot be copied to be read with its log'
-            )
             raise StorageError(
-                f'{self.path} {what}: {error.strerror}; make room in {tempfile.gettempdir()}'
+                f'{self.path} cannot be copied to be read: {error.strerror}; '
+                f'make room in {tempfile.gettempdir()}'
             ) from None
-        return sqlite3.connect(copy)
+        return sqlite3.connect(folder / self.path.name)
 
     def _read_topics(self) -> None:
         cursor = self._base.execute('SELECT * FROM topics')
@@ -97,38 +88,29 @@ class SqliteFile(StoredFile):
         definitions = self._definitions()
         for row in cursor.fetchall():
             topic = dict(zip(columns, row, strict=True))
-            number, type_name = int(topic['id']), str(topic['type'])
-            encoding, text = definitions.get(type_name, ('', ''))
-            details = {
-                'offered_qos_profiles': str(topic.get('offered_qos_profiles') or ''),
-                'topic_type_hash': str(topic.get('type_description_hash') or ''),
-            }
-            self.topics[number] = StoredTopic(
+            encoding, text = definitions.get(str(topic['type']), ('', ''))
+            self.topics[int(topic['id'])] = StoredTopic(
                 name=str(topic['name']),
-                type=type_name,
+                type=str(topic['type']),
                 encoding=str(topic['serialization_format']),
                 definition=text.encode(),
                 definition_encoding=encoding,
-                details=details,
+                details={
+                    'offered_qos_profiles': str(topic.get('offered_qos_profiles') or ''),
+                    'topic_type_hash': str(topic.get('type_description_hash') or ''),
+                },
             )
         counts = self._base.execute('SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id')
-        self._counts = dict(counts.fetchall())
-        first, last = self._base.execute('SELECT MIN(timestamp), MAX(timestamp) FROM messages').fetchone()
-        self._times = None if first is None else (first, last)
+        self.message_counts = dict(counts.fetchall())
+        times = "SELECT MIN(timestamp), MAX(timestamp) FROM messages WHERE typeof(timestamp) = 'integer'"
+        first, last = self._base.execute(times).fetchone()
+        self.time_range = None if first is None else (first, last)
 
     def _definitions(self) -> dict[str, tuple[str, str]]:
         """Return {type: (encoding, text)}; older bags have none."""
         query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
         try:
             rows = self._base.execute(query).fetchall()
-            return {str(kind): (str(encoding), str(text)) for kind, encoding, text in rows}
-        except _UNREADABLE:
+        except sqlite3.Error:
             return {}
-
-
-def _messages(rows: list[tuple[int, int, bytes]]) -> StoredMessages:
-    """Return rows of the database; it tells one time of a message, and no number."""
-    heads = np.zeros(len(rows), HEAD)
-    heads['topic'], heads['log_time'] = [row[0] for row in rows], [row[1] for row in rows]
-    heads['publish_time'] = heads['log_time']
-    return stored_messages(heads, [row[2] for row in rows])
+        return {str(kind): (str(encoding), str(text)) for kind, encoding, text in rows}

@@ -56,6 +56,13 @@ class Definition:
     name: str
     types: Mapping[str, Fields]
 
+    @property
+    def has_stamp(self) -> bool:
+        """Whether its messages begin with a header, and this with a stamp."""
+        first = next(iter(self.types[self.name].values()))
+        stamp = next(iter(self.types.get('std_msgs/Header', {}).values()), None)
+        return first == Field('std_msgs/Header') and stamp == Field('builtin_interfaces/Time')
+
 
 @cache
 def text_definition(type_name: str, text: str) -> Definition:
@@ -81,6 +88,24 @@ def text_definition(type_name: str, text: str) -> Definition:
 def installed_definition(type_name: str) -> Definition:
     """Return the definition of an installed type; raises `ValueError` if there is none."""
     return text_definition(type_name, schema_text(type_name))
+
+
+def definition_of(type_name: str, text: bytes, encoding: str) -> tuple[Definition | None, str]:
+    """Return the definition in a recording, or the installed one and a sentence why that one is used."""
+    obstacle = ''
+    if text.strip() and encoding != 'ros2msg':
+        obstacle = f'its definition is written in {encoding!r}, not in ros2msg'
+    elif text.strip():
+        try:
+            return text_definition(type_name, text.decode()), ''
+        except (DefinitionError, UnicodeDecodeError) as error:
+            obstacle = f'the definition of {type_name} in the recording is not readable ({error})'
+    try:
+        return installed_definition(type_name), obstacle
+    except ValueError:
+        if obstacle:
+            return None, f'{obstacle}, and the type is not installed'
+        return None, f'type {type_name!r} is not installed and the recording does not define it'
 
 
 def _fields(text: str, owner: str) -> Fields:

@@ -4,14 +4,15 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.messages.definitions import Definition, installed_definition
-from engine_mount.recordings.messages.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
-from engine_mount.recordings.messages.times import NO_TIMES, Times
+from engine_mount.recordings.definitions import Definition, installed_definition
+from engine_mount.recordings.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
+from engine_mount.recordings.times import NO_TIMES, Times
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
@@ -21,11 +22,13 @@ _SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
 STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
 """Where the stamp stands in a message: paths, and places in their runs of numbers."""
 STAMP_BYTES = 8
+STAMP_END = HEAD + STAMP_BYTES
+_LITTLE_ENDIAN = (0, 1)  # the first bytes of a message: plain CDR
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 
 
 class SeriesError(ValueError):
-    """What was asked of a topic is not in its messages; the text says what is."""
+    """The messages of a topic have no such column or message; the text has those that are there."""
 
 
 class Payloads:
@@ -53,22 +56,6 @@ class Payloads:
         return Payloads([found])
 
 
-class Heads(NamedTuple):
-    """When messages were received and sent (ns), and the numbers that their publisher gave them.
-
-    `sent` is None where only columns were read.
-    """
-
-    received: Times
-    sequences: NDArray[np.uint32]
-    sent: Times | None
-
-
-def heads_of(heads: np.ndarray) -> Heads:
-    """Return heads of dtype `HEAD` (n,) as columns."""
-    return Heads(*(np.ascontiguousarray(heads[name]) for name in ('log_time', 'sequence', 'publish_time')))
-
-
 class Series:
     """The messages of one topic in the order in which they were recorded.
 
@@ -83,77 +70,77 @@ class Series:
         self,
         topic: str,
         type_name: str,
-        payloads: 'Payloads | Callable[[], Series]',
-        heads: 'Heads',
+        messages: tuple[Payloads, np.ndarray] | Callable[[], tuple[Payloads, np.ndarray]],
         *,
         definition: Definition | None = None,
-        columns: Mapping[str, Column] | None = None,
-        stamps: Times | None = None,
         obstacle: str = '',
         zero: int = 0,
         units: Mapping[str, str] | None = None,
     ):
-        """Take messages with their `definition`, or the sentence why there is none.
+        """Take bytes and heads (dtype `HEAD`) of the messages, or a function that reads them when needed.
 
-        Without both the installed type tells the fields. `zero` (ns) is where `time` begins; `units` are
-        those that the recording tells of fields that no registry knows. A function in
-        place of `payloads` reads the topic anew where something else than `columns` and `stamps` is wanted.
+        `definition` is that of the type, or `obstacle` the reason why there is none; without both the
+        installed type counts. `zero` (ns) is where `time` begins; `units` are those that the recording has
+        for fields that no registry knows.
         """
         self.topic = topic
         self.type = type_name
-        self._heads = heads
-        self._payloads = payloads
-        self.columns = dict(columns or {})
-        if stamps is not None:
-            self.stamps = stamps
+        self.columns: dict[str, Column] = {}
         self.registered: Topic | None = registered_topic(topic, type_name)
-        self._known_definition = definition
-        self._obstacle = obstacle
-        self._zero = zero
-        self._told_units = dict(units or {})
+        self._source = messages
+        self._known_definition, self._obstacle = definition, obstacle
+        self._zero, self._units = zero, units or {}
 
     def __len__(self) -> int:
-        return len(self._heads.received)
+        return len(self.receive_times)
 
-    @property
+    def add_columns(self, columns: Mapping[str, Column], received: Times, stamps: Times | None) -> None:
+        """Take columns and times (ns) of all messages, which then need not be read for them."""
+        self.columns |= columns
+        self.receive_times = received
+        if stamps is not None:
+            self.stamps = stamps
+
+    @functools.cached_property
     def receive_times(self) -> Times:
         """When the messages came in, ns."""
-        return self._heads.received
+        return np.ascontiguousarray(self._messages[1]['log_time'])
 
     @property
     def publish_times(self) -> Times:
         """When the messages were sent, ns."""
-        if self._heads.sent is None:
-            self._read()
-        assert self._heads.sent is not None
-        return self._heads.sent
+        return np.ascontiguousarray(self._messages[1]['publish_time'])
 
     @property
     def sequences(self) -> NDArray[np.uint32]:
         """The numbers that the publisher gave the messages."""
-        return self._heads.sequences
+        return np.ascontiguousarray(self._messages[1]['sequence'])
 
     @property
     def payloads(self) -> Payloads:
         """The serialised messages."""
-        return self._payloads if isinstance(self._payloads, Payloads) else self._read()
+        return self._messages[0]
 
     @property
     def loaded(self) -> bool:
         """Whether the messages are in memory, not only `columns` of them."""
-        return isinstance(self._payloads, Payloads)
+        return isinstance(self._source, tuple)
 
-    def _read(self) -> Payloads:
-        """Read what is not yet there of the topic."""
-        if not isinstance(self._payloads, Payloads):
-            whole = self._payloads()
-            self._payloads, self._heads = whole.payloads, whole._heads
-        return self._payloads
+    @property
+    def _messages(self) -> tuple[Payloads, np.ndarray]:
+        if not isinstance(self._source, tuple):
+            self._source = self._source()
+        return self._source
 
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        found = [NO_TIMES]
+        found, rows = [NO_TIMES], self.payloads.rows
+        if rows is not None and rows.shape[1] >= STAMP_END and self._definition.has_stamp:
+            beginnings = np.ascontiguousarray(rows[:, :STAMP_END])
+            if (beginnings[:, :2] == _LITTLE_ENDIAN).all():
+                times = beginnings.view('V4,<i4,<u4')[:, 0]
+                return np.asarray(times['f1'].astype(np.int64) * 1_000_000_000 + times['f2'])
         for layout, rows in self._layouts:
             if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
                 raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
@@ -168,16 +155,9 @@ class Series:
             seconds = self.layout.numbers.get(_SECONDS)
             return None if seconds is None else seconds.offset
         try:
-            definition = self._definition
+            return HEAD if self._definition.has_stamp else None
         except SeriesError:
             return None
-        kind = definition.name
-        for name in _SECONDS.split('.'):  # each the first one of its kind
-            first, field = next(iter(definition.types[kind].items()))
-            if first != name:
-                return None
-            kind = field.kind
-        return HEAD
 
     @functools.cached_property
     def time(self) -> Column:
@@ -202,8 +182,6 @@ class Series:
             if self.layout is None:
                 raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
             return tuple(path for path, numbers in self.layout.numbers.items() if numbers.count == 1)
-        if self.layout is not None:
-            return tuple(_names_in(self.layout))
         self._check_part('name')
         return tuple(dict.fromkeys(name for layout, _ in self._layouts for name in _names_in(layout)))
 
@@ -222,12 +200,13 @@ class Series:
         return self._joint_column(name, 'velocity')
 
     def unit(self, name: str) -> str:
-        """Return the unit of `series[name]`, empty where neither registry nor recording tell it."""
-        return self.registered.unit(name) if self.registered else self._told_units.get(name, '')
+        """Return the unit of `series[name]`, empty where neither registry nor recording has it."""
+        return self.registered.unit(name) if self.registered else self._units.get(name, '')
 
     def derivative_unit(self, name: str) -> str:
         """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""
-        return next((scalar.derivative_unit for scalar in self._scalars() if scalar.name == name), '')
+        scalars: tuple[Scalar, ...] = self.registered.scalars if self.registered else ()
+        return next((scalar.derivative_unit for scalar in scalars if scalar.name == name), '')
 
     def message(self, index: int) -> Any:
         """Return message `index` as an object with its fields as attributes; raises `SeriesError`."""
@@ -251,9 +230,6 @@ class Series:
         """Yield all messages."""
         return (self.message(index) for index in range(len(self)))
 
-    def _scalars(self) -> tuple[Scalar, ...]:
-        return self.registered.scalars if self.registered else ()
-
     @functools.cached_property
     def layout(self) -> Layout | None:
         """The common layout of all messages, None where they differ or cannot be read in place."""
@@ -268,14 +244,13 @@ class Series:
 
     @functools.cached_property
     def _definition(self) -> Definition:
-        if self._obstacle:
-            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {self._obstacle}')
-        if self._known_definition is not None:
-            return self._known_definition
         try:
-            return installed_definition(self.type)
+            if not self._obstacle:
+                return self._known_definition or installed_definition(self.type)
+            obstacle = self._obstacle
         except ValueError as error:
-            raise SeriesError(f'{self.topic}: only its raw bytes can be read: {error}') from None
+            obstacle = str(error)
+        raise SeriesError(f'{self.topic}: only its raw bytes can be read: {obstacle}')
 
     @functools.cached_property
     def _layouts(self) -> list[tuple[Layout, NDArray[np.uint8]]]:
@@ -302,9 +277,10 @@ class Series:
         if name not in self.names:
             known = ', '.join(self.names) or 'no messages'
             raise SeriesError(f'{self.topic} has no {name!r}; it has {known}')
-        if len(self):
-            self._check_part(part)
-        found = [np.empty(0)]
+        if not len(self):
+            return np.empty(0)
+        self._check_part(part)
+        found = []
         for layout, rows in self._layouts:
             names, numbers = _names_in(layout), layout.numbers.get(part)
             if numbers is not None and name in names and numbers.count == len(names):
@@ -325,6 +301,26 @@ class Series:
                 raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
             found.append(numbers.column(rows, place).astype(np.float64))
         return np.concatenate(found)
+
+
+@dataclass(frozen=True)
+class TopicTimes:
+    """Times in ns in the order of the recording; `obstacle` is the reason where `stamps` are None.
+
+    `receive_times` and `publish_times` are None where nobody needs them.
+    """
+
+    topic: str
+    type: str
+    count: int
+    stamps: Times | None
+    receive_times: Times | None
+    publish_times: Times | None
+    names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
+    obstacle: str = ''
+
+    def __len__(self) -> int:
+        return self.count
 
 
 def _names_in(layout: Layout) -> list[str]:
