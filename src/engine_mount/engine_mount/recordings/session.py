@@ -15,6 +15,9 @@ from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPL
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import SESSION
 
+_OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to run and explains nothing
+_LISTED = 3  # parameters that only one names
+
 
 class SessionError(ValueError):
     """A session message is not understood; the text says why."""
@@ -26,18 +29,14 @@ def session_content(text: str) -> dict[str, Any]:
         content = plain_yaml(text)
     except YamlError as error:
         raise SessionError(f'session {error}') from None
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
+    if content is not None and not isinstance(content, dict):
         raise SessionError(f'session is a {type(content).__name__} instead of keys with values')
-    return content
+    return content or {}
 
 
 def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: value}} of a session, {} where it tells none."""
-    found = content.get('parameters')
-    nodes = found.items() if isinstance(found, dict) else ()
-    return {str(node): values for node, values in nodes if isinstance(values, dict)}
+    return {str(node): values for node, values in _mapping(content, 'parameters') if isinstance(values, dict)}
 
 
 def session_sample_rate(content: Mapping[str, Any]) -> float:
@@ -52,9 +51,12 @@ def session_sample_rate(content: Mapping[str, Any]) -> float:
 def session_values(text: str) -> dict[str, Any]:
     """Return {name: value} of a session text; parameters are named as `--set` names them."""
     try:
-        return _flat(plain_yaml(text))
+        content = plain_yaml(text)
     except YamlError:
-        return {'text': text}
+        content = text
+    return _flat(
+        content if isinstance(content, Mapping) else {'text': content} if content is not None else {}
+    )
 
 
 def recorded_sessions(recording: Recording) -> dict[str, str]:
@@ -83,50 +85,6 @@ def recorded_sample_rate(recording: Recording, namespace: str = '/') -> float:
         return SAMPLE_RATE
 
 
-def _flat(content: Any, prefix: str = '') -> dict[str, Any]:
-    """Return {path: value}; the common root of all parameters is left out."""
-    if not isinstance(content, Mapping):
-        return {prefix or 'text': content} if content is not None else {}
-    flat: dict[str, Any] = {}
-    for key, value in content.items():
-        root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
-        flat.update(_flat(value, root) if isinstance(value, Mapping) else {root: value})
-    return flat
-
-
-_OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to run and explains nothing
-_LISTED = 3  # parameters that only one names
-
-
-def session_differences(a: str, b: str) -> list[str]:
-    """Return a sentence for each difference of two sessions (YAML texts), changed values first."""
-    one, other = session_values(a), session_values(b)
-    changed = [
-        f'{name} is {_shown(one[name])} in A, {_shown(other[name])} in B'
-        for name in one
-        if name in other and not _same(one[name], other[name]) and not _OF_THE_MOMENT.fullmatch(name)
-    ]
-    return [*changed, *_only('A', one, other), *_only('B', other, one)]
-
-
-def _same(one: Any, other: Any) -> bool:
-    both_unknown = isinstance(one, float) and isinstance(other, float) and one != one and other != other
-    return both_unknown or one == other
-
-
-def _only(where: str, present: Mapping[str, Any], absent: Mapping[str, Any]) -> list[str]:
-    names = [name for name in present if name not in absent and not _OF_THE_MOMENT.fullmatch(name)]
-    if not names:
-        return []
-    shown = ', '.join(f'{name} ({_shown(present[name])})' for name in names[:_LISTED])
-    more = f' and {len(names) - _LISTED} more' if len(names) > _LISTED else ''
-    return [f'only {where} tells {shown}{more}']
-
-
-def _shown(value: Any) -> str:
-    return f'{value:g}' if isinstance(value, float) else str(value)
-
-
 def told_session(recording: Recording) -> dict[str, Any]:
     """Return the content of the session, of several mounts that of the first, {} where none can be read."""
     try:
@@ -134,6 +92,29 @@ def told_session(recording: Recording) -> dict[str, Any]:
         return session_content(text)
     except (SessionError, SeriesError, ReadingError):
         return {}
+
+
+def session_differences(a: str, b: str) -> list[str]:
+    """Return a sentence for each difference of two sessions (YAML texts), changed values first."""
+    values = [
+        {name: value for name, value in session_values(text).items() if not _OF_THE_MOMENT.fullmatch(name)}
+        for text in (a, b)
+    ]
+    shown = [
+        {name: f'{value:g}' if isinstance(value, float) else str(value) for name, value in each.items()}
+        for each in values
+    ]
+    found = [
+        f'{name} is {text} in A, {shown[1][name]} in B'
+        for name, text in shown[0].items()
+        if name in shown[1] and not _same(values[0][name], values[1][name])
+    ]
+    for where, place in (('A', 0), ('B', 1)):
+        alone = [f'{name} ({text})' for name, text in shown[place].items() if name not in shown[1 - place]]
+        if alone:
+            more = f' and {len(alone) - _LISTED} more' if len(alone) > _LISTED else ''
+            found.append(f'only {where} tells {", ".join(alone[:_LISTED])}{more}')
+    return found
 
 
 def started_of(content: Mapping[str, Any], recording: Recording) -> datetime | None:
@@ -159,32 +140,48 @@ def duration_of(content: Mapping[str, Any], recording: Recording) -> float | Non
 
 
 def versions_told(content: Mapping[str, Any]) -> dict[str, str]:
-    """Return the versions with which a recording was made, {} where its session tells none."""
-    replay = content.get('replay')
-    known = (replay if isinstance(replay, Mapping) else content).get('versions')
-    return {str(name): str(value) for name, value in known.items()} if isinstance(known, Mapping) else {}
-
-
-def version_differences(session: Mapping[str, Any], here: Mapping[str, str]) -> dict[str, str | None]:
-    """Return {what: recorded version} of all that is another one here, None where the session does not tell.
+    """Return the versions with which a recording was made, {} where its session tells none.
 
     A recorded replay has its own versions beside those of the drive; its answers are of its own.
     """
-    replay = session.get('replay')
-    recorded = (replay if isinstance(replay, Mapping) else session).get('versions')
-    known = recorded if isinstance(recorded, Mapping) else {}
-    versions = {name: str(known[name]) if name in known else None for name in here}
-    return {name: version for name, version in versions.items() if version != here[name]}
+    replay = content.get('replay')
+    source = replay if isinstance(replay, Mapping) else content
+    return {str(name): str(value) for name, value in _mapping(source, 'versions')}
+
+
+def version_differences(session: Mapping[str, Any], here: Mapping[str, str]) -> dict[str, str | None]:
+    """Return {what: recorded version} of what is another one here, None where the session does not tell."""
+    known = versions_told(session)
+    return {name: known.get(name) for name in here if known.get(name) != here[name]}
 
 
 def versions_sentence(differences: Mapping[str, str | None], here: Mapping[str, str]) -> str:
     """Return the sentence about what `version_differences` found."""
+    others = [f'{name} {old} (here {here[name]})' for name, old in differences.items() if old is not None]
+    missing = [name for name, old in differences.items() if old is None]
     if not differences:
         return 'the recording was made with the same versions on the same kind of processor'
-    others = [f'{name} {old} (here {here[name]})' for name, old in differences.items() if old is not None]
-    untold = [name for name, old in differences.items() if old is None]
-    if len(untold) == len(here):
+    if len(missing) == len(here):
         return 'the recording does not tell with which versions and on which processor it was made'
-    text = 'the recording was made with '
-    text += f'others than here: {", ".join(others)}' if others else 'the same versions as far as it tells'
-    return text + (f'; it does not tell {", ".join(untold)}' if untold else '')
+    which = f'others than here: {", ".join(others)}' if others else 'the same versions as far as it tells'
+    more = f'; it does not tell {", ".join(missing)}' if missing else ''
+    return f'the recording was made with {which}{more}'
+
+
+def _mapping(content: Mapping[str, Any], key: str) -> list[tuple[Any, Any]]:
+    found = content.get(key)
+    return list(found.items()) if isinstance(found, Mapping) else []
+
+
+def _flat(content: Mapping[Any, Any], prefix: str = '') -> dict[str, Any]:
+    """Return {path: value}; the common root of all parameters is left out."""
+    flat: dict[str, Any] = {}
+    for key, value in content.items():
+        root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
+        flat |= _flat(value, root) if isinstance(value, Mapping) else {root or 'text': value}
+    return flat
+
+
+def _same(one: Any, other: Any) -> bool:
+    both_unknown = isinstance(one, float) and isinstance(other, float) and one != one and other != other
+    return both_unknown or one == other
