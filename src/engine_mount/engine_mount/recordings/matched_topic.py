@@ -16,6 +16,7 @@ from engine_mount.recordings.alignment import (
     samples_of,
 )
 from engine_mount.recordings.difference import Column, Places, Quantity, SignalDifference, signal_difference
+from engine_mount.recordings.layout import Numbers
 from engine_mount.recordings.series import STAMP, Series, SeriesError
 from engine_mount.recordings.tolerances import Tolerances
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
@@ -182,14 +183,15 @@ class MatchedTopic:
             return self.samples
         different = np.zeros(self.samples, bool)
         for path, numbers in a.numbers.items():
-            for place in range(numbers.count):
-                if not self._is_shown(path, place):
-                    one, other = (
-                        numbers.column(each[places], place)
-                        for each, places in zip(rows, (self._places_a, self._places_b), strict=True)
-                    )
-                    unknown = (one != one) & (other != other)
-                    different |= ~unknown & (one.view(f'u{one.itemsize}') != other.view(f'u{one.itemsize}'))
+            hidden = [place for place in range(numbers.count) if not self._is_shown(path, place)]
+            if hidden:
+                one, other = (
+                    _run(numbers, each[places])[:, hidden]
+                    for each, places in zip(rows, (self._places_a, self._places_b), strict=True)
+                )
+                bits = f'u{numbers.dtype.itemsize}'
+                unlike = (one.view(bits) != other.view(bits)) & ~((one != one) & (other != other))
+                different |= unlike.any(axis=1)
         return int(np.count_nonzero(different))
 
     def _is_shown(self, path: str, place: int) -> bool:
@@ -237,6 +239,12 @@ class MatchedTopic:
         except (ForceTableMessageError, SeriesError):
             return None
         return (a, b) if a.current.shape == b.current.shape else None
+
+
+def _run(numbers: Numbers, rows: NDArray[np.uint8]) -> NDArray[Any]:
+    """Return a run of numbers, messages x numbers."""
+    size = numbers.count * numbers.dtype.itemsize
+    return np.ascontiguousarray(rows[:, numbers.offset : numbers.offset + size]).view(numbers.dtype)
 
 
 def _in_turn(series: Series) -> Samples:
