@@ -1,4 +1,4 @@
-"""What the tests of all packages share: the fixtures of `mount_ros.testing`, and examples that repeat.
+"""What the tests of all packages share: the fixtures of `ros_testing`, and examples that repeat.
 
 In continuous integration a skip that `EXPECTED_SKIPS` does not name fails the run.
 
@@ -22,7 +22,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 prepare_environment()  # of the log too, whose form the first message of a process settles
 
-pytest_plugins = ['mount_ros.testing']
+pytest_plugins = ['ros_testing']
 
 settings.register_profile('repeatable', derandomize=True, deadline=None)
 settings.register_profile(

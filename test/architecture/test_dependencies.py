@@ -63,8 +63,9 @@ def imported(files: Sequence[Path]) -> set[str]:
     beside = {
         path.stem for file in files for path in file.parent.glob('*.py') if 'test' in file.parent.parts[-2:]
     }
+    support = {path.stem for path in (SOURCES.parent / 'test' / 'support').glob('*.py')}
     found = {module.split('.')[0] for file in files for module in modules_of(file)}
-    return found - beside - sys.stdlib_module_names
+    return found - support - beside - sys.stdlib_module_names
 
 
 def keys(modules: Iterable[str]) -> set[str]:

@@ -13,8 +13,8 @@ FLOORS = (
     ('mount_models',),
     ('mount_ros',),
     ('mount_driver', 'mount_init', 'mount_control', 'mount_recorder'),
-    ('engine_mount.recordings',),  # below the simulator as long as that reads recorded excitations itself
     ('mount_sim',),
+    ('engine_mount.recordings',),  # below the launch files as long as one plays a recording
     ('mount_bringup',),
     ('engine_mount.settings',),
     ('engine_mount.signals',),

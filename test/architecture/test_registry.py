@@ -30,13 +30,12 @@ from mount_ros.topics import (
     Delivery,
     Topic,
 )
-from mount_sim.excitation.road import Gap, RandomRoad, Sweep
+from mount_sim.excitation.road import RandomRoad
 from mount_sim.plant.closing import ClosingMechanics
-from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.hydromount import Hydromount
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil
-from mount_sim.plant.vehicle import Vehicle
+from mount_sim.plant.vehicle import Elastomer, Vehicle
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
@@ -54,7 +53,6 @@ PARAMETER_SETS = {
     ),
     ('src/mount_sim/README.md', 'Parameters of the laws'): (
         ReluctanceActuator, RippleCoil, ClosingMechanics, Elastomer, Hydromount, Vehicle, RandomRoad,
-        Gap, Sweep,
     ),
 }  # fmt: skip
 

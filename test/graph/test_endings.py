@@ -8,11 +8,11 @@ import signal
 import subprocess
 
 import pytest
+from ros_testing import wait_until
 
 import engine_mount
 from engine_mount.recordings.audit.audit import audit
 from engine_mount.recordings.audit.losses import losses
-from mount_ros.testing import wait_until
 
 # One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
 ENDLESS = (

@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from ros_testing import free_domain
 
 from engine_mount.faults.case import MATRIX, SAFE, Reaction
-from mount_ros.testing import free_domain
 
 QUICK = (
     'can_silent',

@@ -10,6 +10,7 @@ import time
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
+from ros_testing import wait_until
 from std_msgs.msg import String
 from typer.testing import CliRunner
 
@@ -18,7 +19,6 @@ from engine_mount.cli.command import app
 from engine_mount.recordings.events.recorded_events import read_marks
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT
 
 PERIOD = 1_000_000  # ns

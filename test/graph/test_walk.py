@@ -7,10 +7,10 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from ros_testing import wait_until
 from std_srvs.srv import Trigger
 
 from mount_ros.nodes.process import ros_context
-from mount_ros.testing import wait_until
 
 LIMIT = 180.0  # s: other tests run at the same time, only a failure takes so long
 STEP = 0.5  # s: how often the process is looked at while a service is awaited

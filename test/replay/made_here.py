@@ -18,10 +18,10 @@ from threadpoolctl import threadpool_info
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import CORE, ReplayOrder, replay
+from engine_mount.signals.excitation import build_excitation
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
 from mount_recorder.session import session_text
-from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 
 DRIVE = {

@@ -20,6 +20,7 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.chosen import policy_of
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
@@ -27,9 +28,8 @@ from mount_models.damper import damper_curve
 from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.topics import Topic
-from mount_sim.excitation.building import build_excitation
 from mount_sim.mount_choice import with_control_of_mount
-from mount_sim.plant.simulated_mount import DivergedError
+from mount_sim.plant.simulated_car import DivergedError
 
 PAPER = {'policy': 'switched_viscous'}
 PERIOD = 0.125  # s, of 8 Hz

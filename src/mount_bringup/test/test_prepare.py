@@ -8,7 +8,7 @@ from mount_bringup.prepare import prepare
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros.nodes.process import ros_context, transition
-from mount_ros.testing import compiled_so_far
+from ros_testing import compiled_so_far
 from mount_sim.node import MountSim
 
 prepare(scenarios=['motorway'], policies=['continuous_viscous'])

@@ -3,10 +3,10 @@
 import time
 
 import pytest
+from ros_testing import LIMIT, wait_until
 
 from mount_bringup.graph import processes
 from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, GraphSettings
-from mount_ros.testing import LIMIT, wait_until
 
 PRIORITY = 'import os; print(os.environ["ENGINE_MOUNT_PRIORITY"])'
 

@@ -9,6 +9,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
+from ros_testing import LIMIT
 from std_srvs.srv import Trigger
 
 from mount_bringup.graph import supervisor
@@ -26,7 +27,6 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.graph.recovery import Recovery, initialise_again
 from mount_bringup.graph.supervisor import Supervisor
-from mount_ros.testing import LIMIT
 
 LABELS = {CONFIGURE: 'configure', DEACTIVATE: 'deactivate'}
 DRIVING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '0',

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from ros_testing import LIMIT, wait_until
 
 import mount_models
 from mount_bringup.graph.nodes import GraphError
@@ -19,7 +20,6 @@ from mount_bringup.graph.replay import REPLAY_ARGUMENTS, replay_order
 from mount_models.quantity import ParameterError
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.session import session_message, session_text
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import SESSION
 
 RECORDED = {'quality': 0.7, 'friction.scale': 0.8, 'parameters_file': 'gone.yaml', 'of_yesterday': 1}

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from ros_testing import wait_until
 
 from engine_mount.recordings.recording import open_recording
 from mount_bringup.graph.run import GRAPHS
-from mount_ros.testing import wait_until
 
 LIMIT = 240.0  # s: only a hang takes so long
 REFERENCE = Path(__file__).resolve().parents[3] / 'bags' / 'reference' / 'gap'

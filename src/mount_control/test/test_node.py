@@ -13,6 +13,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
+from ros_testing import wait_until
 from std_msgs.msg import String
 
 from mount_control.controller import ControlLaw, Controller
@@ -32,7 +33,6 @@ from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import wait_until
 
 SOURCES = Path(__file__).parents[2]
 MS = 1_000_000  # ns

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from mount_ros.testing import free_domain
+from ros_testing import free_domain
 
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))

@@ -3,10 +3,11 @@
 import threading
 import time
 
+from ros_testing import LIMIT, wait_until
+
 from mount_driver.bus import open_bus
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, Measurement, MountCodec, Setpoint, Status
-from mount_ros.testing import LIMIT, wait_until
 
 CODEC = MountCodec()
 

@@ -7,6 +7,7 @@ import textwrap
 
 import pytest
 from far_end import CODEC, FarEnd, sample
+from ros_testing import LIMIT, wait_until
 
 from mount_driver import exchange as exchange_module
 from mount_driver.can_library import can
@@ -15,7 +16,6 @@ from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import Setpoint, Status
-from mount_ros.testing import LIMIT, wait_until
 
 OFF = Setpoint(0.0, 0xFFFF, False)
 MS = 1_000_000

@@ -6,6 +6,7 @@ import msgpack
 from far_end import CODEC, sample
 from hypothesis import given
 from hypothesis import strategies as st
+from ros_testing import mutated
 
 from mount_driver.bus import Frame, _message
 from mount_driver.can_library import pack_message
@@ -13,7 +14,6 @@ from mount_driver.clock import CounterClock
 from mount_driver.layout import FrameError
 from mount_driver.link import Link
 from mount_driver.protocol import Status
-from mount_ros.testing import mutated
 
 SEEDS = st.integers(0, 1 << 62)
 SOUND = bytes(CODEC.encode_measurement(sample(1), 1))

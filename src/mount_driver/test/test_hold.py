@@ -6,6 +6,7 @@ import threading
 import pytest
 from car import GOOD, MS, Car
 from far_end import CODEC, sample
+from ros_testing import wait_until
 
 from mount_driver import exchange as exchange_module
 from mount_driver.bus import Frame
@@ -14,7 +15,6 @@ from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import AliveCounter, Setpoint, Status
-from mount_ros.testing import wait_until
 
 HOLD = 20 * MS
 

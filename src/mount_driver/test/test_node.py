@@ -18,6 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from ros_testing import LIMIT, wait_until
 
 from mount_driver.link import Refusal
 from mount_driver.node import MountDriver
@@ -30,7 +31,6 @@ from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.sensors import temperature_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT
 
 MS = 1_000_000

@@ -134,7 +134,7 @@ class MountInit(SafeLifecycleNode):
         return ramp.result()
 
     def _objection(self) -> str:
-        self._path.publisher_watch.check()  # a thread that polls the messages gets no event of discovery
+        self._path.publisher_watch.check()  # the diagnostics pause meanwhile
         return self._driver.refusal
 
     def _subscribe_streams(self, path: DataPath) -> None:

@@ -11,6 +11,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from ros_testing import LIMIT, wait_until
 
 from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
@@ -22,7 +23,6 @@ from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.sensors import temperature_layout
 from mount_ros.messages.verdicts import Level
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 
 STEP = 1_000_000  # ns
 RAMP_LENGTH = 2750

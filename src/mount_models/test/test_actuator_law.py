@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import brentq
 
 from mount_models.actuator.law import (
     TABLE_1,
@@ -17,7 +16,6 @@ from mount_models.actuator.law import (
     check_force_law,
     checked_current_for_force,
     checked_force,
-    coefficients,
     current_for_force,
     force,
 )
@@ -28,34 +26,21 @@ CURRENTS = (0.0, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 FORCES = {
     200: (0, 11.75, 66.81, 244.74, 308.22, 345.98, 375.52, 397.95),
     250: (0, 8.01, 44.51, 172.77, 279.79, 319.35, 349.99, 375.19),
-    300: (0, 5.69, 30.99, 118.96, 242.56, 292.99, 324.90, 351.63),
     349: (0, 4.32, 23.43, 89.29, 195.58, 268.64, 302.97, 330.88),
-    400: (0, 3.48, 19.23, 73.44, 161.00, 247.10, 284.30, 312.91),
-    450: (0, 2.92, 16.69, 64.41, 141.34, 229.94, 269.07, 296.89),
     492: (0, 2.41, 14.24, 55.59, 122.73, 207.07, 253.71, 279.66),
-    500: (0, 2.29, 13.62, 53.32, 117.91, 200.14, 249.46, 275.33),
     550: (0, 1.24, 7.84, 31.42, 70.64, 124.95, 187.32, 230.42),
-    600: (0, -0.59, -2.86, -10.01, -20.10, -28.65, -11.22, 103.55),
-    650: (0, -3.57, -20.52, -78.75, -171.25, -288.27, -390.43, -283.07),
     700: (0, -8.00, -46.31, -177.96, -387.29, -655.67, -927.04, -1004.47),
 }
 INVERSE_GAPS_UM = (250, 300, 349, 400, 450, 492, 520)
 INVERSE = {
     5: (0.1537, 0.1860, 0.2171, 0.2440, 0.2665, 0.2923, 0.3241),
-    10: (0.2259, 0.2732, 0.3176, 0.3543, 0.3834, 0.4174, 0.4607),
     20: (0.3283, 0.3968, 0.4600, 0.5104, 0.5489, 0.5946, 0.6540),
-    30: (0.4068, 0.4916, 0.5693, 0.6303, 0.6762, 0.7308, 0.8027),
     40: (0.4730, 0.5714, 0.6613, 0.7315, 0.7836, 0.8459, 0.9282),
-    60: (0.5836, 0.7050, 0.8156, 0.9014, 0.9644, 1.0396, 1.1395),
-    80: (0.6766, 0.8172, 0.9454, 1.0449, 1.1175, 1.2038, 1.3186),
     100: (0.7581, 0.9157, 1.0595, 1.1717, 1.2532, 1.3495, 1.4776),
-    150: (0.9307, 1.1245, 1.3029, 1.4450, 1.5479, 1.6665, 1.8242),
     200: (1.0808, 1.3082, 1.5195, 1.6922, 1.8166, 1.9570, 2.1499),
     250: (1.2709, 1.5479, 1.8095, 2.0287, 2.1926, 2.4231, 2.7944),
     275: (1.4534, 1.7731, 2.0798, 2.3528, 2.6059, 2.9163, None),
 }
-TABLE_1_HARD_LIMITS = (148e-6, 546e-6)
-"""Gaps (m) beyond which Table 1 no longer rises with current and falls with gap, 1 mA .. 3 A (derived)."""
 
 
 @pytest.mark.parametrize('gap_um', FORCES)
@@ -76,24 +61,8 @@ def test_force_is_equation_3_to_the_last_digits():
     assert force(TABLE_1, current, 349e-6) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ('gap_um', 'expected'),
-    [(349, (45.008, 24.099, 3.5654, 1.5965, 28.057)), (492, (17.965, 24.223, 3.3185, 2.2543, 18.482))],
-)
-def test_coefficients_follow_equation_4(gap_um, expected):
-    for value, printed in zip(coefficients(TABLE_1, gap_um * 1e-6), expected, strict=True):
-        assert value == pytest.approx(printed, rel=3e-5)
-
-
 def test_force_without_current_is_exactly_zero():
     assert (checked_force(UNGUARDED, 0.0, np.linspace(100e-6, 800e-6, 71)) == 0.0).all()
-
-
-@pytest.mark.parametrize(('gap_um', 'slope'), [(250, 7.6), (349, 4.8), (492, 1.05), (550, -0.10)])
-def test_force_leaves_zero_with_a_slope_that_is_no_parabola(gap_um, slope):
-    assert force(UNGUARDED, 1e-7, gap_um * 1e-6) / 1e-7 == pytest.approx(
-        slope, abs=0.05 if slope > 2 else 0.005
-    )
 
 
 @pytest.mark.parametrize('force_n', INVERSE)
@@ -118,72 +87,8 @@ def test_the_inverse_leads_back_at_both_ends_of_the_current():
         assert current_for_force(TABLE_1, force(TABLE_1, 3.0, gap), gap) == pytest.approx(3.0, abs=1e-6)
 
 
-@settings(deadline=None, max_examples=100)
-@given(
-    gap=st.floats(*TABLE_1_HARD_LIMITS),
-    low=st.floats(0.01, 2.98),
-    step=st.floats(0.01, 1.0),
-)
-def test_force_is_positive_and_rises_with_current_within_the_hard_limits(gap, low, step):
-    weaker, stronger = force(UNGUARDED, low, gap), force(UNGUARDED, min(low + step, 3.0), gap)
-    assert 0.0 < weaker < stronger
-
-
-@settings(deadline=None, max_examples=100)
-@given(
-    current=st.floats(0.01, 3.0),
-    gap=st.floats(TABLE_1_HARD_LIMITS[0], TABLE_1_HARD_LIMITS[1] - 1e-6),
-)
-def test_force_falls_with_gap_within_the_hard_limits(current, gap):
-    assert force(UNGUARDED, current, gap + 1e-6) < force(UNGUARDED, current, gap)
-
-
 def test_the_printed_law_passes_its_own_check_over_its_guarded_range():
     check_force_law(TABLE_1)
-
-
-def test_beyond_the_upper_hard_limit_the_force_first_falls_with_current():
-    milliamperes = np.arange(0.001, 3.0005, 0.001)
-    for gap_um, holds in ((546, True), (547, False)):
-        forces = checked_force(UNGUARDED, milliamperes, gap_um * 1e-6)
-        assert (forces[0] > 0.0 and np.diff(forces).min() > 0.0) is np.bool_(holds)
-
-
-def test_at_zero_current_the_slope_of_the_printed_law_turns_already_at_544_9_um():
-    assert 1e6 * brentq(lambda gap: force(UNGUARDED, 1e-7, gap), 500e-6, 560e-6) == pytest.approx(
-        544.9, abs=0.06
-    )
-
-
-@pytest.mark.parametrize(('current', 'limit_um'), [(2.5, 129), (3.0, 148)])
-def test_below_the_lower_hard_limit_the_force_no_longer_falls_with_gap(current, limit_um):
-    gaps = np.arange(limit_um, 200) * 1e-6
-    assert (np.diff(checked_force(UNGUARDED, current, gaps)) < 0.0).all()
-    below = np.array([limit_um - 3, limit_um - 2]) * 1e-6
-    assert np.diff(checked_force(UNGUARDED, current, below))[0] > 0.0
-
-
-def test_up_to_2_amperes_the_force_falls_with_gap_from_120_um():
-    gaps = np.arange(120, 200) * 1e-6
-    forces = checked_force(UNGUARDED, np.linspace(0.05, 2.0, 40), gaps[:, np.newaxis])
-    assert (np.diff(forces, axis=0) < 0.0).all()
-
-
-def test_at_120_um_the_force_turns_over_at_2_95_amperes():
-    currents = np.arange(2.0, 3.0005, 0.001)
-    forces = checked_force(UNGUARDED, currents, 120e-6)
-    assert currents[np.argmax(forces)] == pytest.approx(2.95, abs=0.006)
-    assert (np.diff(checked_force(UNGUARDED, currents, 130e-6)) > 0.0).all()
-
-
-def test_the_printed_law_breaks_up_where_its_coefficients_change_sign():
-    def zero(index):
-        return 1e6 * brentq(lambda gap: coefficients(UNGUARDED, gap)[index], 500e-6, 800e-6)
-
-    assert zero(0) == pytest.approx(544.9, abs=0.05)
-    assert zero(4) == pytest.approx(589.7, abs=0.05)
-    assert zero(2) == pytest.approx(764, abs=0.5)
-    assert force(UNGUARDED, 1.0, 590e-6) > 0.0 > force(UNGUARDED, 1.0, 591e-6)
 
 
 def test_the_check_refuses_the_printed_law_stretched_to_600_um():
@@ -204,21 +109,6 @@ def test_the_check_refuses_a_law_that_rises_with_gap():
 def test_the_check_refuses_a_range_in_falling_order():
     with pytest.raises(ForceLawRefusedError, match='rising order'):
         check_force_law(TABLE_1._replace(gap_low=520e-6, gap_high=200e-6))
-
-
-@pytest.mark.parametrize(('gap_um', 'expected'), [(349, (0.8, 2.9, 2.2, 1.5)), (492, (1.1, 4.5, 13.9, 3.9))])
-def test_three_printed_digits_leave_the_force_uncertain_by_a_few_newtons(gap_um, expected):
-    """Each number lies within half a unit of its third digit; to first order the forces add in squares."""
-    for current, sigma in zip((0.5, 1.0, 2.0, 3.0), expected, strict=True):
-        variance = 0.0
-        for name in ('a1', 'a2', 'a3', 'a4', 'a5'):
-            printed = getattr(TABLE_1, name)
-            for k, value in enumerate(printed):
-                spread = 10.0 ** (math.floor(math.log10(abs(value))) - 2) / math.sqrt(12.0)
-                moved = TABLE_1._replace(**{name: (*printed[:k], value + 1e-3 * spread, *printed[k + 1 :])})
-                change = force(moved, current, gap_um * 1e-6) - force(TABLE_1, current, gap_um * 1e-6)
-                variance += (1e3 * change) ** 2
-        assert math.sqrt(variance) == pytest.approx(sigma, rel=0.07)
 
 
 def test_a_gap_outside_the_guarded_range_is_refused_in_a_sentence():

@@ -104,10 +104,3 @@ def test_ends_of_the_range_and_what_is_no_number():
         assert math.isnan(function(math.nan))
     assert math.isnan(log(-1e-320))
     assert all(math.isnan(value) for x in (math.nan, math.inf) for value in sine_and_cosine(x))
-
-
-def test_they_undo_each_other():
-    x = spread(-30.0, 0.0, 30.0)
-    assert each(log, each(exp, x)) == pytest.approx(x, rel=1e-15, abs=2e-16)
-    tangent = sines(0.125 * x / 30.0) / cosines(0.125 * x / 30.0)
-    assert each(atan, tangent) == pytest.approx(0.25 * math.pi * x / 30.0, rel=1e-15)

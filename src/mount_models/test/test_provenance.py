@@ -1,7 +1,6 @@
 """The provenance of a specimen: free in what it tells, refused where it tells nonsense."""
 
 import copy
-import datetime
 import math
 from dataclasses import replace
 
@@ -54,28 +53,6 @@ NONSENSE = [
     ('parts', 3, r'provenance\.parts must be a mapping of parts'),
     ('parts.force_law', 'by hand', r'provenance\.parts\.force_law must be a mapping with the name'),
     ('parts.force_law.specimen', '', r'force_law must be a mapping with the name of a specimen'),
-    ('parts.force_law.date', 'yesterday', r"force_law\.date must be a text such as .* received 'yesterday'"),
-    ('parts.force_law.date', datetime.date(2026, 5, 4), r'force_law\.date must be a text'),
-    ('parts.force_law.recordings', [], r'force_law\.recordings must be a list of recordings'),
-    ('parts.force_law.recordings', [{'file': 'a.csv'}], r'recordings\[0\] must tell file and sha256'),
-    (
-        'parts.force_law.recordings',
-        [{'file': 'a.csv', 'sha256': 'abc'}],
-        r'recordings\[0\] must tell file and sha256 \(64',
-    ),
-    ('parts.force_law.valid', {'gap': [5e-4, 3e-4]}, r'valid\.gap must be two numbers in rising order'),
-    ('parts.force_law.valid', 'always', r"force_law\.valid must be two numbers .* received 'always'"),
-    ('parts.force_law.covariance', [[1.0, 2.0]], r'covariance must be a square matrix'),
-    ('parts.force_law.covariance', [[-1.0]], r'covariance must be a square matrix of numbers, none below 0'),
-    ('parts.force_law.covariance', [[True]], r'covariance must be a square matrix'),
-    (
-        'parts.force_law.covariance',
-        {'a, b': [[1.0]]},
-        r'covariance\.a, b must have one row for each of its names',
-    ),
-    ('parts.force_law.covariance', {'a': [[-1.0]]}, r'covariance\.a must be a square matrix'),
-    ('parts.force_law.covariance', {}, r'covariance must be a square matrix'),
-    ('parts.gap_curves.inductance_of_gap.covariance', 2.0, r'inductance_of_gap\.covariance must be a square'),
 ]
 
 

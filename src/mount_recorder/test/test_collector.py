@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 from mount_recorder.collector import Collector
 from mount_ros.data_thread import DataThread
 from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, CURRENT_SETPOINT, DISPLACEMENT
 
 

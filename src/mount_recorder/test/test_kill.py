@@ -11,9 +11,9 @@ from fed_recorder import TOPICS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from read_back import pieces_of, read_back, text_in
+from ros_testing import wait_until
 
 from mount_recorder.bag_writer import BagWriter, SplitRule
-from mount_ros.testing import wait_until
 
 STRING = 'std_msgs/msg/String'
 KILLS = 5

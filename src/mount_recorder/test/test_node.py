@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from read_back import description, read_back, text_in
+from ros_testing import LIMIT, wait_until
 from samples import PERIOD, START, sample
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -20,7 +21,6 @@ from std_srvs.srv import Trigger
 from mount_recorder.node import MountRecorder
 from mount_ros.messages.event import read_mark
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)

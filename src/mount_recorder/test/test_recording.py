@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 from mcap.reader import make_reader
 from read_back import loss_statement
+from ros_testing import wait_until
 from samples import PERIOD, START, sample
 from small_disk import small_disk
 
@@ -21,7 +22,6 @@ from mount_recorder.space import SpaceGuard
 from mount_recorder.stamp_watch import StampWatch
 from mount_ros.messages.scalars import stamp_of
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
-from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'

@@ -9,20 +9,32 @@ a call, in the sender's thread and before the message is published for the recor
 
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
+from rclpy.waitable import Waitable
 
 from mount_ros.data_thread import DataThread, LocalTopic, Poll
 from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import raw_publisher
 from mount_ros.publishers import PublisherWatch
 from mount_ros.qos import control_qos, publisher_qos
-from mount_ros.topics import Delivery, Topic
+from mount_ros.topics import TOPICS, Delivery, Topic
+
+
+class _DataNode(Node):
+    """A node without events of its publishers and subscriptions.
+
+    An EventsExecutor that lets go of one whose event is still queued destroys Python objects without the
+    interpreter: a segmentation fault within seconds where writers come and go (rclpy 7.1, its issue 1644).
+    """
+
+    @property
+    def waitables(self) -> Iterator[Waitable]:
+        yield from ()
 
 
 def io_node(owner: Node, name: str = '') -> Node:
@@ -31,7 +43,7 @@ def io_node(owner: Node, name: str = '') -> Node:
     Remappings of topics on the command line hold for it too. One of the name of `owner` does not change
     `name`: other nodes know the writers of a topic by it.
     """
-    return Node(
+    return _DataNode(
         f'{name or owner.get_name()}_io',
         namespace=owner.get_namespace(),
         context=owner.context,
@@ -123,25 +135,16 @@ class DataPath:
 
         `directly`: in the thread of a sender in this process, where time (not lock-step) allows it.
         """
-        if directly and self._direct:
-            receive = self._direct_receiver(topic, callback)
-        else:
-            receive = self._guarded(f'message of {topic.name} not used', callback)
-        events = None  # of discovery; a thread that polls the messages gets none
-        if topic.writers:
-            watch, trouble = self.publisher_watch, f'writers of {topic.name} not known'
-            events = SubscriptionEventCallbacks(
-                matched=self._guarded(trouble, lambda _: watch.check_anew(topic))
-            )
 
         def create() -> None:
-            qos = control_qos(topic, lockstep=self.lockstep)
-            kind = message_class(topic.type)
             subscription = self.node.create_subscription(
-                kind, topic.name, receive, qos, raw=True, event_callbacks=events
+                message_class(topic.type),
+                topic.name,
+                callback,
+                control_qos(topic, lockstep=self.lockstep),
+                raw=True,
             )
-            if topic.writers:
-                self.publisher_watch.watch(topic, subscription)
+            subscription.callback = self._receiver(topic, subscription, callback, directly and self._direct)
 
         if self._serving:
             self._thread.change(create)
@@ -153,7 +156,7 @@ class DataPath:
 
         The node is not served meanwhile: an EventsExecutor ends by an event of a destroyed subscription.
         """
-        self.publisher_watch.forget(topic)
+        self.publisher_watch.remove(topic)
         name = self.node.resolve_topic_name(topic.name)
         if self._serving:
             self._thread.remove(self.node)
@@ -181,7 +184,7 @@ class DataPath:
 
         For lock-step in one process: work that only continues what happens in this thread.
         """
-        self._polls.append(self._guarded('work not done', poll))
+        self._polls.append(self._guarded(poll))
         self._thread.add_poll(self._polls[-1])
 
     def remove_polls(self) -> None:
@@ -204,36 +207,44 @@ class DataPath:
             self._thread.remove(self.node)
         for local in self._sent_directly:
             local.senders -= 1
-        self.publisher_watch.end()
+        self.publisher_watch.remove(*TOPICS)
         self.node.destroy_node()
 
-    def _direct_receiver(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[..., None]:
-        local = self._thread.local_topics[self.node.resolve_topic_name(topic.name)]
+    def _receiver(
+        self, topic: Topic, subscription: Subscription, callback: Callable[[bytes], None], directly: bool
+    ) -> Callable[..., None]:
+        """Return the function that takes a message, and lets no exception end the thread or the sender."""
+        watch = self.publisher_watch
+        watched = watch.add(topic, subscription) if topic.writers else None
+        count_publishers = subscription.get_publisher_count
+        local = self._thread.local_topics[subscription.topic_name] if directly else LocalTopic()
         one_at_a_time, trouble = threading.RLock(), f'message of {topic.name} not used'
 
         def receive(raw: bytes, directly: bool = False) -> None:
-            # By the middleware comes what a sender of this process has handed over before, or a message of a
-            # stranger, who is known from discovery.
-            if local.senders and not directly:
-                return
             with one_at_a_time:
-                if not self._stopped:
-                    try:
+                try:
+                    if not directly:
+                        # A stranger is matched before its first message arrives.
+                        if watched is not None and count_publishers() != watched.count:
+                            watch.check()
+                        if local.senders:  # handed over before, or of a stranger
+                            return
+                    if not self._stopped:
                         callback(raw)
-                    except Exception as error:
-                        self._count_error(trouble, error)
+                except Exception as error:
+                    self._count_error(trouble, error)
 
-        local.receivers.append(receive)
-        self._received_directly.append((local, receive, one_at_a_time))
+        if directly:
+            local.receivers.append(receive)
+            self._received_directly.append((local, receive, one_at_a_time))
         return receive
 
-    def _guarded(self, trouble: str, callback: Callable[[Any], Any] | Poll) -> Callable[..., Any]:
-        # The border of the data thread: an exception would end it, and with it every node that it serves.
-        def guarded(*arguments: Any) -> Any:
+    def _guarded(self, poll: Poll) -> Poll:
+        def guarded() -> bool:
             try:
-                return callback(*arguments)
+                return poll()
             except Exception as error:
-                self._count_error(trouble, error)
+                self._count_error('work not done', error)
                 return False
 
         return guarded

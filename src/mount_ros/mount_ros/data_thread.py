@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
-from typing import Any
 
 from rclpy.context import Context
 from rclpy.executors import Executor
@@ -72,7 +71,7 @@ class DataThread:
         self._thread: threading.Thread | None = None
         self._nodes: list[Node] = []
         self._polls: list[Poll] = []
-        self._changes: list[tuple[Callable[[], Any], Future[None]]] = []
+        self._changes: list[tuple[Callable[[], object], Future[None]]] = []
         self._guard = threading.Lock()
 
     def add(self, node: Node) -> None:
@@ -91,23 +90,18 @@ class DataThread:
     def remove_poll(self, poll: Poll) -> None:
         """Return when `poll` is called no more and does not run; nothing is done where it is unknown."""
         with contextlib.suppress(DataThreadEndedError):
-            self.change(lambda: self._forget(poll))
+            self.change(lambda: self._polls.remove(poll) if poll in self._polls else None)
 
-    def _forget(self, poll: Poll) -> None:
-        if poll in self._polls:
-            self._polls.remove(poll)
-
-    def change(self, make: Callable[[], Any]) -> None:
+    def change(self, make: Callable[[], object]) -> None:
         """Return when `make` was called between two messages, or raise what prevents it: 10 s at most."""
         if threading.current_thread() is self._thread:
             raise DataThreadError('a callback of the data thread cannot wait for the data thread')
         made = Future[None]()
         with self._guard:
             if self.failure:
-                made.set_exception(DataThreadEndedError(self.failure))
-            else:
-                self._changes.append((make, made))
-                self._wake()
+                raise DataThreadEndedError(self.failure)
+            self._changes.append((make, made))
+            self._wake()
             thread = self._thread
         try:
             made.result(_CHANGE_TIMEOUT)
@@ -187,7 +181,7 @@ class DataThread:
                 time.sleep(_IDLE_PERIOD)
 
 
-def _error_of(make: Callable[[], Any]) -> Exception | None:
+def _error_of(make: Callable[[], object]) -> Exception | None:
     """Return what `make` raises: it concerns the caller of `change`, not the thread."""
     try:
         make()

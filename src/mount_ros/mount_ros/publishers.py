@@ -1,6 +1,6 @@
 """Who publishes: the nodes of the graph, and others on a topic whose writers the registry names.
 
-The answer comes from discovery, not from what is sent: a stranger is known with or before its first message.
+The answer comes from discovery, not from what is sent: a stranger is known before its first message is used.
 A killed writer stays in discovery until its lease is over, and looks like a second one of its name.
 """
 
@@ -30,11 +30,12 @@ class PublisherConflictError(ValueError):
 
 
 @dataclass
-class _WatchedTopic:
+class WatchedTopic:
     """What is known of the publishers of one topic."""
 
     subscription: Subscription
-    count: int = -1  # of publishers at the last check
+    count: int = -1
+    """Of publishers at the last check."""
     confirmed: str = ''
     suspected: str = ''
     since: float = 0.0  # of the suspicion, s, steady clock
@@ -56,44 +57,31 @@ class PublisherWatch:
         """The same where it may be a killed writer, or one whose name has not come yet."""
         self._node = node
         self._on_change = on_change
-        self._watched: dict[Topic, _WatchedTopic] = {}
+        self._watched: dict[Topic, WatchedTopic] = {}
         self._guard = threading.Lock()
         self._reporting = threading.RLock()
 
-    def watch(self, topic: Topic, subscription: Subscription) -> None:
+    def add(self, topic: Topic, subscription: Subscription) -> WatchedTopic:
         """Watch the writers of `topic`."""
         with self._guard:
-            self._watched[topic] = _WatchedTopic(subscription)
+            return self._watched.setdefault(topic, WatchedTopic(subscription))
 
-    def forget(self, topic: Topic) -> None:
-        """Watch the writers of `topic` no more."""
+    def remove(self, *topics: Topic) -> None:
+        """Watch the writers of `topics` no more."""
         with self._guard:
-            self._watched.pop(topic, None)
-
-    def end(self) -> None:
-        """Watch nothing any more."""
-        with self._guard:
-            self._watched.clear()
-
-    def check_anew(self, topic: Topic) -> None:
-        """Check the publishers of `topic` even if their number is what it was."""
-        with self._guard:
-            if topic in self._watched:
-                self._watched[topic].count = -1
-        self.check()
+            for topic in topics:
+                self._watched.pop(topic, None)
 
     def check(self) -> None:
-        """Check each topic whose publishers have changed in number, or are suspected."""
+        """Check who publishes each topic: 15 us each."""
         with self._guard:
             before = self.confirmed, self.suspected
-            for topic, watched in self._watched.items():
-                count = watched.subscription.get_publisher_count()
-                if count != watched.count or watched.suspected:
-                    watched.count = count
-                    self._judge(topic, watched)
-            every = self._watched.values()
-            self.confirmed = next((each.confirmed for each in every if each.confirmed), '')
-            self.suspected = next((each.suspected for each in every if each.suspected), '')
+            every = self._watched.items()
+            for topic, watched in every:
+                watched.count = watched.subscription.get_publisher_count()
+                self._judge(topic, watched)
+            self.confirmed = next((each.confirmed for _, each in every if each.confirmed), '')
+            self.suspected = next((each.suspected for _, each in every if each.suspected), '')
             changed = before != (self.confirmed, self.suspected)
         if changed:
             self.report()
@@ -114,11 +102,11 @@ class PublisherWatch:
             if self.confirmed or ending.wait(_CHECK_PERIOD):
                 raise PublisherConflictError(self.confirmed or self.suspected)
 
-    def _judge(self, topic: Topic, watched: _WatchedTopic) -> None:
+    def _judge(self, topic: Topic, watched: WatchedTopic) -> None:
         now = time.monotonic()
-        watched.since = watched.since if watched.suspected else now
         confirmed, suspected = self._others(topic)
-        if suspected and now - watched.since > LONGEST_DOUBT:
+        watched.since = watched.since if watched.suspected else now
+        if now - watched.since > LONGEST_DOUBT:
             confirmed, suspected = confirmed or suspected, []
         killed = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
         watched.confirmed = _sentence(topic, confirmed, 'end it')
@@ -127,9 +115,7 @@ class PublisherWatch:
     def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
         """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
         names = Counter(
-            _NAMELESS
-            if info.node_name == _NAMELESS
-            else f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._node.get_publishers_info_by_topic(topic.name)
             if info.topic_type == topic.type
         )
@@ -138,7 +124,7 @@ class PublisherWatch:
             return [], twice
         space = self._node.get_namespace().rstrip('/')
         others = names.keys() - {f'{space}/{writer}_io' for writer in topic.writers}
-        nameless = others & {_NAMELESS}
+        nameless = {name for name in others if name.endswith(_NAMELESS)}
         return sorted(others - nameless), twice or sorted(nameless)
 
 
@@ -172,6 +158,6 @@ def present_nodes(seen_by: Node) -> list[tuple[str, str]]:
 def _sentence(topic: Topic, names: list[str], remedy: str) -> str:
     if not names:
         return ''
-    who = ' and '.join(name.replace(_NAMELESS, 'a node without a name') for name in names)
+    who = ' and '.join('a node without a name' if _NAMELESS in name else name for name in names)
     own = ' and '.join(topic.writers)
     return f'{who} must not publish {topic.name} too (limit: one writer, {own}): {remedy}'

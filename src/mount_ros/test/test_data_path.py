@@ -1,15 +1,18 @@
 """The data path between two nodes: served by the executor, between works, or no more."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 import mount_ros.data_thread
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread, DataThreadEndedError, DataThreadError
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
 
 
@@ -382,3 +385,43 @@ def test_the_topics_of_a_node_are_remapped_with_it_and_its_data_node_keeps_its_r
     assert path.name == '/mount_driver_io'
     path.stop()
     owner.destroy_node()
+
+
+RESTLESS = """
+import faulthandler, os, threading, time
+import rclpy
+from rclpy.node import Node
+from mount_ros.data_path import DataPath
+from mount_ros.environment import prepare_environment
+from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+
+prepare_environment()
+rclpy.init()
+topics = AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT
+owner, writer = Node('owner'), DataPath(Node('writer'))
+
+def come_and_go():
+    while True:
+        for publisher in [writer.publisher(topic) for topic in topics]:
+            writer.node.destroy_publisher(publisher)
+
+threading.Thread(target=come_and_go, daemon=True).start()
+for _ in range(60):
+    path = DataPath(owner)
+    for topic in topics:
+        path.subscribe(topic, lambda raw: None)
+    path.start()
+    time.sleep(0.02)
+    path.stop()
+os._exit(0)
+"""
+
+
+@pytest.mark.slow
+def test_a_path_is_stopped_while_writers_come_and_go(domain):
+    """An event of discovery that was queued when the path was stopped ended the process by signal 11."""
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+    ended = subprocess.run(
+        [sys.executable, '-c', RESTLESS], env=environment, capture_output=True, timeout=120
+    )
+    assert ended.returncode == 0, ended.stderr

@@ -6,11 +6,11 @@ import types
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import DISPLACEMENT
 
 LAYOUT = ScalarsLayout(DISPLACEMENT)

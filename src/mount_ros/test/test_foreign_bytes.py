@@ -4,10 +4,10 @@ import contextlib
 
 from hypothesis import example, given
 from hypothesis import strategies as st
+from ros_testing import mutated
 
 from mount_ros.messages.event import read_change, read_mark
 from mount_ros.messages.scalars import ScalarsError, ScalarsLayout, ScalarsReader, stamp_of
-from mount_ros.testing import mutated
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT
 
 SEEDS = st.integers(0, 1 << 62)

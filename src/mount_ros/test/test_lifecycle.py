@@ -11,12 +11,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from ros_testing import LIMIT, wait_until
 
 from mount_ros.data_path import DataPath
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode, run_in_thread
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import DIAGNOSTICS, DISPLACEMENT
 
 CONFIGURE, ACTIVATE = Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE

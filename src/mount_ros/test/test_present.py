@@ -1,9 +1,9 @@
 """Which nodes are there: each is told once, and not any more when it is destroyed."""
 
 from rclpy.node import Node
+from ros_testing import wait_until
 
 from mount_ros.publishers import present_nodes
-from mount_ros.testing import wait_until
 
 
 def test_node_is_present_once_until_it_is_destroyed(context):

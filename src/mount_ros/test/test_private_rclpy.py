@@ -10,12 +10,12 @@ from rclpy.lifecycle.node import LifecycleNodeMixin
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
+from ros_testing import wait_until
 
 from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.private_rclpy import OpenLifecycleNode, given_at_start, raw_taker
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 CHANGED = 'this rclpy has no {}: mount_ros.private_rclpy, the only file that uses it, must be changed'

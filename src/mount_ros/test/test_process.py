@@ -10,10 +10,10 @@ import time
 import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from ros_testing import LIMIT, free_domain
 
 from mount_ros.nodes.lifecycle import wake
 from mount_ros.nodes.process import environment_of_children, tied
-from mount_ros.testing import LIMIT, free_domain
 
 PROGRAM = """
 import os, threading

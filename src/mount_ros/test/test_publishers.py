@@ -5,13 +5,13 @@ import types
 
 import pytest
 from rclpy.node import Node
+from ros_testing import LIMIT, wait_until
 
 import mount_ros.publishers
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class
 from mount_ros.publishers import NAMING_TIME, PublisherConflictError, PublisherWatch, UnnamedPublisher
 from mount_ros.qos import publisher_qos
-from mount_ros.testing import LIMIT, wait_until
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
 
 
@@ -33,12 +33,11 @@ def publish_from(context):
 
 @pytest.fixture
 def heard(context):
-    """A data path in a namespace that hears the displacement, and what it was told of writers."""
+    """A data path in a namespace that hears the displacement, and what it was told of writers before."""
     owner = Node('listener', namespace='/car', context=context)
-    changes = []
-    path = DataPath(owner, on_conflict=lambda *_: changes.append(threading.current_thread().name))
-    path.changes = changes
-    path.subscribe(DISPLACEMENT, lambda raw: None)
+    path = DataPath(owner)
+    path.received = []
+    path.subscribe(DISPLACEMENT, lambda raw: path.received.append(path.publisher_watch.confirmed))
     path.start()
     yield path
     path.stop()
@@ -63,16 +62,21 @@ def test_topics_that_decide_on_the_current_have_writers_and_others_have_none():
     }
 
 
-def test_a_second_publisher_is_told_in_the_data_thread_as_soon_as_it_is_found(heard, publish_from):
+def test_a_second_publisher_is_known_before_its_first_message_is_used(heard, publish_from):
     publish_from('mount_driver_io')
     wait_until(lambda: heard.unmatched() == [], 'the driver')
     assert _settled(heard) == ('', '')
     stranger = publish_from('stranger', namespace='/elsewhere')
-    wait_until(lambda: 'data' in heard.changes, 'the data thread to tell')
+    publisher = next(each for each in stranger.publishers if each.topic == '/car/displacement')
+    wait_until(lambda: publisher.get_subscription_count(), 'the subscription')
+    named = heard.node.get_publishers_info_by_topic
+    wait_until(lambda: any(each.node_name == 'stranger' for each in named('displacement')), 'its name')
+    publisher.publish(message_class(DISPLACEMENT.type)())
+    wait_until(lambda: heard.received, 'its message')
     sentence = (
         '/elsewhere/stranger must not publish displacement too (limit: one writer, mount_driver): end it'
     )
-    wait_until(lambda: _settled(heard) == (sentence, ''), 'the name of the stranger')
+    assert heard.received == [sentence]
     with pytest.raises(PublisherConflictError, match='/elsewhere/stranger must not publish'):
         heard.publisher_watch.wait_for_sole(threading.Event())
     stranger.destroy_node()
@@ -149,10 +153,10 @@ def _info(name, kind=DISPLACEMENT.type, namespace='/car'):
 def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(heard, monkeypatch):
     infos = [_info('mount_driver_io'), _info('stranger', 'std_msgs/msg/String')]
     monkeypatch.setattr(heard.node, 'get_publishers_info_by_topic', lambda topic: infos)
-    heard.publisher_watch.check_anew(DISPLACEMENT)
+    heard.publisher_watch.check()
     assert (heard.publisher_watch.confirmed, heard.publisher_watch.suspected) == ('', '')
     infos.append(_info('_NODE_NAME_UNKNOWN_', namespace='_NODE_NAMESPACE_UNKNOWN_'))
-    heard.publisher_watch.check_anew(DISPLACEMENT)
+    heard.publisher_watch.check()
     assert heard.publisher_watch.confirmed == ''
     assert heard.publisher_watch.suspected.startswith(
         'a node without a name must not publish displacement too'
@@ -208,7 +212,7 @@ def test_of_two_changes_found_by_two_threads_the_newer_one_is_delivered_last():
         delivered.append((bool(confirmed), bool(suspected)))
 
     watch = PublisherWatch(publishers, on_change)
-    watch.watch(DISPLACEMENT, publishers)
+    watch.add(DISPLACEMENT, publishers)
     watch.check()
     publishers.names = ('mount_driver_io', 'mount_driver_io')  # a doubt
     threads = [threading.Thread(target=watch.check)]

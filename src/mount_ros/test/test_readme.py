@@ -3,10 +3,11 @@
 import re
 from pathlib import Path
 
+from ros_testing import wait_until
+
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import Level
-from mount_ros.testing import wait_until
 from mount_ros.topics import DISPLACEMENT
 
 README = Path(__file__).resolve().parents[1] / 'README.md'

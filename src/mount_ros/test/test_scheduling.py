@@ -6,9 +6,9 @@ import subprocess
 import sys
 
 import pytest
+from ros_testing import LIMIT
 
 from mount_ros.nodes.scheduling import Threads
-from mount_ros.testing import LIMIT
 
 
 def may_be_urgent():

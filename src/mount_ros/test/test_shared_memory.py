@@ -7,8 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from ros_testing import wait_until
+
 from mount_ros.nodes.shutdown import SHARED_MEMORY, remove_abandoned
-from mount_ros.testing import wait_until
 
 SEGMENT, PORT = 'fastrtps_0123456789abcdef', 'fastrtps_port7411'
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_mount import FARTHEST_DISPLACEMENT, Run
+from mount_sim.plant.simulated_car import FARTHEST_DISPLACEMENT, Run
 
 DRIVING, FINISHED = 'driving', 'finished'
 _OF_EACH = ('answered', 'latency_median_s', 'latency_p99_s', 'beyond_range', 'first_beyond_range_s')

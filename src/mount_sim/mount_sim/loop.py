@@ -1,19 +1,27 @@
-"""The simulated electronics of one mount on its bus: samples out, setpoints in, the plant moved on."""
+"""The simulated electronics of all mounts at work, each on a bus of its own, in one thread.
+
+Samples out, setpoints in, the plant moved on; in real time and in lock-step.
+"""
 
 import math
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from mount_driver.protocol import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import ElectronicsParameters, status_every
-from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
 
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 _DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
+_LOCKSTEP_WAIT = 0.1  # s: how often a loop in lock-step looks whether it shall end
+_DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
+_FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
+_RESERVE = 1.5  # chosen: times the work's longest time are kept for it
 
 
 class NoAnswerError(RuntimeError):
@@ -59,11 +67,6 @@ class ElectronicsLoop:
         self._beyond_told = 0  # samples beyond the sensor's range, when the last status was sent
         self.figures = LoopFigures(beyond_range=mount.beyond_range)
         self.last_latency = math.nan
-
-    def step_in_real_time(self) -> None:
-        """Take the next sample with the newest setpoint, whether or not one has come."""
-        self.send_sample()
-        self.go_on()
 
     def discharged(self) -> bool:
         """Whether the coil carries no current any more."""
@@ -120,9 +123,9 @@ class ElectronicsLoop:
             )
         ]
         if number % self._status_every == 0:
-            frames.append(self._can_end.status_frame(mount.faults.status(self._status())))
+            frames.append(self._can_end.status_frame(mount.faults.through('status', self._status())))
         if mount.faults.present:
-            frames = mount.faults.on_bus(frames)
+            frames = mount.faults.through('frames', frames)
         self._sent_at[self._counted % _REMEMBERED] = time.time()
         for frame in frames:
             self._can_end.send_frame(frame)
@@ -133,7 +136,7 @@ class ElectronicsLoop:
         faults, microseconds = self._mount.faults, number * self._mount.sample_time // _NS
         self._counted = number
         if faults.present:
-            self._counted, microseconds = faults.counted(number, microseconds)
+            self._counted, microseconds = faults.through('counters', (number, microseconds))
             if faults.restarts:
                 self._can_end.restart()
                 self._mount.forget()
@@ -183,3 +186,100 @@ class ElectronicsLoop:
             setpoint_timeout=not self._mount.enabled,
             e2e_error=self._failed_told > failed,
         )
+
+
+def until_ending(ending: threading.Event, discharged: Callable[[], bool]) -> Iterator[None]:
+    """Yield for each sample until `ending` is set and the coils are `discharged`, or 0.1 s after `ending`.
+
+    Electronics outlive the graph: its last setpoint is followed, and the truth shows that the current goes.
+    """
+    while not ending.is_set():
+        yield
+    limit = time.monotonic() + _DISCHARGE_LIMIT
+    while not discharged() and time.monotonic() < limit:
+        yield
+
+
+class OwnWork:
+    """How long the simulator's own work on a sample takes, which waits until the graph has answered.
+
+    Electronics have a processor of their own; with two of them the simulator would take one from the graph.
+    """
+
+    def __init__(self, longest: float):
+        """`longest` in s: what is to be expected at first."""
+        self._longest = longest
+        self._begin = 0.0
+
+    def latest_begin(self, end: float) -> float:
+        """Return when it must begin so that it is done at `end` (s)."""
+        return end - _RESERVE * self._longest
+
+    def __enter__(self) -> None:
+        self._begin = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        taken = time.monotonic() - self._begin
+        self._longest = max(taken, (1.0 - _FORGOTTEN) * self._longest)
+
+
+class CarLoop:
+    """Takes each sample of all mounts, one after the other, before it takes the next of the first."""
+
+    def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float, sample_rate: float):
+        self._sample_rate = sample_rate
+        self._loops = list(loops.items())
+        self._clock_drift = clock_drift
+        self._turn = 0  # lock-step: whose sample comes next
+
+    def run_in_real_time(self, ending: threading.Event) -> None:
+        """Sample by the electronics' clock until `ending` is set and the coils are discharged.
+
+        So it goes on after the end of the run: electronics do not fall silent when a drive is over; if they
+        did, the control would rightly report it.
+        """
+        period = 1.0 / self._sample_rate / (1.0 + self._clock_drift)
+        own = OwnWork(period)
+        begin = time.monotonic()
+        for number, _ in enumerate(until_ending(ending, self._discharged), 1):
+            for _, loop in self._loops:
+                loop.send_sample()
+            for _, loop in self._loops:
+                loop.wait_for_answer(own.latest_begin(begin + number * period))
+            with own:
+                for _, loop in self._loops:
+                    loop.go_on()
+            now = time.monotonic()
+            remaining = begin + number * period - now
+            for _, loop in self._loops:
+                loop.figures.wall_time = now - begin
+                loop.figures.overruns += remaining <= 0.0  # the next samples follow at once: none is skipped
+            if remaining > 0.0:
+                time.sleep(remaining)
+
+    def _discharged(self) -> bool:
+        return all(loop.discharged() for _, loop in self._loops)
+
+    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
+        """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""
+        while not self.finished and not ending.is_set():
+            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
+
+    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+        """Take the next sample of the mount whose turn it is; as `ElectronicsLoop.step_in_lockstep`.
+
+        A mount alone has no name; of several the name of the mount leads an error.
+        """
+        name, loop = self._loops[self._turn]
+        try:
+            taken = loop.step_in_lockstep(patience, wait)
+        except NoAnswerError as error:
+            raise NoAnswerError(f'{name}: {error}' if name else str(error)) from None
+        if taken or loop.finished:
+            self._turn = (self._turn + 1) % len(self._loops)
+        return taken or (loop.finished and not self.finished)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run is over, in lock-step with all last samples answered."""
+        return all(loop.finished for _, loop in self._loops)

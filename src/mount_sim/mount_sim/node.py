@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import deepcopy
 from functools import partial
 from typing import Any
@@ -24,18 +24,16 @@ from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
-from mount_ros.nodes.real_time import LoopTiming, RealTimeThreads
+from mount_ros.nodes.real_time import RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
-from mount_sim.car_loop import CarLoop
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults.schedule import injected_faults, texts_of_mount
 from mount_sim.excitation.building import build_excitation
-from mount_sim.loop import ElectronicsLoop, NoAnswerError
+from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.places import ALONE, general_name, mount_names, values_of_mount
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import DivergedError, SimulatedMount
+from mount_sim.plant.simulated_car import DivergedError, SimulatedCar, mount_parameters
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
@@ -63,9 +61,8 @@ class MountSim(SafeLifecycleNode):
 
     def configure(self) -> None:
         self._settings = read(self, SimParameters())
-        self._values: dict[str, Any] = flattened(self._settings)
-        for name in ('channel', 'port', *self._own):
-            self._values[name] = self.get_parameter(name).value
+        other = {name: self.get_parameter(name).value for name in ('channel', 'port', *self._own)}
+        self._values = flattened(self._settings) | other
         self._names = mount_names(self._settings.mounts) or (ALONE,)
         with compilation_told(self.get_logger().info):
             self._excitation = build_excitation(self._settings)
@@ -79,18 +76,14 @@ class MountSim(SafeLifecycleNode):
         interface = self.get_parameter('interface').value
         if any(mount.sample for mount in self._mounts.values()):
             self._prepare_mounts()
+        rate, drift = self._settings.sample_rate, self._settings.electronics.clock_drift
         self._loops = {}
         for name, mount in self._mounts.items():
-            can_end = CanEnd(self._open_bus(interface, name), self._settings.sample_rate)
+            can_end = CanEnd(self._open_bus(interface, name), rate)
             self._can_ends.append(can_end)
-            self._loops[name] = ElectronicsLoop(
-                mount,
-                can_end,
-                mount_parameters(self._values, name).electronics,
-                partial(self._publish, name),
-            )
-        drift = self._settings.electronics.clock_drift
-        self._loop = CarLoop(self._loops, drift, self._settings.sample_rate)
+            electronics = mount_parameters(self._values, name).electronics
+            self._loops[name] = ElectronicsLoop(mount, can_end, electronics, partial(self._publish, name))
+        self._loop = CarLoop(self._loops, drift, rate)
         self._counted = SlidingWindow({})
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
@@ -144,32 +137,26 @@ class MountSim(SafeLifecycleNode):
             response.message = str(error)
         return response
 
-    def loop_timing(self) -> LoopTiming:
-        figures = [loop.figures for loop in self._loops.values()]
-        if not figures:
-            return LoopTiming()
-        return LoopTiming(min(each.samples for each in figures), max(each.overruns for each in figures))
-
     def _open_bus(self, interface: str, name: str) -> can.BusABC:
         """Return the bus of a mount; no two mounts may have the same."""
-        own = {other: values_of_mount(self._values, other) for other in self._names}
-        bus = own[name]['channel'], own[name]['port']
+        buses = {}
         for other in self._names:
-            if other != name and (own[other]['channel'], own[other]['port']) == bus:
+            own = values_of_mount(self._values, other)
+            buses[other] = own['channel'], own['port']
+        channel, port = buses.pop(name)
+        for other, bus in buses.items():
+            if bus == (channel, port):
                 raise ParameterError(
-                    f'the mounts {other} and {name} have one CAN bus (channel {bus[0]}, port {bus[1]}): give '
+                    f'the mounts {other} and {name} have one CAN bus (channel {channel}, port {port}): give '
                     f'each its own, as in mount_{name}.port'
                 )
-        return open_bus(interface, bus[0], port=bus[1])
+        return open_bus(interface, channel, port=port)
 
     def _prepare_mounts(self) -> None:
-        self._mounts = self._simulated(self._settings.faults)
-        for mount in self._simulated(()).values():
+        self._mounts = SimulatedCar(self._values, self._excitation).mounts
+        for mount in SimulatedCar({**self._values, 'faults': ()}, self._excitation).mounts.values():
             mount.measure()  # a rehearsal: loads the compiled plant before simulated time begins
             mount.advance(0.0)
-
-    def _simulated(self, faults: Sequence[str]) -> dict[str, SimulatedMount]:
-        return SimulatedCar({**self._values, 'faults': faults}, self._excitation).mounts
 
     def _run(self) -> None:
         assert self._loop is not None

@@ -1,13 +1,12 @@
 """Everything that can be set on the simulated mount."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SampleRate
 from mount_sim.electronics.electronics import ElectronicsParameters
-from mount_sim.electronics.warm_coil import TemperatureCoefficients
 from mount_sim.excitation.scenario import (
     SCENARIO_NAMES,
     BenchScenario,
@@ -26,8 +25,8 @@ from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.places import PLACES, Places
 from mount_sim.plant.plant import Plant
 from mount_sim.plant.reluctance import ReluctanceActuator
-from mount_sim.plant.ripple import RippleCoil
-from mount_sim.plant.vehicle import Engine, Vehicle
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients
+from mount_sim.plant.vehicle import Vehicle
 
 
 class SimParameters(NamedTuple):
@@ -45,7 +44,7 @@ class SimParameters(NamedTuple):
         ),
     ] = ''
     sample_rate: SampleRate = SAMPLE_RATE
-    seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1, 'chosen')] = 1
+    seed: Annotated[int, Quantity('1', 'seed of noise and road', 0, 2**31 - 1)] = 1
     timeline: Timeline = Timeline()
     bench: BenchScenario = BenchScenario()
     motorway: MotorwayScenario = MotorwayScenario()
@@ -73,19 +72,8 @@ class SimParameters(NamedTuple):
     @property
     def plant(self) -> Plant:
         """The simulated truth; an unknown mount raises `ParameterError`."""
-        return Plant(
-            actuator=self.actuator,
-            coil=self.coil,
-            temperature=self.temperature,
-            mechanics=self.mechanics,
-            friction=self.friction,
-            contact=self.contact,
-            vehicle=self.vehicle,
-            engine=Engine(self.vehicle.engine_mass, self.vehicle.elastomer),
-            electronics=self.electronics,
-            hydromount=self.hydromount,
-            mount=seated_mount(self.mount),
-        )
+        parts: dict[str, Any] = {name: getattr(self, name) for name in Plant._fields}
+        return Plant(**{**parts, 'mount': seated_mount(self.mount)})
 
 
 class NodeParameters(NamedTuple):

@@ -14,8 +14,7 @@ from mount_models.quantity import flattened, with_flattened
 from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_car import SimulatedCar
-from mount_sim.plant.simulated_mount import SimulatedMount
+from mount_sim.plant.simulated_car import SimulatedCar, SimulatedMount
 
 # The tests are imported one by one (importmode importlib); what they share is found by this path.
 sys.path.insert(0, str(Path(__file__).parent))

@@ -26,7 +26,6 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.hydromount import decoupler_overrun, upper_pressure
-from mount_sim.plant.plant import PLANT, STATE, PlantSimulation, advance
 
 _VEHICLE = int(Seat.VEHICLE)
 
@@ -71,39 +70,6 @@ def imbalance(account: Any) -> float:
     lost = sum(float(account[name]) for name in LOSSES)
     put_in = float(account['road_work'] + account['engine_work'])
     return put_in - lost - float(account['stored'] - account['first_stored'])
-
-
-class Books:
-    """The account of a simulated vehicle, which `advance` moves on as `PlantSimulation.advance` does."""
-
-    def __init__(self, plant: PlantSimulation):
-        assert (
-            plant.memory.seat == Seat.VEHICLE
-        )  # a rack or a given acceleration has no limit to what it gives
-        self._plant = plant
-        self._account = new_account()
-        self.account = self._account[0]
-
-    def advance(self, values, engine_forces, wanted_current: float) -> None:
-        """Advance the plant and book each step."""
-        memory = self._plant.memory
-        advance_with_books(
-            memory.plant, memory.state, self._account, values, engine_forces, wanted_current, memory.step_time
-        )
-
-
-@compiled
-def advance_with_books(plant, state, account, values, engine_forces, wanted_current, dt):
-    """Advance as `advance` does in a vehicle and book each step in `account`, (1,)."""
-    law = plant.view(PLANT)[0]
-    before = state.copy()
-    for k in range(len(values)):
-        before[:] = state
-        advance(plant, state, _VEHICLE, values[k : k + 1], engine_forces[k : k + 1], wanted_current, dt)
-        was, now = before.view(STATE)[0], state.view(STATE)[0]
-        book_step(
-            account[0], law.vehicle, law.hydromount, law.contact, was, now, values[k], engine_forces[k], dt
-        )
 
 
 @compiled

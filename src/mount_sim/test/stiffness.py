@@ -3,8 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from mount_sim.plant.elastomer import Elastomer
-from mount_sim.plant.vehicle import Vehicle
+from mount_sim.plant.vehicle import Elastomer, Vehicle
 
 FloatArray = npt.NDArray[np.float64]
 

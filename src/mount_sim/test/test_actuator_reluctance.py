@@ -1,14 +1,10 @@
 """The simulated magnet: published figures, the laws of its circuit, and how near it comes to Table 1."""
 
-import math
-
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.law import TABLE_1, checked_force
-from mount_models.quantity import ParameterError, checked, quantities, with_values
+from mount_models.quantity import with_values
 from mount_sim.plant.reluctance import (
     MU_0,
     ReluctanceActuator,
@@ -53,41 +49,12 @@ def test_slow_incremental_inductance_meets_the_published_table(gap_um, inductanc
     assert inductance == pytest.approx(inductance_mh, abs=0.0051)
 
 
-@pytest.mark.parametrize(('current', 'density'), [(1.0, 0.83), (1.5, 1.20), (2.0, 1.42), (3.0, 1.53)])
-def test_the_core_saturates_from_1_4_tesla(current, density):
-    assert core_flux_density(MAGNET, current, 349e-6) == pytest.approx(density, abs=0.0051)
-
-
-def test_the_core_reaches_1_4_tesla_at_1_4_kiloamperes_per_metre():
-    field = 1400.0
-    density = MU_0 * field + MAGNET.saturation_polarisation * field / (MAGNET.knee_field + field)
-    assert density == pytest.approx(1.40, abs=0.005)
-
-
-def test_initial_relative_permeability_is_7065():
-    assert differential_permeability(MAGNET, 0.0) / MU_0 == pytest.approx(7065, abs=0.51)
-
-
 @settings(deadline=None)
 @given(current=currents, gap=gaps)
 def test_the_flux_of_the_core_equals_that_of_gaps_and_leakage(current, gap):
     magnetomotive = MAGNET.turns * current - MAGNET.core_length * core_field(MAGNET, current, gap)
     flux = MAGNET.gap_area * core_flux_density(MAGNET, current, gap)
     assert flux == pytest.approx(gap_permeance(MAGNET, gap) * magnetomotive, rel=1e-9, abs=1e-18)
-
-
-@settings(deadline=None)
-@given(current=currents, gap=gaps)
-def test_the_force_does_not_ask_which_way_the_current_flows(current, gap):
-    assert force(MAGNET, current, gap) == pytest.approx(force(MAGNET, -current, gap), rel=1e-12)
-    assert core_field(MAGNET, -current, gap) == -core_field(MAGNET, current, gap)
-
-
-@settings(deadline=None)
-@given(current=st.floats(0.01, 2.9), gap=gaps)
-def test_force_rises_with_current_and_falls_with_gap(current, gap):
-    here = force(MAGNET, current, gap)
-    assert force(MAGNET, current + 0.05, gap) > here > force(MAGNET, current, gap + 5e-6) > 0.0
 
 
 @settings(deadline=None)
@@ -109,40 +76,6 @@ def test_the_slow_inductance_is_the_slope_of_the_flux_linkage(current, gap):
     assert mean_incremental_inductance(MAGNET, current, gap) == pytest.approx(slope, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ('current', 'per_cent'), [(0.5, -0.47), (1.0, -0.45), (1.5, -0.37), (2.0, -0.20), (3.0, -0.10)]
-)
-def test_one_micrometre_changes_the_force_at_349_um_by_the_published_share(current, per_cent):
-    value, slope = force_and_gap_slope(MAGNET, current, 349e-6)
-    assert 100.0 * slope / value * 1e-6 == pytest.approx(per_cent, abs=0.0051)
-
-
-@pytest.mark.parametrize(
-    ('low_um', 'high_um', 'rms', 'largest'), [(260, 520, 5.3, 21.0), (300, 500, 4.7, 13.8)]
-)
-def test_table_1_is_met_as_nearly_as_one_magnetisation_curve_can(low_um, high_um, rms, largest):
-    """The published rms figures do not tell their grid; on this one they come out within 0.4 N."""
-    grid_gaps = np.arange(low_um, high_um + 1, 10)[:, np.newaxis] * 1e-6
-    grid_currents = np.linspace(0.1, 3.0, 30)
-    law = TABLE_1._replace(gap_high=521e-6)
-    truth = np.array([[force(MAGNET, i, gap) for i in grid_currents] for gap in grid_gaps[:, 0]])
-    error = checked_force(law, grid_currents, grid_gaps) - truth
-    assert math.sqrt(np.mean(error**2)) == pytest.approx(rms, abs=0.4)
-    assert np.abs(error).max() == pytest.approx(largest, abs=0.2)
-
-
-def test_without_leakage_table_1_is_met_less_well():
-    grid_gaps = np.arange(260, 521, 20)[:, np.newaxis] * 1e-6
-    grid_currents = np.linspace(0.1, 3.0, 30)
-    printed = checked_force(TABLE_1, grid_currents, grid_gaps)
-
-    def rms(magnet):
-        truth = np.array([[force(magnet, i, gap) for i in grid_currents] for gap in grid_gaps[:, 0]])
-        return math.sqrt(np.mean((printed - truth) ** 2))
-
-    assert rms(with_values(MAGNET, leakage_permeance=0.0)) > 1.4 * rms(MAGNET)
-
-
 @pytest.mark.parametrize('gap_um', [250, 349, 550])
 def test_far_below_saturation_the_force_is_that_of_equations_1_and_2(gap_um):
     magnet = with_values(MAGNET, leakage_permeance=0.0, residual_gap=0.0)
@@ -152,10 +85,3 @@ def test_far_below_saturation_the_force_is_that_of_equations_1_and_2(gap_um):
     expected = 2.0 * magnet.gap_area / (2.0 * MU_0) * density**2
     assert force(magnet, current, gap) == pytest.approx(expected, rel=1e-3)
     assert gap_flux_density(magnet, current, gap) == pytest.approx(density, rel=1e-3)
-
-
-def test_every_parameter_tells_its_unit_and_range():
-    assert set(quantities(MAGNET)) == set(MAGNET._fields)
-    assert checked(MAGNET) == MAGNET
-    with pytest.raises(ParameterError, match='knee_field'):
-        with_values(MAGNET, knee_field=-1.0)

@@ -6,7 +6,7 @@ from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWi
 from mount_sim.diagnosis import DRIVING, FINISHED, Counted, counted, verdict
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_mount import BeyondRange, Run
+from mount_sim.plant.simulated_car import BeyondRange, Run
 
 RUN = Run(samples=20_000, excitation_start=5000)
 

@@ -45,11 +45,6 @@ def test_small_signals_follow_with_the_stated_bandwidth(bandwidth):
     assert math.sqrt(low * high) == pytest.approx(bandwidth, rel=0.05)
 
 
-def test_a_small_step_decays_with_the_loop_s_time_constant():
-    error = 1.0 - _loop(np.full(40, 1.0), 0.99)
-    assert error[19] / 0.01 == pytest.approx(math.exp(-20 * DT * 2.0 * math.pi * 400.0), rel=1e-3)
-
-
 @pytest.mark.parametrize('wanted', [[3.0] * 400, [0.0, 3.0] * 200, [2.0] * 50 + [0.0] * 100 + [3.0] * 200])
 def test_the_coil_never_sees_more_than_the_link_voltage(wanted):
     currents = np.r_[0.0, _loop(wanted)]
@@ -58,13 +53,6 @@ def test_the_coil_never_sees_more_than_the_link_voltage(wanted):
         voltage = COIL.resistance * before + inductance * (after - before) / DT
         assert voltage <= COIL.link_voltage * (1.0 + 1e-9)
         assert voltage >= -COIL.link_voltage * (1.0 + 1e-9) or after == 0.0
-
-
-def test_a_large_step_rises_as_14_volt_allow():
-    first = _loop([3.0])[0]
-    assert first / DT == pytest.approx(14.0 / mean_incremental_inductance(ACTUATOR, 0.0, GAP), rel=1e-9)
-    rise = int(np.argmax(_loop([3.0] * 1000) > 2.7)) * DT
-    assert 0.003 < rise < 0.030  # far slower than the 0.9 ms of the loop alone
 
 
 def test_the_current_reaches_its_setpoint_and_0_exactly():
@@ -106,17 +94,3 @@ def test_ripple_noise_is_the_scatter_of_the_inductance(sigma):
     assert np.std(inductance) / np.mean(inductance) == pytest.approx(sigma, rel=0.03)
     for slope in (readings[:, 2], readings[:, 3]):
         assert np.std(slope) / np.mean(slope) == pytest.approx(sigma * math.sqrt(0.5), rel=0.03)
-
-
-def test_displacement_and_current_have_their_own_noise():
-    readings = _readings(displacement_noise=5e-6, current_noise=0.004)
-    assert np.std(readings[:, 0]) == pytest.approx(5e-6, rel=0.03)
-    assert np.std(readings[:, 1]) == pytest.approx(0.004, rel=0.03)
-    assert abs(np.corrcoef(readings.T)[0, 1]) < 0.03
-
-
-def test_noise_belongs_to_its_seed_and_does_not_repeat():
-    np.testing.assert_array_equal(_readings(5000, seed=3), _readings(5000, seed=3))
-    one = _readings(10_000, seed=3)
-    assert not (one == _readings(10_000, seed=4)).all(axis=1).any()
-    assert len(np.unique(one[:, 0])) == 10_000

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import CoefficientsRefusedError, FrictionContact, check_friction
-from mount_models.friction.simplified import simplified_response
 from mount_models.quantity import quantities, with_values
 from mount_sim.plant.friction import full_response, full_step
 
@@ -54,26 +53,6 @@ def test_sine_at_8_hertz_gives_the_known_peaks_at_every_step_length(dt):
     assert loss == pytest.approx(0.629, abs=6e-4 if dt < 1e-3 else 2e-3)
 
 
-def test_sine_at_8_hertz_hardly_moves_the_creeping_element():
-    deflection = sine_response(1e-4)[4]
-    assert deflection.min() == pytest.approx(-4.0e-6, abs=0.06e-6)
-    assert deflection.max() == pytest.approx(-2.1e-6, abs=0.06e-6)
-
-
-def test_both_models_agree_in_macroslip_and_differ_in_microslip():
-    _, velocity, force, sliding, _ = sine_response(1e-4)
-    time = np.arange(0.0, 48 * CYCLE + 5e-5, 1e-4)
-    all_velocity = 1e-3 * 2.0 * np.pi * 8.0 * np.cos(2.0 * np.pi * 8.0 * time)
-    simplified, _ = simplified_response(CONTACT, COEFS, all_velocity, np.full(time.size, 100.0), 1e-4)
-    difference = force - simplified[-force.size :]
-    # macroslip: the slider has most of the velocity; the 10 % around standstill are where mu is faded out
-    macroslip = (sliding * np.sign(velocity) > 0.6 * abs(velocity)) & (abs(velocity) > 0.1 * velocity.max())
-    rms = np.sqrt(np.mean(difference[macroslip] ** 2))
-    assert rms == pytest.approx(1.6, abs=0.06)
-    assert rms / np.sqrt(np.mean(force**2)) == pytest.approx(0.010, abs=1e-3)
-    assert np.sqrt(np.mean(difference**2)) == pytest.approx(45.7, abs=0.1)
-
-
 SAWTOOTH = {  # velocity in mm/s: coefficient after reversal and at the end of the stroke, p and n
     1: (0.632, 0.560, 0.941, 0.872),
     2: (0.771, 0.656, 1.134, 1.022),
@@ -100,17 +79,6 @@ def test_coefficient_jumps_after_reversal_and_decays_along_the_stroke(speed_mm):
     assert found == pytest.approx(SAWTOOTH[speed_mm], abs=1.1e-3)
     ninety_percent_ms = np.argmax(rising > 0.9 * rising.max()) * 0.1
     assert ninety_percent_ms == pytest.approx(NINETY_PERCENT_MS[speed_mm], abs=0.55)
-
-
-def test_negative_b_offset_makes_the_decay_larger():
-    rising, _ = sawtooth_stroke(1, with_values(COEFS, b_offset=-14.0))
-    assert (rising.max(), rising[-1]) == pytest.approx((0.789, 0.443), abs=1.1e-3)
-
-
-def test_fast_creep_does_not_let_the_slider_run_away():
-    fast_creep = with_values(CONTACT, tangential_damping=0.05 * CONTACT.tangential_stiffness)
-    _, velocity, _, sliding, _ = sine_response(1e-4, contact=fast_creep)
-    assert abs(sliding).max() < 1.1 * abs(velocity).max()
 
 
 def test_steep_pull_breaks_away_at_the_coefficient_at_rest():

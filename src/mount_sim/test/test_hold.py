@@ -55,7 +55,8 @@ class Car:
         """Take samples; behind each the driver sees it, `node()` publishes, the driver looks at the clock."""
         for _ in range(samples):
             self.now += MS
-            self._loop.step_in_real_time()
+            self._loop.send_sample()
+            self._loop.go_on()
             while driver_lives and self.exchange.poll():
                 pass
             node()

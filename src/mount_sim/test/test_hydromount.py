@@ -8,19 +8,16 @@ from hypothesis import strategies as st
 from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.quantity import checked, quantities
-from mount_sim.plant.elastomer import Elastomer
 from mount_sim.plant.hydromount import (
     HYDROMOUNT_STATE,
     Hydromount,
-    decoupler_overrun,
     hydromount_force,
     hydromount_step,
     upper_pressure,
 )
+from mount_sim.plant.vehicle import Elastomer
 
 HYDROMOUNT = Hydromount()
-SYMMETRIC = HYDROMOUNT._replace(compliance_asymmetry=0.0)
 DT = 5e-5
 PERIODS, SETTLED = 30, 5
 
@@ -57,13 +54,6 @@ def test_storage_and_loss_at_8_hz_have_their_values_in_newton_per_millimetre(amp
     assert stiffness.imag == pytest.approx(loss, abs=0.5)
 
 
-def test_it_is_stiffer_than_the_elastomer_alone_at_27_hz():
-    assert abs(shaken(27.0, 1e-4)[0]) / 1e-4 == pytest.approx(257e3, abs=500.0)
-    assert abs(dynamic_stiffness(Elastomer(), 27.0)) == pytest.approx(194e3, abs=500.0)
-    floating = HYDROMOUNT._replace(decoupler_resistance=2e7)
-    assert abs(shaken(27.0, 1e-4, floating)[0]) / 1e-4 < 215e3
-
-
 def test_harmonics_at_8_hz_and_1_mm_have_their_values():
     expected = [277.8, 5.03, 13.23, 2.01, 5.36, 1.02, 2.32, 0.50]
     found = np.abs(shaken(8.0, 1e-3))
@@ -74,11 +64,6 @@ def test_harmonics_at_8_hz_and_1_mm_have_their_values():
 def test_half_the_step_changes_no_harmonic_by_half_a_percent():
     coarse, fine = np.abs(shaken(8.0, 1e-3)), np.abs(shaken(8.0, 1e-3, dt=DT / 2.0))
     np.testing.assert_allclose(coarse, fine, rtol=0.005)
-
-
-def test_even_harmonics_come_from_the_asymmetric_bulge_alone():
-    assert np.abs(shaken(8.0, 1e-3, SYMMETRIC))[1::2].max() <= 0.01
-    assert np.abs(shaken(8.0, 1e-3))[1::2].min() >= 0.4
 
 
 @given(
@@ -98,13 +83,6 @@ def test_the_bulge_s_slope_is_its_compliance_and_its_energy_the_work_of_its_pres
     work = upper_energy(hydromount, volume + width) - upper_energy(hydromount, volume - width)
     assert work == pytest.approx(2.0 * width * pressure, rel=2e-3, abs=1e-8)
     assert upper_energy(hydromount, volume) >= 0.0
-
-
-def test_between_its_stops_the_decoupler_is_free_and_beyond_them_not():
-    assert decoupler_overrun(HYDROMOUNT, 1.0e-6) == 0.0
-    assert decoupler_overrun(HYDROMOUNT, -0.6e-6) == 0.0
-    assert decoupler_overrun(HYDROMOUNT, 1.3e-6) == pytest.approx(0.3e-6)
-    assert decoupler_overrun(HYDROMOUNT, -0.7e-6) == pytest.approx(-0.1e-6)
 
 
 def test_a_slow_stroke_only_fills_the_soft_chamber():
@@ -141,13 +119,3 @@ def test_it_never_returns_more_energy_than_it_was_given(frequency, amplitude, se
     force = hydromount_response(hydromount, stroke, DT)
     work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(stroke))
     assert work.min() >= -1e-4 * np.abs(work).max()
-
-
-def test_its_state_is_a_named_record_at_rest():
-    assert np.zeros(1, HYDROMOUNT_STATE).dtype == HYDROMOUNT_STATE
-    assert hydromount_force(HYDROMOUNT, np.zeros(1, HYDROMOUNT_STATE)[0]) == 0.0
-
-
-def test_every_parameter_has_unit_meaning_and_a_range_that_holds_its_default():
-    assert set(quantities(HYDROMOUNT)) == set(HYDROMOUNT._fields)
-    assert checked(HYDROMOUNT) == HYDROMOUNT

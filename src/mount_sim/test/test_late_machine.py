@@ -131,7 +131,8 @@ class Link:
                 self._latency = self.random.integers(25) if late and self.random.uniform() < 0.5 else 0
             if self.electronics.runs(self.now, late):
                 while self.mount.sample < self.now:  # the next sample follows at once: none is skipped
-                    self._loop.step_in_real_time()
+                    self._loop.send_sample()
+                    self._loop.go_on()
             if self.host.runs(self.now, late):
                 while self.exchange.poll():
                     pass

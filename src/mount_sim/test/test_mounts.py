@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from energy import LOSSES, Books, imbalance
 from stiffness import dynamic_stiffness
 
+from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
-from mount_sim.electronics.electronics import Noise
+from mount_sim.excitation.array_file import write_excitation
 from mount_sim.excitation.building import build_excitation
-from mount_sim.plant.elastomer import Elastomer
+from mount_sim.excitation.excitation import Excitation, Seat
+from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.plant.mounts import MOUNTS, seated_mount
-from mount_sim.plant.plant import PlantSimulation
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from mount_sim.plant.vehicle import Elastomer, Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
 CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}
@@ -24,10 +24,9 @@ def closed(number):
 
 @pytest.fixture
 def shaken_chassis(tmp_path):
-    times = np.arange(500) / 200.0
-    np.save(tmp_path / 'z_value.npy', 2.0 * np.sin(2 * np.pi * 6.0 * times))
-    np.save(tmp_path / 'z_t.npy', times)
-    return {**CHASSIS, 'recorded__file': str(tmp_path / 'z_value.npy')}
+    values = series_of(2.0 * np.sin(2 * np.pi * 6.0 * STEP_TIME * np.arange(50_000)))
+    shaken = Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, 0.0)
+    return {**CHASSIS, 'recorded__file': str(write_excitation(tmp_path / 'z.npy', shaken))}
 
 
 def harmonics(truth):
@@ -71,12 +70,6 @@ def test_the_driver_of_friction_off_opens_when_the_excitation_begins(make_mount,
     assert (truth['current_setpoint'][201:] == 0.0).all()
     assert (truth['coil_current'][260:] == 0.0).all()
     assert (truth['friction_force'][260:] == 0.0).all()
-
-
-def test_friction_always_on_is_the_friction_mount(make_mount, drive):
-    _, always = drive(make_mount(mount='friction_always_on'), closed)
-    _, friction = drive(make_mount(), closed)
-    assert always.tobytes() == friction.tobytes()
 
 
 @pytest.mark.parametrize('seat', ['motorway', 'recorded'])
@@ -131,43 +124,3 @@ def test_an_unknown_mount_is_refused_with_the_known_ones(parameters):
 
 
 # Energy
-
-
-def damped_ride(parameters, mount, **chosen):
-    """The account of a ride, its current following the speed as a damper would ask it to."""
-    settings = parameters(mount=mount, **chosen)
-    excitation = build_excitation(settings)
-    plant, plain = (PlantSimulation(settings.plant, excitation.seat, excitation.step_time) for _ in range(2))
-    books, forces = Books(plant), excitation.engine_forces
-    forces = np.zeros(len(excitation.values)) if forces is None else forces
-    for first in range(0, len(excitation.values), 20):
-        step = slice(first, first + 20)
-        plant.read(np.zeros(Noise.NUMBERS))
-        plain.read(np.zeros(Noise.NUMBERS))
-        assert plain.truth_bytes == plant.truth_bytes
-        current = min(0.48 + 8.0 * abs(plant.truth['velocity']), 3.0)
-        books.advance(excitation.values[step], forces[step], current)
-        plain.advance(excitation.values[step], forces[step], current)
-    return books.account
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('idle', [0.0, 200.0])
-@pytest.mark.parametrize(
-    'chosen',
-    [
-        {'scenario': 'motorway', 'timeline__duration': 6.0, 'motorway__gap_depth': 0.03},
-        {'scenario': 'sweep', 'sweep__first_frequency': 4.0, 'timeline__duration': 8.0},
-    ],
-)
-@pytest.mark.parametrize('mount', ['friction', 'hydro', 'elastomer'])
-def test_what_the_road_puts_in_is_stored_or_dissipated(parameters, mount, chosen, idle):
-    """To a thousandth of what the mount takes, which is a small share of what the suspension does."""
-    account = damped_ride(parameters, mount, idle__amplitude=idle, **chosen)
-    assert account['road_work'] > 20.0
-    in_the_mount = sum(account[name] for name in LOSSES if name not in ('suspension_loss', 'chassis_loss'))
-    assert in_the_mount > 0.5
-    assert abs(imbalance(account)) <= 1e-3 * in_the_mount
-    assert all(account[name] >= 0.0 for name in LOSSES)
-    sliding, track = account['sliding_loss'] > 0.0, account['track_loss'] > 0.0
-    assert (sliding, track) == (mount == 'friction', mount == 'hydro')

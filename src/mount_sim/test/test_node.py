@@ -5,11 +5,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from ros_testing import wait_until
 from std_srvs.srv import SetBool
 
 from mount_driver.can_library import can
 from mount_ros.nodes.diagnostics import Level
-from mount_ros.testing import wait_until
 from mount_sim.node import INJECT, MountSim
 
 SUCCESS = TransitionCallbackReturn.SUCCESS

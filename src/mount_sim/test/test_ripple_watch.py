@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mount_driver.quantisation import quantised_current_rate, quantised_flux_rate
-from mount_driver.watches.ripple_law import RippleLaw, gap_of_crossing, ripple_law, warmth
+from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_models.coil.gap import gap_from_crossing_current
 from mount_models.coil.heating import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
@@ -73,20 +72,6 @@ def test_the_defaults_are_the_shipped_specimen_s():
         assert getattr(law, name) == pytest.approx(value, rel=1e-12), name
 
 
-def test_the_gap_of_a_crossing_is_the_specimen_s_within_3_um():
-    law, curves = RippleLaw(), default_specimen().gap_curves
-    for current in np.linspace(law.crossing[0], law.crossing[2], 20):
-        assert gap_of_crossing(law, current) == pytest.approx(
-            gap_from_crossing_current(curves, current), abs=3e-6
-        )
-
-
-def test_an_unknown_temperature_and_a_specimen_without_compensation_change_nothing():
-    law = RippleLaw()
-    assert warmth(law, math.nan) == warmth(law._replace(warm_rise=0.0), 80.0) == 1.0
-    assert warmth(law, -40.0) < 0.95 < 1.0 < 1.05 < warmth(law, 80.0)
-
-
 def test_the_ramp_tells_the_gap_at_the_crossing(learnt):
     figures = learnt.figures
     assert figures.gap == pytest.approx(341.2e-6, abs=6e-6)
@@ -148,13 +133,6 @@ def test_slow_wear_is_warned_of_before_it_is_a_fault(learnt):
     assert learnt.figures.gap_change == pytest.approx(-20e-6, abs=4e-6)
 
 
-def test_what_is_about_to_be_a_fault_is_not_warned_of(learnt):
-    gone = MECHANICS._replace(contact_gap=250e-6)
-    for k in range(0, 300, 10):
-        assert fed(learnt, readings(DAMPING[k : k + 10], mechanics=gone), begin=10_000 + k) is None
-        assert learnt.warning == ''
-
-
 @pytest.mark.parametrize('currents', [np.zeros(2000), READY, DAMPING])
 def test_shorted_turns_are_found_by_the_voltage(learnt, currents):
     shorted = readings(currents, COIL._replace(resistance=1.25), actuator=ACTUATOR._replace(turns=240.0))
@@ -190,13 +168,6 @@ def test_a_ripple_that_is_missing_is_found_also_if_a_reading_comes_now_and_then(
     assert fed(found, samples) is not None
 
 
-def test_readings_that_are_missing_now_and_then_are_no_fault(learnt):
-    samples = readings(DAMPING)
-    samples[1][::3] = math.nan
-    samples[1][100:300] = math.nan  # shorter than the duration
-    assert fed(learnt, samples) is None
-
-
 def test_noise_is_told_as_noise(learnt):
     k, sentence = fed(learnt, readings(READY, noise=0.2))
     assert k < 400
@@ -225,13 +196,6 @@ def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
     other = coil_at(celsius)
     assert fed(learnt, readings(DAMPING[:100], other), begin=10_000) is None
     assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
-
-
-def test_what_was_carried_to_the_wrong_temperature_is_forgotten(learnt):
-    warm = coil_at(122.0)
-    assert fed(learnt, readings(READY[:100], warm), begin=10_000) is None
-    assert fed(learnt, readings(np.zeros(250), warm), 14.0, 122.0, begin=10_100) is None
-    assert fed(learnt, readings(READY, warm), 14.0, 122.0, begin=10_350) is None
 
 
 def test_a_deviation_that_goes_is_no_fault(learnt):
@@ -318,16 +282,3 @@ def test_pads_that_wear_are_found_where_the_engine_is_damped_for_one_period_alon
     assert doubt is not None
     assert len(READY) + 300 <= doubt[0] < len(READY) + 350
     assert doubt[1].startswith('coil inductance by the ripple at ')
-
-
-@pytest.mark.parametrize('volts', [9.0, 12.0, 16.0])
-def test_another_supply_than_in_the_ramp_is_no_deviation(learnt, volts):
-    assert fed(learnt, readings(DAMPING, coil_at(20.0, volts)), volts, begin=len(RAMP)) is None
-    assert abs(learnt.figures.gap_change) < 3e-6
-
-
-@pytest.mark.parametrize('volts', [9.0, 14.0, 16.0])
-def test_the_gap_of_the_ramp_is_the_same_at_any_supply(volts):
-    found = watch()
-    assert fed(found, readings(RAMP, coil_at(20.0, volts)), volts) is None
-    assert found.figures.gap * 1e6 == pytest.approx(341.0, abs=4.0)

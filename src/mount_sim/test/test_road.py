@@ -4,30 +4,29 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from mount_models.quantity import ParameterError, checked, quantities
+from mount_models.quantity import ParameterError
 from mount_sim.excitation.road import (
-    ROAD_CLASSES,
     Gap,
     RandomRoad,
     RoadError,
-    Sweep,
     gap_in_road,
     random_road,
     sweep_road,
 )
+from mount_sim.excitation.scenario import SweepScenario
 
 
 def density(heights, spacing, segment):
     return signal.welch(heights, fs=1.0 / spacing, nperseg=segment, detrend='linear')
 
 
-@pytest.mark.parametrize('name', ROAD_CLASSES)
-def test_random_road_has_the_density_of_its_class(name):
-    road = RandomRoad(roughness=ROAD_CLASSES[name], ramp_in=0.0)
+@pytest.mark.parametrize('roughness', [2e-6, 1024e-6])
+def test_random_road_has_the_density_of_its_class(roughness):
+    road = RandomRoad(roughness=roughness, ramp_in=0.0)
     spacing = 0.05
     heights = random_road(np.arange(0.0, 6000.0, spacing) / road.speed, road)
     frequency, found = density(heights, spacing, 8192)
-    expected = ROAD_CLASSES[name] * (0.1 / frequency[1:]) ** 2
+    expected = roughness * (0.1 / frequency[1:]) ** 2
     ratio = found[1:] / expected
     for low, high in ((0.03, 0.1), (0.1, 0.5), (0.5, 2.8)):
         band = (frequency[1:] > low) & (frequency[1:] < high)
@@ -41,14 +40,6 @@ def test_random_road_has_nothing_outside_its_band():
     inside = found[(frequency > 0.15) & (frequency < 0.95)].min()
     assert found[frequency > 1.1].max() < 1e-3 * inside
     assert found[frequency < 0.08].max() < 1e-3 * found[(frequency > 0.1) & (frequency < 0.15)].max()
-
-
-@pytest.mark.parametrize(('waviness', 'ratio'), [(1.5, 10**1.5), (2.0, 100.0), (2.5, 10**2.5)])
-def test_waviness_sets_the_fall_of_the_density(waviness, ratio):
-    road = RandomRoad(waviness=waviness, ramp_in=0.0)
-    frequency, found = density(random_road(np.arange(0.0, 6000.0, 0.05) / 33.0, road), 0.05, 8192)
-    around = [np.mean(found[(frequency > 0.7 * n) & (frequency < 1.4 * n)]) for n in (0.15, 1.5)]
-    assert around[0] / around[1] == pytest.approx(ratio, rel=0.25)
 
 
 def test_height_does_not_depend_on_the_other_times():
@@ -73,15 +64,6 @@ def test_same_seed_is_the_same_road_and_another_seed_another():
     assert not np.allclose(random_road(times, RandomRoad(seed=4)), random_road(times, RandomRoad(seed=5)))
 
 
-def test_faster_vehicle_meets_the_same_road_sooner():
-    slow = random_road([4.0], RandomRoad(speed=10.0))
-    assert random_road([2.0], RandomRoad(speed=20.0)) == pytest.approx(slow, abs=1e-12)
-
-
-def test_random_road_begins_level():
-    assert random_road([0.0, 1e-4], RandomRoad()) == pytest.approx([0.0, 0.0], abs=1e-6)
-
-
 @pytest.mark.parametrize('depth', [0.010, 0.020, 0.030])
 def test_gap_goes_down_by_its_depth_over_its_length(depth):
     gap = Gap(depth=depth, position=66.0)
@@ -98,7 +80,7 @@ def test_gap_goes_down_by_its_depth_over_its_length(depth):
 def test_sweep_rises_one_hertz_per_second_at_constant_velocity():
     dt = 5e-5
     times = np.arange(0.0, 30.0, dt)
-    heights = sweep_road(times, Sweep())
+    heights = sweep_road(times, SweepScenario())
     velocity = np.diff(heights) / dt
     for start in (5.0, 15.0, 28.0):
         second = (times[:-1] >= start) & (times[:-1] < start + 1.0)
@@ -108,7 +90,7 @@ def test_sweep_rises_one_hertz_per_second_at_constant_velocity():
 
 
 def test_sweep_begins_level_and_then_has_its_formula():
-    sweep = Sweep(velocity_amplitude=0.2)
+    sweep = SweepScenario(velocity_amplitude=0.2)
     assert sweep_road([0.0], sweep)[0] == 0.0
     assert sweep_road([0.5], sweep)[0] == pytest.approx(
         0.5 * -0.2 / (2.0 * np.pi * 1.5) * np.cos(2.0 * np.pi * 0.625), rel=1e-12
@@ -121,25 +103,14 @@ def test_sweep_begins_level_and_then_has_its_formula():
 @pytest.mark.parametrize(
     ('call', 'error', 'sentence'),
     [
-        (lambda: gap_in_road([0.0], Gap(depth=-0.01)), ParameterError, r'depth \(-0\.01 m\) must lie within'),
-        (lambda: sweep_road([0.0], Sweep(velocity_amplitude=99.0)), ParameterError, 'velocity_amplitude'),
         (lambda: random_road([0.0], RandomRoad(speed=0.0)), ParameterError, r'speed \(0 m/s\)'),
         (
             lambda: random_road([0.0], RandomRoad(lowest_frequency=5.0)),
             RoadError,
             r'highest_frequency \(3 cycles/m\) must lie above lowest_frequency \(5 cycles/m\)',
         ),
-        (lambda: gap_in_road([-1.0], Gap()), RoadError, 'times must be one row of finite seconds'),
-        (lambda: gap_in_road([], Gap()), RoadError, 'times must be one row'),
-        (lambda: sweep_road([np.nan], Sweep()), RoadError, 'times must be one row'),
     ],
 )
 def test_nonsense_is_refused_with_a_sentence(call, error, sentence):
     with pytest.raises(error, match=sentence):
         call()
-
-
-@pytest.mark.parametrize('parameters', [RandomRoad(), Gap(), Sweep()])
-def test_every_parameter_has_unit_meaning_and_a_range_that_holds_its_default(parameters):
-    assert set(quantities(parameters)) == set(parameters._fields)
-    assert checked(parameters) == parameters

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.signal import SignalError
+from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
+from mount_sim.excitation.array_file import write_excitation
 from mount_sim.excitation.building import build_excitation
-from mount_sim.excitation.excitation import Seat
+from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.scenario import STEP_TIME
 
 
@@ -83,19 +84,6 @@ def test_the_sweep_shakes_the_wheel_from_1_to_50_hz_in_49_s(parameters):
     np.testing.assert_allclose(excitation.values[:], height, atol=1e-12)
 
 
-def test_a_sweep_takes_its_own_frequencies_rate_and_amplitude(parameters):
-    chosen = parameters(
-        scenario='sweep', sweep__first_frequency=5.0, sweep__last_frequency=9.0, sweep__rate=2.0,
-        sweep__velocity_amplitude=0.06, sweep__ramp_in=0.0,
-    )  # fmt: skip
-    excitation = build_excitation(chosen)
-    assert excitation.duration == pytest.approx(2.0)
-    velocity = np.diff(excitation.values[:]) / STEP_TIME
-    assert np.abs(velocity).max() == pytest.approx(0.06, rel=0.02)
-    crossings = np.flatnonzero(np.diff(excitation.values[:] > 0.0))  # exact zeros count once
-    assert len(crossings) == pytest.approx(2.0 * 0.5 * (5.0 + 9.0) * 2.0, abs=1)
-
-
 def test_an_impossible_sweep_is_refused(parameters):
     down = parameters(scenario='sweep', sweep__first_frequency=20.0, sweep__last_frequency=20.0)
     assert _refusal(down) == ('sweep.last_frequency (20 Hz) must lie above sweep.first_frequency (20 Hz)')
@@ -132,84 +120,65 @@ def test_a_tip_in_lifts_the_engine_once_and_adds_to_the_idle_force(parameters):
     np.testing.assert_array_equal(both[17:4242], both[:][17:4242])
 
 
-def test_a_tip_in_on_the_bench_is_refused(parameters):
-    refusal = _refusal(parameters(scenario='bench', tip_in__force=-20.0))
-    assert refusal.startswith('tip_in.force (-20 N) has no effect in scenario bench')
-
-
-def test_an_idle_force_on_the_bench_is_refused(parameters):
-    refusal = _refusal(parameters(scenario='bench', idle__amplitude=200.0))
-    assert refusal.startswith('idle.amplitude (200 N) has no effect in scenario bench')
-
-
 @pytest.fixture
 def recording(tmp_path):
-    times = np.arange(2000) / 200.0
-    np.save(tmp_path / 'z_value.npy', np.sin(2 * np.pi * 8.0 * times))
-    np.save(tmp_path / 'z_t.npy', times)
-    return str(tmp_path / 'z_value.npy')
-
-
-def test_a_recording_shakes_the_chassis_and_gives_its_length(parameters, recording):
-    excitation = build_excitation(parameters(scenario='recorded', recorded__file=recording))
-    assert excitation.seat is Seat.ACCELERATED_CHASSIS
-    assert excitation.duration == pytest.approx(9.995, abs=1e-4)
-    shorter = build_excitation(
-        parameters(scenario='recorded', recorded__file=recording, timeline__duration=4.0)
+    """Return an array file of 10 s; its numbers are those of a sine in m/s^2."""
+    shaken = sim_excitation(
+        Seat.ACCELERATED_CHASSIS, np.sin(2 * np.pi * 8.0 * STEP_TIME * np.arange(200_000))
     )
-    np.testing.assert_array_equal(shorter.values[:], excitation.values[:80_000])
+    return str(write_excitation(tmp_path / 'z.npy', shaken))
 
 
-def test_what_was_done_to_a_recording_is_told(parameters, recording):
-    assert build_excitation(parameters(scenario='recorded', recorded__file=recording)).notes == ()
-    times = np.load(recording.replace('value', 't'))
-    times[500] = times[499] + 1e-6
-    np.save(recording.replace('value', 't'), times)
-    (note,) = build_excitation(parameters(scenario='recorded', recorded__file=recording)).notes
-    assert note.startswith('z.0: taken as evenly spaced at 200 Hz: ')
+def sim_excitation(seat, values):
+    return Excitation(seat, series_of(values), STEP_TIME, 0.0)
 
 
-def test_a_recording_is_scaled(parameters, recording):
-    plain, scaled = (
-        build_excitation(parameters(scenario='recorded', recorded__file=recording, recorded__scale=scale))
-        for scale in (1.0, -9.81)
-    )
-    np.testing.assert_allclose(scaled.values[:], -9.81 * plain.values[:])
+@pytest.mark.parametrize(
+    ('scenario', 'seat'), [('recorded', Seat.ACCELERATED_CHASSIS), ('road', Seat.VEHICLE)]
+)
+def test_an_array_shakes_the_plant_to_the_bit_and_gives_its_length(parameters, tmp_path, scenario, seat):
+    values = np.random.default_rng(2).standard_normal(100_000)
+    file = write_excitation(tmp_path / 'excitation.npy', sim_excitation(seat, values))
+    chosen = {'scenario': scenario, f'{scenario}__file': str(file)}
+    excitation = build_excitation(parameters(**chosen))
+    assert (excitation.seat, excitation.duration) == (seat, pytest.approx(5.0))
+    assert excitation.values[:].tobytes() == values.tobytes()
+    cut = build_excitation(parameters(**chosen, timeline__duration=1.0))
+    assert cut.values[:].tobytes() == values[:20_000].tobytes()
+    too_long = parameters(**chosen, timeline__duration=5.5)
+    assert 'duration (5.5 s) is longer than' in _refusal(too_long)
 
 
-def test_what_a_recording_cannot_give_is_refused(parameters, recording):
-    assert 'scenario recorded needs a file: CSV, NPY, JSON or MCAP' in _refusal(
-        parameters(scenario='recorded')
-    )
-    too_long = parameters(scenario='recorded', recorded__file=recording, timeline__duration=10.5)
-    assert 'duration (10.5 s) is longer than the recording z.0 (9.995 s)' in _refusal(too_long)
+@pytest.mark.parametrize(
+    ('content', 'reason'),
+    [
+        (None, 'cannot be read as NPY'),
+        (np.ones(9), 'is no array of at least one road_height, each 50 us'),
+        (np.ones(9, [('chassis_acceleration', '<f8')]), 'is no array of at least one road_height'),
+        (np.ones(0, [('road_height', '<f8')]), 'is no array of at least one road_height'),
+        (np.array([(0.0,), (np.nan,)], [('road_height', '<f8')]), 'is not finite at number 1'),
+    ],
+)
+def test_an_array_of_another_kind_is_refused(parameters, tmp_path, content, reason):
+    file = tmp_path / 'road.npy'
+    if content is not None:
+        np.save(file, content)
+    assert reason in _refusal(parameters(scenario='road', road__file=str(file)))
 
 
-def road_file(folder, heights, period=1e-3):
-    np.save(folder / 'road_value.npy', heights)
-    np.save(folder / 'road_t.npy', period * np.arange(heights.size))
-    return str(folder / 'road_value.npy')
-
-
-def test_a_measured_road_goes_under_the_wheel_as_it_is(parameters, tmp_path):
-    times = 1e-3 * np.arange(3001)
-    file = road_file(tmp_path, 0.01 * np.sin(2 * np.pi * 5.0 * times))
-    excitation = build_excitation(parameters(scenario='road', road__file=file))
-    assert excitation.seat is Seat.VEHICLE
-    assert excitation.duration == pytest.approx(3.0, abs=0.001)
-    steps = np.arange(len(excitation.values)) * STEP_TIME
-    middle = slice(2000, -2000)
-    wanted = 0.01 * np.sin(2 * np.pi * 5.0 * steps)
-    np.testing.assert_allclose(excitation.values[:][middle], wanted[middle], atol=5e-6)
-    cut = build_excitation(parameters(scenario='road', road__file=file, timeline__duration=1.0))
-    assert cut.duration == pytest.approx(1.0)
-
-
-def test_a_measured_road_that_is_missing_too_short_or_in_another_unit_is_refused(parameters, tmp_path):
+def test_what_only_the_desk_can_read_is_refused(parameters, recording):
+    assert 'scenario recorded needs a file: CSV, NPY' in _refusal(parameters(scenario='recorded'))
     assert 'scenario road needs a measured road' in _refusal(parameters(scenario='road'))
-    file = road_file(tmp_path, 0.01 * np.sin(0.1 * np.arange(3001)))
-    long = parameters(scenario='road', road__file=file, timeline__duration=9.0)
-    assert 'is longer than the road road.0 (3.000 s)' in _refusal(long)
-    file = road_file(tmp_path, 10.0 * np.sin(0.1 * np.arange(3001)))
-    with pytest.raises(SignalError, match='is meant in m, without hills'):
-        build_excitation(parameters(scenario='road', road__file=file))
+    chosen = parameters(scenario='recorded', recorded__file=recording, recorded__scale=-1.0)
+    assert 'are for engine-mount drive, which makes the excitation of a recording' in _refusal(chosen)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'tip_in__force': -20.0}, 'tip_in.force (-20 N) has no effect in scenario bench'),
+        ({'idle__amplitude': 200.0}, 'idle.amplitude (200 N) has no effect in scenario bench'),
+    ],
+)
+def test_a_force_on_the_engine_is_refused_on_the_bench(parameters, changes, reason):
+    assert _refusal(parameters(scenario='bench', **changes)).startswith(reason)

@@ -82,15 +82,6 @@ def test_a_driver_that_opens_says_that_it_is_off(make_mount):
     assert on == [True] * 50 + [False] * 3
 
 
-def test_a_faulty_driver_gives_what_it_likes(make_mount):
-    mount = make_mount(faults=('coil_half@0',))
-    for _ in range(100):
-        mount.measure()
-        mount.advance(1.0)
-    mount.measure()
-    assert mount.truth['coil_current'] == pytest.approx(0.5, abs=1e-3)
-
-
 def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
     mount, currents = make_mount(), []
     for number in range(60):
@@ -141,37 +132,6 @@ def test_the_noise_is_no_part_of_the_truth(make_mount, drive):
     assert quiet_truth.tobytes() == noisy_truth.tobytes()
     np.testing.assert_array_equal(quiet[:, 0], quiet_truth['displacement'])
     assert np.std(noisy[:, 0] - noisy_truth['displacement']) == pytest.approx(1e-4, rel=0.2)
-
-
-@pytest.mark.parametrize(('depth', 'peak'), [(0.030, 3.55e-3), (0.020, 2.37e-3), (0.010, 1.18e-3)])
-def test_a_gap_in_the_road_without_damping_shakes_the_engine(make_mount, drive, depth, peak):
-    mount = make_mount(
-        scenario='motorway', timeline__duration=3.0, motorway__gap_depth=depth, motorway__roughness=0.0
-    )
-    _, truth = drive(mount)
-    assert np.abs(truth['displacement']).max() == pytest.approx(peak, rel=0.005)
-    # the chassis follows, the engine more so: the mount is between them
-    relative = truth['engine_displacement'] - truth['chassis_displacement']
-    np.testing.assert_allclose(relative, truth['displacement'], atol=1e-12)
-    assert truth['road_height'].min() == pytest.approx(-depth, rel=1e-3)
-
-
-def test_the_gaps_of_the_truth_are_those_of_the_parameters(make_mount, drive):
-    mount = make_mount(mechanics__rest_gap=500e-6, mechanics__contact_gap=340e-6)
-    _, truth = drive(mount, lambda number: 1.0)
-    assert set(truth['rest_gap']) == {500e-6}
-    assert set(truth['contact_gap']) == {340e-6}
-    assert truth['gap'][0] == 500e-6
-    closed = 340e-6 - truth['normal_force'][-1] / 2e7
-    assert truth['gap'][-1] == pytest.approx(closed, abs=1e-9)
-
-
-def test_the_bench_force_is_elastomer_plus_friction(make_mount, drive):
-    _, free = drive(make_mount())
-    _, damped = drive(make_mount(), lambda number: 1.0)
-    np.testing.assert_allclose(
-        damped['mount_force'] - damped['friction_force'], free['mount_force'], atol=1e-9
-    )
 
 
 def test_an_impossible_plant_is_refused():

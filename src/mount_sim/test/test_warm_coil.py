@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from mount_sim.electronics.electronics import ElectronicsParameters, Noise
-from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import Plant, PlantSimulation
-from mount_sim.plant.ripple import RippleCoil
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
 
 COIL = RippleCoil()
 

@@ -16,6 +16,7 @@ from engine_mount.drives.progress import DriveProgress
 from engine_mount.recordings.run.folder import RunFolder, make_run_folder
 from engine_mount.recordings.run.screen import Screen
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.signals.excitation import with_array
 from mount_bringup.chosen import Parameters
 from mount_bringup.graph.domain import can_port, domain_locks
 from mount_bringup.graph.nodes import (
@@ -96,7 +97,7 @@ def _drive_graph(
     settings = GraphSettings(
         namespace=order.namespace,
         domain=order.domain,
-        parameters=_node_parameters(order, folder),
+        parameters=_node_parameters(order, excitation, folder),
         grouping=_grouping(order),
         priority=0 if lockstep else order.priority,
         restart_limit=order.restart_limit,
@@ -209,7 +210,9 @@ def _control_faults(faults: int) -> list[str]:
     return [f'{FAULT_SENTENCE} (times: {faults})'] if faults else []
 
 
-def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str, Any]]:
+def _node_parameters(
+    order: DriveOrder, excitation: Excitation, folder: RunFolder
+) -> dict[str, dict[str, Any]]:
     lockstep, mounts = order.mode == 'lock-step', order.mounts
     buses = {mount: _bus(order, mount) for mount in mounts or ('',)}
     interface = {'interface': 'virtual' if _grouping(order) is Grouping.TOGETHER else 'udp_multicast'}
@@ -225,6 +228,7 @@ def _node_parameters(order: DriveOrder, folder: RunFolder) -> dict[str, dict[str
     # Nothing but a stalled process may end a ramp in lock-step.
     patience = {'silence_timeout': 10.0} if lockstep else {}
     added = {name: {**values, **order.parameters.get(name, {})} for name, values in shared.items()}
+    added[SIM.name] = with_array(added[SIM.name], excitation, folder.path / FOLDER)
     for mount, settings in settings_of_mounts(order.parameters).items():
         own = {'mount_driver': interface | buses[mount], 'mount_init': patience, 'mount_control': {}}
         for name, values in own.items():
@@ -246,8 +250,16 @@ def _grouping(order: DriveOrder) -> Grouping:
 
 def _session(order: DriveOrder, parameters: Parameters) -> str:
     told = told_parameters(parameters)
+    # the files that the order names, not the array that is made of them
+    read = {name: value for name, value in order.parameters.get(SIM.name, {}).items() if _names_input(name)}
+    others = {name: value for name, value in told.get(SIM.name, {}).items() if not _names_input(name)}
+    told[SIM.name] = {**others, **read}
     content = {'scenario': order.scenario, 'mode': order.mode, 'parameters': told}
     return session_text(new_session({**content, **provenance(order.brought, order.parameters)}))
+
+
+def _names_input(name: str) -> bool:
+    return name.startswith(('recorded.', 'road.'))
 
 
 def told_parameters(parameters: Parameters) -> dict[str, dict[str, Any]]:

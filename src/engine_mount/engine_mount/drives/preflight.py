@@ -3,6 +3,7 @@
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.recorder_options import checked_recorder
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.chosen import Parameters
 from mount_bringup.settings import check_sample_rate
 from mount_control.settings import check_effect
@@ -10,9 +11,7 @@ from mount_driver.parameters import DriverParameters
 from mount_models.quantity import with_flattened
 from mount_recorder.parameters import RecorderParameters
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
-from mount_sim.excitation.building import build_excitation
-from mount_sim.excitation.excitation import Excitation
-from mount_sim.excitation.shaking import steps_of_sample
+from mount_sim.excitation.excitation import Excitation, steps_of_sample
 from mount_sim.mount_choice import check_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant

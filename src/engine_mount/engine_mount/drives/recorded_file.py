@@ -10,6 +10,7 @@ import numpy as np
 from engine_mount.drives.brought import Brought
 from engine_mount.recordings.signals.even_grid import evenly_spaced
 from engine_mount.recordings.signals.signal import Signal
+from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading
 from engine_mount.signals.formats.reading import headings
@@ -26,7 +27,6 @@ from engine_mount.signals.units.mapping import (
 )
 from engine_mount.signals.units.quantities import quantity
 from engine_mount.signals.units.signals import chosen_signals
-from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE
 
 _ACCELERATION = 'acceleration'
 _OWN = recorded_as(quantity(_ACCELERATION))

@@ -6,6 +6,7 @@ import os
 import time
 
 import pytest
+from ros_testing import free_domain
 from typer.testing import CliRunner
 
 from engine_mount.cli.bench import bench, fleet
@@ -13,7 +14,6 @@ from engine_mount.cli.bench.chain_runs import Place, relay_in_turn
 from engine_mount.cli.bench.comparison import Comparison
 from engine_mount.cli.bench.processes import children, memory, processor_time
 from engine_mount.cli.command import app
-from mount_ros.testing import free_domain
 
 
 @pytest.fixture

@@ -22,9 +22,9 @@ from engine_mount.experiments.recorded_drive.evaluation import (
 )
 from engine_mount.experiments.registry import experiments_named
 from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.recorded import acceleration_at, recorded_acceleration
-from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario
 
 pytestmark = pytest.mark.slow
 
@@ -150,7 +150,7 @@ def test_alone_its_own_page_is_the_page(driven, tmp_path):
 
 @needs_i280
 def test_the_committed_page_tells_of_this_recording():
-    signal = recorded_acceleration(I280, column='accelerometer.2')
+    signal = recorded_signal(RecordedScenario(str(I280), 'accelerometer.2'))
     values = acceleration_at(signal, -1.0, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
     text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
     told = re.findall(r'([\d.]+) m/s\^2 from', text)

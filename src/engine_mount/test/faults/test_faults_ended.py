@@ -5,11 +5,11 @@ import signal
 from pathlib import Path
 
 import pytest
+from ros_testing import free_domain
 
 from engine_mount.faults import session
 from engine_mount.faults.case import MATRIX
 from engine_mount.faults.graph import Place
-from mount_ros.testing import free_domain
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

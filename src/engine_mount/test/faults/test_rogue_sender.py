@@ -4,8 +4,7 @@ import subprocess
 import sys
 
 import pytest
-
-from mount_ros.testing import free_domain
+from ros_testing import free_domain
 
 
 @pytest.mark.slow

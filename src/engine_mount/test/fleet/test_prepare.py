@@ -13,7 +13,7 @@ from engine_mount.fleet.catalogue.reading import read_place
 from engine_mount.fleet.what_if.one import replay_one
 from engine_mount.drives.loop import recording
 from engine_mount.fleet.prepare import prepare
-from mount_ros.testing import compiled_so_far
+from ros_testing import compiled_so_far
 
 prepare(scenarios=['motorway'], policies=['switched_viscous'])
 before = compiled_so_far()

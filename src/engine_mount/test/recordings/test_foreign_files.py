@@ -16,6 +16,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from recorded_drive import write_drive
+from ros_testing import mutated
 from test_other_storages import written
 
 import engine_mount
@@ -26,7 +27,6 @@ from engine_mount.recordings.mcap_file import McapFile
 from engine_mount.recordings.mcap_records import CRC_PLACE, RECORD
 from engine_mount.recordings.metadata import MetadataError, read_metadata
 from engine_mount.recordings.series import SeriesError
-from mount_ros.testing import mutated
 
 SEEDS = st.integers(0, 1 << 62)
 ONE_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -7,6 +7,7 @@ import random
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from ros_testing import mutated
 
 from engine_mount.recordings.run.session import SessionError, session_content, session_sample_rate
 from engine_mount.settings.mounts import settings_of_mounts
@@ -22,7 +23,6 @@ from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, quantities, with_flattened
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE
 from mount_models.specimen import SpecimenError, default_specimen
-from mount_ros.testing import mutated
 from mount_sim.parameters import SimParameters
 
 REFUSALS = (YamlError, ParameterError, SpecimenError, DamperError, CoefficientsRefusedError)

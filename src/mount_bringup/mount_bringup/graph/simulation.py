@@ -6,6 +6,7 @@ from mount_bringup.graph.order import LaunchOrder, Settings, Texts, launch_order
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.faults.schedule import FORM, told_faults
 from mount_sim.excitation.building import build_excitation
+from mount_sim.excitation.scenario import SCENARIO_NAMES
 from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS, seated_mount
@@ -14,7 +15,13 @@ from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
 
 SIM_ARGUMENTS = (
     *COMMON_ARGUMENTS,
-    LaunchArgument('scenario', 'what is driven: motorway, bench, sweep, recorded', ('mount_sim.scenario',)),
+    LaunchArgument('scenario', f'what is driven: {", ".join(SCENARIO_NAMES)}', ('mount_sim.scenario',)),
+    LaunchArgument(
+        'excitation',
+        'array of a recording or road at the step of the plant, as in given/ of a drive; '
+        'with scenario:=recorded or road',
+        ('mount_sim.recorded.file', 'mount_sim.road.file'),
+    ),
     LaunchArgument('mount', f'what is between engine and chassis: {", ".join(MOUNTS)}', ('mount_sim.mount',)),
     LaunchArgument(
         'duration', 's of excitation, after which the graph ends', ('mount_sim.timeline.duration',)

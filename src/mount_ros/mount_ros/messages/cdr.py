@@ -25,8 +25,8 @@ _PRIMITIVES = {
     'float': 'f',
     'double': 'd',
 }
-_SEQUENCE = re.compile(r'sequence<(?P<element>[^,>]+)(?:, *\d+)?>')
-_ARRAY = re.compile(r'(?P<element>.+)\[(?P<length>\d+)\]')
+_SEQUENCE = re.compile(r'sequence<([^,>]+)(?:, *\d+)?>')
+_ARRAY = re.compile(r'(.+)\[\d+\]')
 
 
 def message_class(name: str) -> type:
@@ -54,30 +54,24 @@ def _write(stream: bytearray, kind: str, value: Any) -> None:
     if kind == 'octet':
         stream += value
     elif kind in _PRIMITIVES:
-        _write_numbers(stream, _PRIMITIVES[kind], [value])
+        _write_numbers(stream, _PRIMITIVES[kind], value)
     elif kind.startswith('string'):
         text = value.encode() + b'\x00'
-        _write_numbers(stream, 'I', [len(text)])
+        _write_numbers(stream, 'I', len(text))
         stream += text
-    elif match := _SEQUENCE.fullmatch(kind):
-        _write_numbers(stream, 'I', [len(value)])
-        _write_elements(stream, match['element'], value)
-    elif match := _ARRAY.fullmatch(kind):
-        _write_elements(stream, match['element'], value)
+    elif many := _SEQUENCE.fullmatch(kind) or _ARRAY.fullmatch(kind):
+        if many.re is _SEQUENCE:
+            _write_numbers(stream, 'I', len(value))
+        if many[1] in _PRIMITIVES:
+            _write_numbers(stream, _PRIMITIVES[many[1]], *value)
+        else:
+            for each in value:
+                _write(stream, many[1], each)
     else:
         _write_message(stream, value)
 
 
-def _write_elements(stream: bytearray, kind: str, values: Any) -> None:
-    if kind in _PRIMITIVES:
-        _write_numbers(stream, _PRIMITIVES[kind], list(values))
-        return
-    for value in values:
-        _write(stream, kind, value)
-
-
-def _write_numbers(stream: bytearray, code: str, values: list[Any]) -> None:
-    if not values:
-        return
-    stream += bytes(-len(stream) % struct.calcsize(code))
-    stream += struct.pack(f'<{len(values)}{code}', *values)
+def _write_numbers(stream: bytearray, code: str, *values: Any) -> None:
+    if values:
+        stream += bytes(-len(stream) % struct.calcsize(code))
+        stream += struct.pack(f'<{len(values)}{code}', *values)

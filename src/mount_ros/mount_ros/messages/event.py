@@ -1,5 +1,6 @@
 """The text of a message on `event`: "here is something worth finding again", in YAML."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -41,13 +42,12 @@ def read_mark(text: str, received: int) -> Mark:
     """
     # Every word stays the text that it is: `12:30` is no number, and `2026-02-30` no date.
     content = _content(text, words=True)
-    told = {name: content[name] for name in Mark._fields if isinstance(content.get(name), str)}
-    known = len(told) + (len(_OF_CHANGE & content.keys()) if told.get('kind') == PARAMETER else 0)
-    return Mark(
-        _whole_number(told.get('time', ''), received),
-        told.get('kind', BY_HAND),
-        told.get('text', '') if told and known == len(content) else text.strip(),
-    )
+    fields = {name: content[name] for name in Mark._fields if isinstance(content.get(name), str)}
+    kind = fields.get('kind', BY_HAND)
+    others = content.keys() - fields.keys() - (_OF_CHANGE if kind == PARAMETER else set())
+    with contextlib.suppress(ValueError):
+        received = int(fields.get('time', ''))
+    return Mark(received, kind, fields.get('text', '') if fields and not others else text.strip())
 
 
 def change_text(node: str, changes: Mapping[str, tuple[Any, Any]]) -> str:
@@ -81,10 +81,3 @@ def _content(text: str, *, words: bool = False) -> dict[Any, Any]:
     except YamlError:
         return {}
     return content if isinstance(content, dict) else {}
-
-
-def _whole_number(word: str, otherwise: int) -> int:
-    try:
-        return int(word)
-    except ValueError:
-        return otherwise

@@ -5,7 +5,6 @@ Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)
 """
 
 import re
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -43,8 +42,6 @@ def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
     from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
     rows = np.asarray(table, float)
-    if rows.ndim != 2:
-        raise _refusal(f'must have 2 rows of N columns; instead received an array of shape {rows.shape}')
     _check(rows)
     count = int(rows.shape[1])
     dimensions = [
@@ -56,22 +53,26 @@ def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
 
 def from_message(message: 'Float64MultiArray') -> ForceTable:
     """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
-    dimensions = list(message.layout.dim)
-    if len(dimensions) != 2 or dimensions[0].size != 2:
-        sizes = [dimension.size for dimension in dimensions]
-        raise _refusal(f'must have dimensions 2 x N; instead received {sizes}')
-    if dimensions[0].label != _ROWS_LABEL:
-        raise _refusal(f'must have the label {_ROWS_LABEL!r}; instead received {dimensions[0].label!r}')
-    count = dimensions[1].size
-    offset = message.layout.data_offset
-    if offset != 0 or len(message.data) != 2 * count or dimensions[1].stride != count:
+    shape = [(dimension.size, dimension.stride) for dimension in message.layout.dim]
+    offset, numbers = message.layout.data_offset, np.array(message.data, float)
+    count = numbers.size // 2
+    # The stride of the first dimension says nothing that its size does not.
+    if len(shape) != 2 or (shape[0][0], *shape[1], offset) != (2, count, count, 0) or numbers.size % 2:
         raise _refusal(
-            f'must hold 2 x {count} numbers, row by row; instead it holds {len(message.data)} with stride '
-            f'{dimensions[1].stride} and offset {offset}'
+            f'must hold 2 x N numbers, row by row; instead it holds {numbers.size} with offset {offset} and '
+            f'(size, stride) {shape}'
         )
-    rows = np.array(message.data, float).reshape(2, count)
+    rows_label, activation = (dimension.label for dimension in message.layout.dim)
+    if rows_label != _ROWS_LABEL:
+        raise _refusal(f'must have the label {_ROWS_LABEL!r}; instead received {rows_label!r}')
+    stamp = re.fullmatch(rf'{_ACTIVATION_LABEL}([0-9]+)', activation)
+    if stamp is None:
+        raise _refusal(
+            f'must name its activation as "{_ACTIVATION_LABEL}<stamp ns>"; instead received {activation!r}'
+        )
+    rows = numbers.reshape(2, count)
     _check(rows)
-    return ForceTable(_activation(dimensions[1].label), rows[0], rows[1])
+    return ForceTable(int(stamp[1]), rows[0], rows[1])
 
 
 def from_bytes(raw: bytes) -> ForceTable:
@@ -82,28 +83,20 @@ def from_bytes(raw: bytes) -> ForceTable:
     return from_message(deserialize_message(raw, Float64MultiArray))
 
 
-def _activation(label: str) -> int:
-    found = re.fullmatch(rf'{_ACTIVATION_LABEL}([0-9]+)', label)
-    if found is None:
-        raise _refusal(
-            f'must name its activation as "{_ACTIVATION_LABEL}<stamp ns>"; instead received {label!r}'
-        )
-    return int(found[1])
-
-
 def _check(rows: FloatArray) -> None:
-    if rows.shape[0] != 2 or rows.shape[1] < 2:
+    if rows.ndim != 2 or rows.shape[0] != 2 or rows.shape[1] < 2:
         raise _refusal(f'must have 2 rows of at least 2 columns; instead received shape {rows.shape}')
     if not np.isfinite(rows).all():
         column = int(np.argwhere(~np.isfinite(rows))[0][1])
         raise _refusal(f'must be finite; column {column} is {rows[0, column]} A, {rows[1, column]} N')
-    for name, unit, row in zip(('current', 'normal force'), ('A', 'N'), rows.tolist(), strict=True):
-        for column, (one, following) in enumerate(pairwise(row)):
-            if not following > one:
-                raise _refusal(
-                    f'must rise strictly; {name} at columns {column} and {column + 1} is '
-                    f'{one:g} and {following:g} {unit}'
-                )
+    falls = np.argwhere(~(np.diff(rows) > 0.0))
+    if falls.size:
+        row, column = falls[0].tolist()
+        name, unit = (('current', 'A'), ('normal force', 'N'))[row]
+        raise _refusal(
+            f'must rise strictly; {name} at columns {column} and {column + 1} is '
+            f'{rows[row, column]:g} and {rows[row, column + 1]:g} {unit}'
+        )
     low, high = float(rows[0, 0]), float(rows[0, -1])
     if low < 0.0 or high > HIGHEST_CURRENT:
         raise _refusal(

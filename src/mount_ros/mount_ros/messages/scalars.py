@@ -64,11 +64,15 @@ class _Layout:
             raise ScalarsError(
                 f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns'
             )
-        _put(rows, _STAMP_OFFSET, seconds, '<i4')
-        _put(rows, _STAMP_OFFSET + 4, nanoseconds, '<u4')
-        for offset, numbers in zip(self._offsets, runs, strict=False):
-            if numbers is not None:
-                _put(rows, offset, numbers, '<f8')
+        columns: list[tuple[int, NDArray[Any] | None, str]] = [
+            (_STAMP_OFFSET, seconds, '<i4'),
+            (_STAMP_OFFSET + 4, nanoseconds, '<u4'),
+        ]
+        columns += [(offset, run, '<f8') for offset, run in zip(self._offsets, runs, strict=False)]
+        for offset, values, kind in columns:
+            if values is not None:
+                raw = np.ascontiguousarray(values, kind).view(np.uint8).reshape(len(rows), -1)
+                rows[:, offset : offset + raw.shape[1]] = raw
         return rows
 
 
@@ -180,12 +184,6 @@ def _decoded(raw: bytes) -> JointState:
         return deserialize_message(raw, JointState)
     except (RuntimeError, ValueError) as error:  # of the middleware; of a name that is no UTF-8
         raise ScalarsError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
-
-
-def _put(rows: Rows, offset: int, values: NDArray[Any], kind: str) -> None:
-    """Write the bytes of each row of numbers."""
-    raw = np.ascontiguousarray(values, kind).view(np.uint8).reshape(len(rows), -1)
-    rows[:, offset : offset + raw.shape[1]] = raw
 
 
 def _marks(count: int, first: int) -> list[float]:

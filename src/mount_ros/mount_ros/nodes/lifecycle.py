@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import Executor
@@ -21,7 +21,7 @@ from mount_ros.nodes.diagnostics import (
     Verdict,
 )
 from mount_ros.nodes.parameters import ParameterNode
-from mount_ros.nodes.real_time import LoopTiming, RealTime, RealTimeThreads
+from mount_ros.nodes.real_time import RealTime, RealTimeThreads
 from mount_ros.publishers import PublisherWatch
 
 SPIN_PERIOD = 60.0
@@ -31,27 +31,6 @@ _LOCKSTEP = 'time stands in the stamps alone: each sample waits for its answer; 
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 T = TypeVar('T')
-
-
-class ServedPath(Protocol):
-    """What carries the data of a node, as far as the lifecycle needs it; see `DataPath`."""
-
-    refused: int
-    refusal: str
-
-    @property
-    def name(self) -> str:
-        """The full name of the node that has the topics."""
-
-    @property
-    def failure(self) -> str:
-        """Why its thread has ended by itself; empty while it serves."""
-
-    def unmatched(self) -> list[str]:
-        """Return the names of the topics whose other side has not been found yet."""
-
-    def stop(self) -> None:
-        """End serving; safe to call twice."""
 
 
 class SafeLifecycleNode(ParameterNode):
@@ -72,7 +51,8 @@ class SafeLifecycleNode(ParameterNode):
         self._registered_name = name  # its own one may have been remapped
         descriptor = ParameterDescriptor(description=_LOCKSTEP)
         self._lockstep = bool(self.declare_parameter('lockstep', False, descriptor).value)
-        self.data_path: ServedPath | None = None
+        self.data_path: Any = None
+        """What carries its data, and ends with the node: a `DataPath`, or what has the same figures."""
         self._publisher_watch: PublisherWatch | None = None  # of the topics of the data path
         self.data_thread: DataThread | None = None  # shared with the other nodes of the process, if any
         self.real_time = RealTime(0)  # that of the process, if it has one
@@ -110,10 +90,6 @@ class SafeLifecycleNode(ParameterNode):
     def judge(self) -> Verdict:
         """Return the verdict on the active node; must be quick and must not block."""
         return Verdict(Level.OK, 'active')
-
-    def loop_timing(self) -> LoopTiming:
-        """Return how a loop with a clock of its own has kept its time since the activation."""
-        return LoopTiming()
 
     # State.
 
@@ -275,30 +251,32 @@ class SafeLifecycleNode(ParameterNode):
             verdict = self.judge()
         else:
             verdict = Verdict(Level.OK, 'inactive')
-        level, sentence, findings = verdict.level, verdict.sentence, verdict.findings
-        state = 'active' if self.active else 'inactive'
-        figures: dict[str, object] = {**verdict.figures, 'state': state, 'other_writer': other}
-        if other and level is Level.OK:
-            level, sentence, findings = Level.WARN, other, ()
-        if path is None:
-            figures |= {'unmatched': 'not configured', 'path_errors': 0, 'data_node': ''}
-        else:
-            figures |= {'path_errors': path.refused, 'data_node': path.name}
-            figures['unmatched'] = ', '.join(path.unmatched())
+        figures = {
+            **verdict.figures,
+            'state': 'active' if self.active else 'inactive',
+            'other_writer': other,
+            'path_errors': 0 if path is None else path.refused,
+            'data_node': '' if path is None else path.name,
+            'unmatched': 'not configured' if path is None else ', '.join(path.unmatched()),
+            'real_time_priority': real_time.held,
+            'memory_locked': real_time.memory_locked,
+        }
+        if other and verdict.level is Level.OK:
+            verdict = Verdict(Level.WARN, other)
+        if path is not None:
             lately = path.refused - self._path_errors.earlier(time.monotonic(), path.refused)
             if path.failure:
-                level, sentence, findings = Level.ERROR, path.failure, ()
+                verdict = Verdict(Level.ERROR, path.failure)
                 figures['fatal'] = True
-            elif lately and level is Level.OK:
+            elif lately and verdict.level is Level.OK:
                 text = f'errors in the data path ({lately}, limit: none), the last: {path.refusal}'
-                findings = (Finding(Level.WARN, 'path errors', text),)
-        verdict = self._findings.keep(Verdict(level, sentence, {}, findings))
+                verdict = Verdict(Level.WARN, text, {}, (Finding(Level.WARN, 'path errors', text),))
+        verdict = self._findings.keep(verdict)
         level, sentence = verdict.level, verdict.sentence
         if real_time.given_back:
             reason = real_time.given_back
             sentence = reason if level is Level.OK else f'{sentence}; {reason}'
             level = max(level, Level.WARN)
-        figures |= {'real_time_priority': real_time.held, 'memory_locked': real_time.memory_locked}
         return Verdict(level, sentence, figures)
 
 

@@ -193,28 +193,28 @@ class ParameterNode(OpenLifecycleNode):
         return frozenset(self.get_parameters_by_prefix(''))
 
     def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        try:
-            self._check_changes(parameters)
-        except ValueError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = self._refusal_of(parameters)
+        return SetParametersResult(successful=not reason, reason=reason)
 
-    def _check_changes(self, parameters: list[Parameter]) -> None:
+    def _refusal_of(self, parameters: list[Parameter]) -> str:
         if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
-            raise ParameterError(_SIM_TIME_REFUSED)
+            return _SIM_TIME_REFUSED
         if self._holder not in (None, threading.get_ident()):
             what, node = parameters[0].name, self.get_name()
-            raise ParameterError(f'{what} cannot be set during a transition of {node}: wait for its end')
+            return f'{what} cannot be set during a transition of {node}: wait for its end'
         changes = self._changes(parameters)
-        for name in changes:
-            if name not in self.run_time_parameters:
-                known = ', '.join(sorted(self.run_time_parameters)) or 'nothing'
-                raise ParameterError(
-                    f'{name} can be set before configure: deactivate and clean up first; '
-                    f'what can be set at run time is {known}'
-                )
-        if changes:
-            self.check_parameters({**self._in_use, **{name: each.new for name, each in changes.items()}})
+        if fixed := [name for name in changes if name not in self.run_time_parameters]:
+            known = ', '.join(sorted(self.run_time_parameters)) or 'nothing'
+            return (
+                f'{fixed[0]} can be set before configure: deactivate and clean up first; '
+                f'what can be set at run time is {known}'
+            )
+        try:
+            if changes:
+                self.check_parameters({**self._in_use, **{name: each.new for name, each in changes.items()}})
+        except ValueError as error:
+            return str(error)
+        return ''
 
     def _apply_parameters(self, parameters: list[Parameter]) -> None:
         if changes := self._changes(parameters):
@@ -231,21 +231,20 @@ class ParameterNode(OpenLifecycleNode):
 
 
 def _descriptor(quantity: Quantity, kind: type) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor()
-    descriptor.description = f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
+    descriptor = ParameterDescriptor(
+        description=f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
+        + '; nan: unknown' * quantity.may_be_unknown
+    )
     ends = [math.isfinite(quantity.low), math.isfinite(quantity.high)]
     if quantity.words:
         descriptor.additional_constraints = f'one of {quantity.limits}'
-    if quantity.may_be_unknown:
-        # rclpy holds NaN to be outside every range; `read` checks this one
-        descriptor.description += '; nan: unknown'
+    elif quantity.may_be_unknown:  # rclpy holds NaN to be outside every range; `read` checks this one
         descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}, or nan'
-    elif not all(ends):
-        if any(ends):  # ROS knows ranges with two ends alone
-            descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
-    elif kind is float:
+    elif any(ends) and not all(ends):  # ROS knows ranges with two ends alone
+        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
+    elif all(ends) and kind is float:
         span = FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))
         descriptor.floating_point_range = [span]
-    elif kind is int:
+    elif all(ends) and kind is int:
         descriptor.integer_range = [IntegerRange(from_value=int(quantity.low), to_value=int(quantity.high))]
     return descriptor

@@ -9,7 +9,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from pathlib import Path
 
 import rclpy
@@ -71,16 +70,21 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
     for node in nodes:
         node.ending.set()
     if ending.starter.ended:
-        name = ending.starter.name
-        logger.error(f'{name} has ended, so this one ends too, at 0 A: start the graph again')
+        logger.error(f'{ending.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
     for service in services:
         service.end()
     for node in reversed(nodes):
         node.close()
     real_time.close()  # until here no load keeps the coil from 0 A
+
+    def take_down() -> None:
+        for node in reversed(nodes):
+            node.destroy_node()
+        rclpy.try_shutdown()
+
     code = 1 if ending.failed else 0
-    left = leave_middleware(partial(_take_down, nodes), code=code)
+    left = leave_middleware(take_down, code=code)
     if ending.starter.ended:
         remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
     for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C: Python restores other handlers first
@@ -157,20 +161,14 @@ def _freeze() -> None:
     gc.freeze()
 
 
-def _take_down(nodes: Sequence[SafeLifecycleNode]) -> None:
-    for node in reversed(nodes):
-        node.destroy_node()
-    rclpy.try_shutdown()
-
-
 class Starter:
     """The process that started this one: without it a node must not go on driving the coil."""
 
     def __init__(self) -> None:
         self.descriptors: list[int] = []
         """What can be read once it has ended; none where it is not known, or had ended before."""
-        self._had_ended = False
         number = os.environ.get(_STARTER)
+        self._had_ended = False
         self.name = f'the process that started this one ({number})'
         if number is not None:
             try:
@@ -194,9 +192,9 @@ class _Ending:
 
     def __init__(self) -> None:
         self.failed = False
-        self.starter = Starter()
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
+        self.starter = Starter()
 
     def add_signals(self, *signals: int) -> None:
         """Wake the main thread by these signals too."""

@@ -10,7 +10,7 @@ A watch gives the priority back, for all of them until an activation after 30 s 
 
 - one of them used more than its share of a core (a loop that spins, or more work than the machine carries);
 - an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
-- a loop with a clock of its own missed most of its periods for 3 s (it gains nothing by its priority).
+- a thread ran for 1 s without a sleep, as the system reports.
 
 The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
 or threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
@@ -31,8 +31,6 @@ HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
 _WINDOW = 5  # periods, chosen: 1 s
 _SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
-_MISSED = 0.5  # of the periods between two checks, chosen
-_LATE = 15  # checks in a row, chosen: 3 s; to catch up after a stall of the machine takes less
 _REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
 _STARVED = 3  # periods without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
 _WITHOUT_SLEEP = 1.0  # s of processor time between two sleeps, chosen; after a stall of 2 s it is 0.6 s
@@ -41,13 +39,6 @@ _LAST = 3.0  # s, chosen: the same, until the process is killed
 # + 11 + 2 participant) theirs are odd, those of discovery even.
 _MIDDLEWARE = re.compile(r'dds\.udp\.\d*[13579]')
 _ORDINARY = 'dds.ev.'  # the middleware's timers: an ordinary thread that wakes often, without the interpreter
-
-
-class LoopTiming(NamedTuple):
-    """Periods of a loop with a clock of its own, and how many of them were over when its work was done."""
-
-    periods: int = 0
-    missed: int = 0
 
 
 class RealTimeThreads(NamedTuple):
@@ -62,15 +53,6 @@ class RealTimeLoop(Protocol):
     """A node with threads that work in real time."""
 
     real_time_threads: RealTimeThreads
-
-    def loop_timing(self) -> LoopTiming:
-        """Return how its loop has kept its time so far; zeros where it has no clock of its own."""
-
-
-class _Check(NamedTuple):
-    time: float  # s
-    used: dict[int, float]  # processor time of each thread that has the priority, s
-    timing: LoopTiming
 
 
 class RealTime:
@@ -93,11 +75,9 @@ class RealTime:
         self._ordinary_until = -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
-        self._past: deque[_Check] = deque(maxlen=_WINDOW + 1)
-        self._late: list[
-            LoopTiming
-        ] = []  # between the last checks, in each of which most periods were missed
-        self._waiting: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
+        self._past: deque[tuple[float, dict[int, float]]] = deque(maxlen=_WINDOW + 1)
+        """Time and processor time of each thread with the priority at the last checks, s."""
+        self._starved: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
 
     @property
     def held(self) -> int:
@@ -143,10 +123,9 @@ class RealTime:
                 return ''
             self._give()
             used = {number: self._threads.processor_time(number) for number in self._held}
-            every = [loop.loop_timing() for loop in self._loops]
-            timing = LoopTiming(sum(each.periods for each in every), sum(each.missed for each in every))
-            self._past.append(_Check(self._clock(), used, timing))
-            return self._give_back(self._overuse() or self._starved() or self._missed())
+            self._past.append((self._clock(), used))
+            reason = self._overuse() or self._starvation()
+            return self._give_back(reason) if reason else ''
 
     def ran_without_sleep(self) -> str:
         """Give the priority back since the system has reported (SIGXCPU) a thread that does not sleep."""
@@ -181,50 +160,34 @@ class RealTime:
         return {**wanted, self._watcher: self.priority + 1}
 
     def _give_back(self, reason: str) -> str:
-        if reason:
-            self._ordinary_until = self._clock() + _REST
-            self._past.clear()
-            self.given_back = (
-                f'real-time priority {self.priority} given back: {reason}; lower the load of this machine or '
-                f'the number of graphs on it, then activate again, not before {_REST:g} s'
-            )
-            self._give()
-            limit_without_sleep(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
+        self._ordinary_until = self._clock() + _REST
+        self.given_back = (
+            f'real-time priority {self.priority} given back: {reason}; lower the load of this machine or '
+            f'the number of graphs on it, then activate again, not before {_REST:g} s'
+        )
+        self._give()
+        limit_without_sleep(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
         return self.given_back
 
     def _overuse(self) -> str:
         if len(self._past) <= _WINDOW:
             return ''
-        before, now = self._past[0], self._past[-1]
-        window = now.time - before.time
-        for number in before.used.keys() & now.used.keys():
-            share = (now.used[number] - before.used[number]) / window
+        (begin, before), (end, now) = self._past[0], self._past[-1]
+        for number in before.keys() & now.keys():
+            share = (now[number] - before[number]) / (end - begin)
             if share > _SHARE:
                 name = self._threads.names().get(number, str(number))
-                return f'thread {name} used {share:.2f} of a core in {window:.1f} s (limit {_SHARE:g})'
+                return f'thread {name} used {share:.2f} of a core in {end - begin:.1f} s (limit {_SHARE:g})'
         return ''
 
-    def _starved(self) -> str:
-        for number, name in self._threads.names().items():
-            if name.startswith(_ORDINARY):
-                used, (before, periods) = self._threads.processor_time(number), self._waiting
-                waits = used == before and self._threads.waits(number)
-                self._waiting = (used, periods + 1 if waits else 0)
-                if self._waiting[1] < _STARVED:
-                    return ''
-                limit = _STARVED * WATCH_PERIOD
-                return f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
-        return ''
-
-    def _missed(self) -> str:
-        if len(self._past) < 2:
-            self._late = []
+    def _starvation(self) -> str:
+        names = self._threads.names().items()
+        number = next((number for number, name in names if name.startswith(_ORDINARY)), None)
+        if number is None:
             return ''
-        before, now = self._past[-2].timing, self._past[-1].timing
-        lately = LoopTiming(now.periods - before.periods, now.missed - before.missed)
-        self._late = [*self._late, lately] if lately.missed > _MISSED * lately.periods else []
-        if len(self._late) < _LATE:
-            return ''
-        periods, missed = (sum(each) for each in zip(*self._late, strict=True))
-        limits = f'{100 * _MISSED:g} % for {_LATE * WATCH_PERIOD:g} s'
-        return f'the loop missed {missed} of {periods} periods (limit {limits})'
+        used, (before, periods) = self._threads.processor_time(number), self._starved
+        waits = used == before and self._threads.waits(number)
+        self._starved = (used, periods + 1 if waits else 0)
+        limit = _STARVED * WATCH_PERIOD
+        text = f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
+        return text if self._starved[1] >= _STARVED else ''

@@ -12,6 +12,7 @@ import ctypes
 import fcntl
 import os
 import re
+import struct
 import sys
 import threading
 import time
@@ -66,18 +67,6 @@ def end_process(code: int) -> NoReturn:
     sys.exit(code)
 
 
-class _Event(ctypes.Structure):
-    """`struct sigevent` of Linux with a function to be called."""
-
-    _fields_ = (
-        ('value', ctypes.c_void_p),  # its first bytes are the argument, an int
-        ('signal', ctypes.c_int),
-        ('notify', ctypes.c_int),
-        ('function', ctypes.c_void_p),
-        ('padding', ctypes.c_char * 40),  # attributes among it
-    )
-
-
 _SIGEV_THREAD = 2  # Linux, asm-generic/siginfo.h
 
 
@@ -87,10 +76,10 @@ class Deadline:
     def __init__(self, code: int):
         self._library = ctypes.CDLL(None, use_errno=True)
         end = ctypes.cast(self._library._exit, ctypes.c_void_p).value
-        event = _Event(value=code, notify=_SIGEV_THREAD, function=end)
+        # `struct sigevent`: the argument, no signal, a function to be called, and its attributes
+        event = struct.pack('P2iP40x', code, 0, _SIGEV_THREAD, end)
         self._timer = ctypes.c_void_p()
-        arguments = (time.CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(self._timer))
-        if self._library.timer_create(*arguments) != 0:
+        if self._library.timer_create(time.CLOCK_MONOTONIC, event, ctypes.byref(self._timer)) != 0:
             raise OSError(ctypes.get_errno(), 'a timer that ends this process cannot be made')
 
     def set(self, limit: float) -> None:

@@ -20,30 +20,24 @@ STATUS_PERIOD = 0.1
 class ElectronicsParameters(NamedTuple):
     """The electronics' own numbers; noise and jitter are standard deviations."""
 
-    current_bandwidth: Annotated[
-        float, Quantity('Hz', 'bandwidth of the current loop', 10.0, 2000.0, 'chosen')
-    ] = 400.0
+    current_bandwidth: Annotated[float, Quantity('Hz', 'bandwidth of the current loop', 10.0, 2000.0)] = 400.0
     setpoint_timeout: Annotated[
-        float, Quantity('s', 'without a setpoint for so long the electronics go to 0 A', 0.001, 1.0, 'chosen')
+        float, Quantity('s', 'without a setpoint for so long the electronics go to 0 A', 0.001, 1.0)
     ] = SETPOINT_TIMEOUT
-    displacement_noise: Annotated[
-        float, Quantity('m', 'noise of the displacement sensor', 0.0, 1e-3, 'chosen')
-    ] = 2e-6
+    displacement_noise: Annotated[float, Quantity('m', 'noise of the displacement sensor', 0.0, 1e-3)] = 2e-6
     sample_jitter: Annotated[
-        float, Quantity('s', 'time of sampling the displacement, against its stamp', 0.0, 5e-4, 'chosen')
+        float, Quantity('s', 'time of sampling the displacement, against its stamp', 0.0, 5e-4)
     ] = 0.0
     ripple_noise: Annotated[
-        float, Quantity('1', 'noise of one ripple reading of the inductance, relative', 0.0, 0.5, 'chosen')
+        float, Quantity('1', 'noise of one ripple reading of the inductance, relative', 0.0, 0.5)
     ] = 0.01
-    current_noise: Annotated[
-        float, Quantity('A', 'noise of the mean current reading', 0.0, 0.1, 'chosen')
-    ] = 0.0
+    current_noise: Annotated[float, Quantity('A', 'noise of the mean current reading', 0.0, 0.1)] = 0.0
     clock_drift: Annotated[
-        float, Quantity('1', "relative error of the electronics' clock in real time", -5e-4, 5e-4, 'chosen')
+        float, Quantity('1', "relative error of the electronics' clock in real time", -5e-4, 5e-4)
     ] = 0.0
-    supply_voltage: Annotated[float, Quantity('V', 'supply as reported', 0.0, 60.0, 'chosen')] = 14.0
+    supply_voltage: Annotated[float, Quantity('V', 'supply as reported', 0.0, 60.0)] = 14.0
     coil_temperature: Annotated[
-        float, Quantity('degC', 'temperature of coil and core, and as reported', -60.0, 250.0, 'chosen')
+        float, Quantity('degC', 'temperature of coil and core, and as reported', -60.0, 250.0)
     ] = 20.0
 
 

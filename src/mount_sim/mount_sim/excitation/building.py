@@ -3,23 +3,18 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.signals.even_grid import EvenSignal
 from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_over_time
 from mount_models.quantity import ParameterError, checked
+from mount_sim.excitation.array_file import read_excitation
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
-from mount_sim.excitation.recorded import (
-    acceleration_at,
-    height_at,
-    measured_height,
-    recorded_acceleration,
-)
-from mount_sim.excitation.road import Gap, RandomRoad, Sweep, gap_in_road, random_road, sweep_road
-from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario, TipIn
+from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
+from mount_sim.excitation.scenario import SCENARIO_NAMES, STEP_TIME, TipIn
 from mount_sim.parameters import SimParameters
 
 FloatArray = NDArray[np.float64]
@@ -27,11 +22,16 @@ FloatArray = NDArray[np.float64]
 _DEFAULT_DURATION = 15.0  # s, chosen
 
 
-def build_excitation(sim: SimParameters) -> Excitation:
-    """Return the excitation of the chosen scenario, or raise `ValueError` with what is wrong."""
-    if sim.scenario not in _SCENARIOS:
-        raise ParameterError(f'scenario {sim.scenario!r} is unknown; known are {", ".join(_SCENARIOS)}')
-    shaken, idle, tip_in = _SCENARIOS[sim.scenario](sim), sim.idle, sim.tip_in
+def build_excitation(sim: SimParameters, made: tuple[str, StreamedSeries] | None = None) -> Excitation:
+    """Return the excitation of the chosen scenario, or raise `ValueError` with what is wrong.
+
+    `made` are name and numbers of a recording or road that the desk has brought to the step of the plant;
+    without it they are read from the file that the scenario names.
+    """
+    if sim.scenario not in SCENARIO_NAMES:
+        raise ParameterError(f'scenario {sim.scenario!r} is unknown; known are {", ".join(SCENARIO_NAMES)}')
+    shaken = _of_array(sim, made) if sim.scenario in _ARRAYS else _SCENARIOS[sim.scenario](sim)
+    idle, tip_in = sim.idle, sim.tip_in
     given = {'idle.amplitude': idle.amplitude, 'tip_in.force': tip_in.force}
     acting = {name: size for name, size in given.items() if size != 0.0}
     if not acting:
@@ -57,16 +57,6 @@ def _pushed(tip_in: TipIn, time: FloatArray) -> FloatArray:
     return np.asarray(tip_in.force * np.clip((time - tip_in.time) / tip_in.rise, 0.0, 1.0))
 
 
-def recorded_signal(recorded: RecordedScenario) -> EvenSignal:
-    """Return the signal evenly spaced, not yet scaled; raises `SignalError`."""
-    return recorded_acceleration(
-        recorded.file,
-        column=recorded.column,
-        time_column=recorded.time_column,
-        topic=recorded.topic,
-    )
-
-
 def _bench(sim: SimParameters) -> Excitation:
     frequency, amplitude = sim.bench
 
@@ -88,7 +78,7 @@ def _motorway(sim: SimParameters) -> Excitation:
         )
     road = checked(RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=sim.seed))
     position = motorway.speed * gap_time
-    gap = checked(Gap(motorway.gap_depth, position, motorway.gap_length, motorway.speed))
+    gap = Gap(motorway.gap_depth, position, motorway.gap_length, motorway.speed)
 
     def height(time: FloatArray) -> FloatArray:
         rough = random_road(time, road) if road.roughness > 0.0 else np.zeros_like(time)
@@ -111,8 +101,7 @@ def _sweep(sim: SimParameters) -> Excitation:
             f'duration ({duration:g} s) is longer than the sweep from {chosen.first_frequency:g} to '
             f'{chosen.last_frequency:g} Hz ({whole:g} s); ask for at most that, or raise sweep.last_frequency'
         )
-    road = Sweep(chosen.velocity_amplitude, chosen.first_frequency, chosen.rate, chosen.ramp_in)
-    return _over_time(sim, Seat.VEHICLE, duration, partial(sweep_road, sweep=checked(road)))
+    return _over_time(sim, Seat.VEHICLE, duration, partial(sweep_road, sweep=chosen))
 
 
 def _over_time(
@@ -122,46 +111,37 @@ def _over_time(
     return Excitation(seat, values, STEP_TIME, sim.timeline.start)
 
 
-def _recorded(sim: SimParameters) -> Excitation:
-    recorded = sim.recorded
-    if not recorded.file:
+def _of_array(sim: SimParameters, made: tuple[str, StreamedSeries] | None) -> Excitation:
+    seat, what, needed = _ARRAYS[sim.scenario]
+    settings = getattr(sim, sim.scenario)
+    if not settings.file:
+        raise ParameterError(f'scenario {sim.scenario} needs {needed}')
+    if made is None and settings != type(settings)(settings.file):
         raise ParameterError(
-            'scenario recorded needs a file: CSV, NPY, JSON or MCAP (recorded.file, or --file)'
+            f'column, time_column, topic and scale of recorded.file ({settings.file}) are for engine-mount '
+            'drive, which makes the excitation of a recording: leave them out for the simulator'
         )
-    signal = recorded_signal(recorded)
-    values = acceleration_at(signal, recorded.scale, STEP_TIME)
-    return _measured(sim, Seat.ACCELERATED_CHASSIS, signal, values, 'recording')
-
-
-def _road(sim: SimParameters) -> Excitation:
-    file = sim.road.file
-    if not file:
-        raise ParameterError(
-            'scenario road needs a measured road: engine-mount drive --road PROFILE --speed 60/3.6, or '
-            'road.file'
-        )
-    signal = measured_height(file)
-    return _measured(sim, Seat.VEHICLE, signal, height_at(signal, STEP_TIME), 'road')
-
-
-def _measured(
-    sim: SimParameters, seat: Seat, signal: EvenSignal, values: StreamedSeries, what: str
-) -> Excitation:
+    name, values = made or (Path(settings.file).name, read_excitation(settings.file, seat))
     duration, available = sim.timeline.duration, len(values) * STEP_TIME
     if duration > available + 0.001:
         raise ParameterError(
-            f'duration ({duration:g} s) is longer than the {what} {signal.name} ({available:.3f} s); ask for '
+            f'duration ({duration:g} s) is longer than the {what} {name} ({available:.3f} s); ask for '
             'at most that'
         )
     cut = values.cut(round(duration / STEP_TIME)) if duration else values
-    notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
-    return Excitation(seat, cut, STEP_TIME, sim.timeline.start, notes=notes)
+    return Excitation(seat, cut, STEP_TIME, sim.timeline.start)
 
 
-_SCENARIOS = {
-    'motorway': _motorway,
-    'bench': _bench,
-    'sweep': _sweep,
-    'recorded': _recorded,
-    'road': _road,
+_ARRAYS = {
+    'recorded': (
+        Seat.ACCELERATED_CHASSIS,
+        'recording',
+        'a file: CSV, NPY, JSON or MCAP (engine-mount drive --file, or recorded.file)',
+    ),
+    'road': (
+        Seat.VEHICLE,
+        'road',
+        'a measured road: engine-mount drive --road PROFILE --speed 60/3.6, or road.file',
+    ),
 }
+_SCENARIOS = {'motorway': _motorway, 'bench': _bench, 'sweep': _sweep}

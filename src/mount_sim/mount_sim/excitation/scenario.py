@@ -13,7 +13,7 @@ class Timeline(NamedTuple):
 
     start: Annotated[
         float,
-        Quantity('s', 'rest before the excitation, in which the mount is initialised', 0.0, 60.0, 'chosen'),
+        Quantity('s', 'rest before the excitation, in which the mount is initialised', 0.0, 60.0),
     ] = 5.0
     duration: Annotated[
         float,
@@ -22,7 +22,6 @@ class Timeline(NamedTuple):
             'length of the excitation; 0: that of the recording or sweep, else 15 s',
             0.0,
             7200.0,
-            'chosen',
         ),
     ] = 0.0
 
@@ -31,7 +30,7 @@ class BenchScenario(NamedTuple):
     """A test rack that moves the mount on a sine."""
 
     frequency: Annotated[float, Quantity('Hz', 'frequency of the sine', 0.1, 100.0, 'paper, section 6')] = 8.0
-    amplitude: Annotated[float, Quantity('m', 'amplitude of the sine', 0.0, 0.010, 'chosen')] = 0.001
+    amplitude: Annotated[float, Quantity('m', 'amplitude of the sine', 0.0, 0.010)] = 0.001
 
 
 class MotorwayScenario(NamedTuple):
@@ -41,13 +40,11 @@ class MotorwayScenario(NamedTuple):
     roughness: Annotated[
         float, Quantity('m^3', 'ISO 8608 roughness G_d at 0.1 cycles/m', 0.0, 1e-3, 'chosen: a good class A')
     ] = 2e-6
-    gap_depth: Annotated[float, Quantity('m', 'depth of the gap', 0.0, 0.1, 'chosen')] = 0.020
-    gap_length: Annotated[
-        float, Quantity('m', 'effective length of the gap, after the tyre', 0.1, 5.0, 'chosen')
-    ] = 1.0
+    gap_depth: Annotated[float, Quantity('m', 'depth of the gap', 0.0, 0.1)] = 0.020
+    gap_length: Annotated[float, Quantity('m', 'effective length of the gap, after the tyre', 0.1, 5.0)] = 1.0
     gap_time: Annotated[
         float,
-        Quantity('s', 'when the wheel meets the gap; 0: after a third of the drive', 0.0, 3600.0, 'chosen'),
+        Quantity('s', 'when the wheel meets the gap; 0: after a third of the drive', 0.0, 3600.0),
     ] = 0.0
 
 
@@ -55,7 +52,7 @@ class SweepScenario(NamedTuple):
     """A rack under the front wheels: a sine of rising frequency, its velocity of constant amplitude."""
 
     velocity_amplitude: Annotated[
-        float, Quantity('m/s', 'V0: largest vertical velocity of the road', 0.0, 1.0, 'chosen')
+        float, Quantity('m/s', 'V0: largest vertical velocity of the road', 0.0, 1.0)
     ] = 0.12
     first_frequency: Annotated[
         float, Quantity('Hz', 'frequency at the beginning', 0.1, 100.0, 'paper, section 6')
@@ -64,41 +61,35 @@ class SweepScenario(NamedTuple):
         float, Quantity('Hz', 'frequency at the end', 0.1, 100.0, 'paper, section 6')
     ] = 50.0
     rate: Annotated[float, Quantity('Hz/s', 'rise of the frequency', 0.01, 10.0, 'paper, section 6')] = 1.0
-    ramp_in: Annotated[
-        float, Quantity('s', 'the height grows linearly from zero for so long', 0.0, 10.0, 'chosen')
-    ] = 1.0
+    ramp_in: Annotated[float, Quantity('s', 'the height grows linearly from zero for so long', 0.0, 10.0)] = (
+        1.0
+    )
 
 
 class IdleForce(NamedTuple):
     """Force of the idling engine on itself, a sine with its second harmonic; none on a bench."""
 
     amplitude: Annotated[
-        float, Quantity('N', 'F_i: amplitude of the first harmonic; 0: no idle force', 0.0, 2000.0, 'chosen')
+        float, Quantity('N', 'F_i: amplitude of the first harmonic; 0: no idle force', 0.0, 2000.0)
     ] = 0.0
     frequency: Annotated[
-        float, Quantity('Hz', 'first harmonic: two for each turn of the crank', 5.0, 200.0, 'chosen')
+        float, Quantity('Hz', 'first harmonic: two for each turn of the crank', 5.0, 200.0)
     ] = 26.7
     second_share: Annotated[
-        float, Quantity('1', 'amplitude of the second harmonic over that of the first', 0.0, 2.0, 'chosen')
+        float, Quantity('1', 'amplitude of the second harmonic over that of the first', 0.0, 2.0)
     ] = 0.4
 
 
 class TipIn(NamedTuple):
     """Force on the engine from a pedal pushed down: it rises once and stays; none on a bench."""
 
-    force: Annotated[
-        float, Quantity('N', 'force upwards on the engine; 0: no tip-in', -5000.0, 5000.0, 'chosen')
-    ] = 0.0
-    time: Annotated[float, Quantity('s', 'it begins so long after the excitation', 0.0, 3600.0, 'chosen')] = (
-        1.0
-    )
-    rise: Annotated[float, Quantity('s', 'the force grows linearly for so long', 0.001, 10.0, 'chosen')] = (
-        0.05
-    )
+    force: Annotated[float, Quantity('N', 'force upwards on the engine; 0: no tip-in', -5000.0, 5000.0)] = 0.0
+    time: Annotated[float, Quantity('s', 'it begins so long after the excitation', 0.0, 3600.0)] = 1.0
+    rise: Annotated[float, Quantity('s', 'the force grows linearly for so long', 0.001, 10.0)] = 0.05
 
 
 AccelerationScale = Annotated[
-    float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4, 'chosen')
+    float, Quantity('1', 'factor to m/s^2 upwards; -1 for an axis that points down', -1e4, 1e4)
 ]
 
 

@@ -17,8 +17,6 @@ from mount_sim.plant.engine_body import (
     Support,
     accelerated_engine_step,
     car_step,
-    resting_body,
-    resting_supports,
     support_records,
 )
 from mount_sim.plant.plant import (
@@ -58,10 +56,6 @@ class CarMemory(NamedTuple):
     body: NDArray[np.uint8]  # `BODY_STATE`
     motions: NDArray[np.uint8]  # `SUPPORT_STATE`
 
-    def copy(self) -> 'CarMemory':
-        """Return the same in memory of its own."""
-        return CarMemory(*(part.copy() for part in self))
-
 
 class CarSimulation:
     """Mounts, engine and vehicle; of the mounts those with electronics come first.
@@ -83,8 +77,8 @@ class CarSimulation:
             np.concatenate([mount.memory.plant for mount in mounts]),
             np.concatenate([mount.memory.state for mount in mounts]),
             support_records(supports).view(np.uint8),
-            resting_body().view(np.uint8),
-            resting_supports(len(supports)).view(np.uint8),
+            np.zeros(BODY_STATE.itemsize, np.uint8),
+            np.zeros(len(supports) * SUPPORT_STATE.itemsize, np.uint8),
         )
         bytes_of_each = (np.split(part, len(mounts)) for part in (self.memory.plants, self.memory.states))
         for mount, plant, state in zip(mounts, *bytes_of_each, strict=True):

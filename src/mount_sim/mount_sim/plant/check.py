@@ -5,7 +5,7 @@ moves is shifted a little, and what becomes of it in one step is a column of the
 eigenvalue of that lies outside the unit circle, a motion grows from step to step.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,17 +15,20 @@ from mount_models.arithmetic.record import record_bytes
 from mount_models.friction.contact import check_friction
 from mount_models.quantity import ParameterError, flattened, quantities, with_flattened
 from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.car import CarMemory, advance_car
 from mount_sim.plant.mounts import Contents
 from mount_sim.plant.plant import STATE, Plant, advance
-from mount_sim.plant.vehicle import Engine
 
 GROWTH_ALLOWED = 1e-6
 """Of a motion in one step, chosen: far above rounding, 2 % in a second."""
 
 _BISECTIONS = 30
+_SHIFT, _SHIFT_OF_CAR = 1e-6, 1e-9  # SI, chosen: small for heights, angles and forces of branches
 _SHIFTS = {'volume': 1e-12, 'flow': 1e-9}  # m^3, m^3/s (chosen): within one piece of the hydromount's laws
-_SHIFT = 1e-6  # of all others, SI, chosen
 _MOVING = ('vehicle', 'engine', 'hydromount', 'displacement')
+_NOTHING = np.zeros(1)
+
+FloatArray = NDArray[np.float64]
 
 
 def checked_plant(plant: Plant, seat: Seat, step_time: float) -> Plant:
@@ -43,65 +46,86 @@ def checked_plant(plant: Plant, seat: Seat, step_time: float) -> Plant:
     return plant
 
 
+def check_car(memory: CarMemory, seat: Seat, step_time: float) -> None:
+    """Raise `ParameterError` if in steps of `step_time` s a motion of the engine would grow without end."""
+    if car_growth(memory, seat, step_time) > 1.0 + GROWTH_ALLOWED:
+        raise ParameterError(
+            f'in steps of {1e6 * step_time:g} us the motion of the simulated engine on its mounts would grow '
+            'without end: set its masses and inertias (engine.*), its stiffnesses (vehicle.*) and places '
+            'closer to their defaults'
+        )
+
+
 def growth(plant: Plant, seat: Seat, step_time: float) -> float:
     """Return by how much the fastest growing free motion about rest is greater after a step, 1 for not."""
-    law, moving = record_bytes(plant), list(_numbers(STATE))
-    base = _after_a_step(law, plant, seat, step_time, None)
-    columns = [(_after_a_step(law, plant, seat, step_time, name) - base) / _shift(name) for name in moving]
+    law, rest = record_bytes(plant), np.zeros(STATE.itemsize // 8)
+    rest.view(STATE)['gap'] = plant.mechanics.rest_gap
+    places = {place: name for part in _MOVING for place, name in _numbers(STATE, part)}
+
+    def step(state: FloatArray) -> FloatArray:
+        advance(law, state.view(np.uint8), int(seat), _NOTHING, _NOTHING, 0.0, step_time)
+        return state
+
+    shifts = [next((by for word, by in _SHIFTS.items() if word in name), _SHIFT) for name in places.values()]
+    return _growth(step, rest, list(places), shifts)
+
+
+def car_growth(memory: CarMemory, seat: Seat, step_time: float) -> float:
+    """Return the same for an engine on several mounts; the fluid of each is checked where it stands alone."""
+    body, rest = memory.body.size, memory.body.size + memory.motions.size
+    ((displacement, _),) = _numbers(STATE, 'displacement')
+    whole = np.concatenate([memory.body, memory.motions, memory.states]).view(np.float64)
+    displacements = range(rest // 8 + displacement, whole.size, STATE.itemsize // 8)
+
+    def step(state: FloatArray) -> FloatArray:
+        numbers = state.view(np.uint8)
+        trial = memory._replace(body=numbers[:body], motions=numbers[body:rest], states=numbers[rest:])
+        advance_car(*trial, int(seat), _NOTHING, _NOTHING, np.zeros(0), step_time)
+        return state
+
+    moving = [*range(rest // 8), *displacements]
+    return _growth(step, whole, moving, [_SHIFT_OF_CAR] * len(moving))
+
+
+def _growth(
+    step: Callable[[FloatArray], FloatArray], rest: FloatArray, moving: list[int], shifts: Sequence[float]
+) -> float:
+    """Return the greatest eigenvalue of a `step`, which changes its state in place, for what is `moving`."""
+    base = step(rest.copy())[moving]
+    columns = []
+    for place, shift in zip(moving, shifts, strict=True):
+        state = rest.copy()
+        state[place] += shift
+        columns.append((step(state)[moving] - base) / shift)
     return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
+
+
+def _numbers(kind: np.dtype, part: str) -> list[tuple[int, str]]:
+    """Return place among all numbers and name of those in a part of a record."""
+    fields: Mapping[str, Any] = kind.fields or {}
+    field, offset = fields[part][:2]
+    return [(offset // 8 + k, name) for k, name in enumerate(field.names or (part,))]
+
+
+# Which parameter it is.
 
 
 def _is_stable(plant: Plant, seat: Seat, step_time: float) -> bool:
     return growth(plant, seat, step_time) <= 1.0 + GROWTH_ALLOWED
 
 
-def _after_a_step(
-    law: NDArray[np.uint8], plant: Plant, seat: Seat, step_time: float, shifted: str | None
-) -> NDArray[np.float64]:
-    """Return what moves, one step after rest at 0 A with the number `shifted` out of its place."""
-    state = np.zeros(1, STATE)
-    state['gap'] = plant.mechanics.rest_gap
-    if shifted is not None:
-        record, name = _place(state, shifted)
-        record[name] += _shift(shifted)
-    nothing = np.zeros(1)
-    advance(law, state.view(np.uint8), int(seat), nothing, nothing, 0.0, step_time)
-    places = (_place(state, name) for name in _numbers(STATE))
-    return np.array([record[name][0] for record, name in places])
-
-
-def _numbers(kind: np.dtype, prefix: str = '') -> Iterator[str]:
-    for name in kind.names or ():
-        if prefix or name in _MOVING:
-            nested = kind[name].names is not None
-            yield from _numbers(kind[name], f'{prefix}{name}.') if nested else [prefix + name]
-
-
-def _place(state: NDArray[Any], path: str) -> tuple[NDArray[Any], str]:
-    *outer, name = path.split('.')
-    for part in outer:
-        state = state[part]
-    return state, name
-
-
-def _shift(name: str) -> float:
-    return next((shift for word, shift in _SHIFTS.items() if word in name), _SHIFT)
-
-
-# Which parameter it is.
-
-
 def _culprit(plant: Plant, seat: Seat, step_time: float) -> str:
     """Return the parameter that does it alone, with the limit at which it would not, or all that may."""
-    values, defaults = _values(plant), _values(Plant())
-    changed = [name for name, value in values.items() if value != defaults[name]]
+    values, defaults = flattened(plant), flattened(Plant())
+    parts = ('vehicle.', 'hydromount.')
+    changed = [name for name in values if name.startswith(parts) and values[name] != defaults[name]]
     for name in changed:
         good, bad = defaults[name], values[name]
-        if not _is_stable(_with(plant, name, good), seat, step_time):
+        if not _is_stable(with_flattened(plant, {name: good}), seat, step_time):
             continue
         for _ in range(_BISECTIONS):
             middle = 0.5 * (good + bad)
-            if _is_stable(_with(plant, name, middle), seat, step_time):
+            if _is_stable(with_flattened(plant, {name: middle}), seat, step_time):
                 good = middle
             else:
                 bad = middle
@@ -112,19 +136,6 @@ def _culprit(plant: Plant, seat: Seat, step_time: float) -> str:
         )
     told = ', '.join(f'{name} ({values[name]:g} {_unit(plant, name)})' for name in changed)
     return f'{told} do not fit together; set them closer to their defaults'
-
-
-def _values(plant: Plant) -> dict[str, float]:
-    return {**flattened(plant.vehicle, 'vehicle'), **flattened(plant.hydromount, 'hydromount')}
-
-
-def _with(plant: Plant, name: str, value: float) -> Plant:
-    vehicle = with_flattened(plant.vehicle, {name: value}, 'vehicle')
-    return plant._replace(
-        vehicle=vehicle,
-        engine=Engine(vehicle.engine_mass, vehicle.elastomer),
-        hydromount=with_flattened(plant.hydromount, {name: value}, 'hydromount'),
-    )
 
 
 def _unit(plant: Plant, path: str) -> str:

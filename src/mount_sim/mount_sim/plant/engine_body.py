@@ -27,11 +27,10 @@ import numpy.typing as npt
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 from mount_models.quantity import Quantity
-from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
+from mount_sim.plant.vehicle import BRANCHES, Elastomer, elastomer_force, stretch_branches
 
 FloatArray = npt.NDArray[np.float64]
 
-_BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODY_NAMES = ('wheel', 'body', 'engine', 'roll', 'pitch')
 BODY_STATE = record_type(
     [
@@ -39,7 +38,7 @@ BODY_STATE = record_type(
         for name in _BODY_NAMES
         for what in (('angle', 'rate') if name in ('roll', 'pitch') else ('height', 'velocity'))
     ]
-    + _BRANCHES
+    + BRANCHES
 )
 """Heights (m), velocities (m/s), angles (rad) and their rates (rad/s); forces (N) of the rod's branches."""
 SUPPORT_STATE = record_type(
@@ -55,7 +54,7 @@ SUPPORT_STATE = record_type(
             'engine_height',
         )
     ]
-    + _BRANCHES
+    + BRANCHES
 )
 """Of one mount, SI: the chassis under it, its motion, force and acceleration of the last step, branches."""
 
@@ -69,20 +68,16 @@ class RigidEngine(NamedTuple):
     proportion to its stiffness.
     """
 
-    mass: Annotated[float, Quantity('kg', 'm: engine with gearbox', 10.0, 1e4, 'chosen')] = 160.0
+    mass: Annotated[float, Quantity('kg', 'm: engine with gearbox', 10.0, 1e4)] = 160.0
     roll_inertia: Annotated[
-        float, Quantity('kg m^2', 'I_x: about the longitudinal axis, of a box', 0.1, 1e4, 'chosen')
+        float, Quantity('kg m^2', 'I_x: about the longitudinal axis, of a box', 0.1, 1e4)
     ] = 15.6
-    pitch_inertia: Annotated[
-        float, Quantity('kg m^2', 'I_y: about the crank, of a box', 0.1, 1e4, 'chosen')
-    ] = 8.1
-    force_x: Annotated[
-        float, Quantity('m', 'x_F: where the force of the idling engine acts', -1.0, 1.0, 'chosen')
-    ] = 0.0
-    force_y: Annotated[float, Quantity('m', 'y_F: likewise', -1.0, 1.0, 'chosen')] = 0.0
-    rod_lever: Annotated[
-        float, Quantity('m', 'h: torque rod below the centre of gravity', 0.0, 1.0, 'chosen')
-    ] = 0.25
+    pitch_inertia: Annotated[float, Quantity('kg m^2', 'I_y: about the crank, of a box', 0.1, 1e4)] = 8.1
+    force_x: Annotated[float, Quantity('m', 'x_F: where the force of the idling engine acts', -1.0, 1.0)] = (
+        0.0
+    )
+    force_y: Annotated[float, Quantity('m', 'y_F: likewise', -1.0, 1.0)] = 0.0
+    rod_lever: Annotated[float, Quantity('m', 'h: torque rod below the centre of gravity', 0.0, 1.0)] = 0.25
     rod: Elastomer = Elastomer(3e5, 3e4, 3e4, 3e4)
 
 
@@ -103,16 +98,6 @@ SUPPORT = record_dtype(Support)
 def support_records(supports: Sequence[Support]) -> npt.NDArray[Any]:
     """Return the supports (n,) as records of `SUPPORT` for the steps."""
     return np.concatenate([record_bytes(support).view(SUPPORT) for support in supports])
-
-
-def resting_body() -> npt.NDArray[Any]:
-    """Return the state (1,) of `BODY_STATE` at rest; pass element 0 to the steps."""
-    return np.zeros(1, BODY_STATE)
-
-
-def resting_supports(count: int) -> npt.NDArray[Any]:
-    """Return the states (count,) of `SUPPORT_STATE` at rest."""
-    return np.zeros(count, SUPPORT_STATE)
 
 
 @compiled
@@ -159,8 +144,7 @@ def accelerated_engine_step(engine, supports, body, states, acceleration, engine
 
 @compiled
 def _note_force(support, state, beside):
-    branches = (state.slow_force, state.middle_force, state.fast_force)
-    state.mount_force = elastomer_force(support.elastomer, state.displacement, branches) + beside
+    state.mount_force = elastomer_force(support.elastomer, state.displacement, state) + beside
 
 
 @compiled
@@ -172,16 +156,14 @@ def _move_engine(engine, supports, body, states, engine_force, acceleration, dt)
         lift -= force
         rolling -= supports[k].y * force
         pitching += supports[k].x * force
-    branches = (body.slow_force, body.middle_force, body.fast_force)
-    pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, branches)
+    pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, body)
     body.engine_velocity += dt * (lift / engine.mass - acceleration)
     body.roll_rate += dt * rolling / engine.roll_inertia
     body.pitch_rate += dt * pitching / engine.pitch_inertia
     body.engine_height += dt * body.engine_velocity
     body.roll_angle += dt * body.roll_rate
     body.pitch_angle += dt * body.pitch_rate
-    slow, middle, fast = branch_step(engine.rod, branches, engine.rod_lever * body.pitch_rate * dt, dt)
-    body.slow_force, body.middle_force, body.fast_force = slow, middle, fast
+    stretch_branches(engine.rod, body, engine.rod_lever * body.pitch_rate * dt, dt)
     for k in range(len(supports)):
         _take_motion(supports[k], states[k], body, dt)
 
@@ -196,9 +178,7 @@ def _take_motion(support, state, body, dt):
         - support.x * body.pitch_rate
         - state.chassis_velocity
     )
-    branches = (state.slow_force, state.middle_force, state.fast_force)
-    slow, middle, fast = branch_step(support.elastomer, branches, state.velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(support.elastomer, state, state.velocity * dt, dt)
 
 
 def engine_stiffness(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray:

@@ -1,15 +1,15 @@
 """Where an engine on several mounts rests, and which parameters each mount may have for itself."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, NamedTuple
 
-from mount_models.quantity import ParameterError, Quantity, check_name
+from mount_models.quantity import ParameterError, Quantity
 from mount_sim.electronics.faults.schedule import texts_of_mount
 from mount_sim.plant.engine_body import RigidEngine, Support, engine_modes
 from mount_sim.plant.vehicle import Vehicle
 
-_X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0, 'chosen')
-_Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0, 'chosen')
+_X = Quantity('m', 'x of the mount, forward of the centre of gravity', -2.0, 2.0)
+_Y = Quantity('m', 'y of the mount, left of the centre of gravity', -2.0, 2.0)
 _LOWEST_MODE = 0.5  # Hz, chosen: below it the engine is held by nothing
 
 SUPPORTS = {
@@ -87,12 +87,15 @@ def values_of_mount(values: Mapping[str, Any], name: str) -> dict[str, Any]:
     return found
 
 
-def check_support(name: str, support: str) -> str:
-    """Return the support of the place `name`, or raise `ParameterError`."""
-    if support not in SUPPORTS:
-        known = ', '.join(SUPPORTS)
-        raise ParameterError(f'places.{name}.support {support!r} is unknown; known are {known}')
-    return support
+def supported_places(places: Places, mounts: Collection[str]) -> list[str]:
+    """Return the places with a support without electronics, or raise `ParameterError`."""
+    for name, place in places._asdict().items():
+        if place.support not in SUPPORTS:
+            raise ParameterError(
+                f'places.{name}.support {place.support!r} is unknown; known are {", ".join(SUPPORTS)}'
+            )
+    named = places._asdict().items()
+    return [name for name, place in named if name not in mounts and place.support != 'none']
 
 
 def support_of(place: Place, vehicle: Vehicle) -> Support:
@@ -111,10 +114,3 @@ def check_hold(engine: RigidEngine, supports: Mapping[str, Support]) -> None:
             'mount (mounts) or a support (places.rear.support elastomer), or the torque rod a lever '
             '(engine.rod_lever)'
         )
-
-
-def check_own_name(name: str, known: Mapping[str, Any]) -> str:
-    """Return the general name of a parameter of mount_sim; raises `ParameterError` for an unknown one."""
-    general = general_name(name)
-    check_name('mount_sim', general, known)
-    return general

@@ -12,16 +12,22 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked
 from mount_ros.topics import SIM_TRUTH
 from mount_sim.electronics.electronics import ElectronicsParameters, advance_current, read_sensors
-from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.closing import ClosingMechanics, checked_closing, closed_state
-from mount_sim.plant.elastomer import branch_step, elastomer_force
 from mount_sim.plant.friction import full_step
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE, Hydromount, hydromount_force, hydromount_step
 from mount_sim.plant.mounts import Contents, SeatedMount
 from mount_sim.plant.reluctance import ReluctanceActuator, gap_flux_density
-from mount_sim.plant.ripple import RippleCoil
-from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, Engine, Vehicle, engine_step, vehicle_step
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
+from mount_sim.plant.vehicle import (
+    ENGINE_STATE,
+    VEHICLE_STATE,
+    Vehicle,
+    elastomer_force,
+    engine_step,
+    stretch_branches,
+    vehicle_step,
+)
 
 _PADS, _FLUID = int(Contents.PADS), int(Contents.FLUID)
 _BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
@@ -37,7 +43,6 @@ class Plant(NamedTuple):
     friction: FrictionCoefficients = FrictionCoefficients()
     contact: FrictionContact = FrictionContact()
     vehicle: Vehicle = Vehicle()
-    engine: Engine = Engine()
     electronics: ElectronicsParameters = ElectronicsParameters()
     hydromount: Hydromount = Hydromount()
     mount: SeatedMount = SeatedMount()
@@ -193,7 +198,7 @@ def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
             _advance_bench(law, now, values[index], dt)
         elif seat == _ACCELERATED_CHASSIS:
             beside = force_beside_elastomer(law, now, now.displacement, dt)
-            motion = engine_step(law.engine, now.engine, values[index], engine_forces[index], beside, dt)
+            motion = engine_step(law.vehicle, now.engine, values[index], engine_forces[index], beside, dt)
             take_motion(law, now, motion, dt)
         else:
             now.road_height = values[index]
@@ -237,15 +242,14 @@ def _rub(law, now, displacement, dt):
 @compiled
 def _advance_bench(law, now, displacement, dt):
     """The rack imposes the displacement; the mount answers with its force."""
-    elastomer = law.engine.elastomer
+    elastomer = law.vehicle.elastomer
     change = displacement - now.displacement
-    branches = branch_step(elastomer, (now.slow_force, now.middle_force, now.fast_force), change, dt)
-    now.slow_force, now.middle_force, now.fast_force = branches
+    stretch_branches(elastomer, now, change, dt)
     now.velocity = change / dt
     now.displacement = displacement
     _pump(law, now, change, dt)
     beside = force_beside_elastomer(law, now, displacement, dt)
-    now.mount_force = elastomer_force(elastomer, displacement, branches) + beside
+    now.mount_force = elastomer_force(elastomer, displacement, now) + beside
 
 
 @compiled

@@ -23,7 +23,7 @@ class ReluctanceActuator(NamedTuple):
     Eq (2) is used in its dimensionally right form B = mu0 n i / (2 gap + l / mu_r), and A of Eq (1) is 2 A_g.
     """
 
-    turns: Annotated[float, Quantity('1', 'turns n of the coil', 1.0, 1e5, 'chosen')] = 480.0
+    turns: Annotated[float, Quantity('1', 'turns n of the coil', 1.0, 1e5)] = 480.0
     gap_area: Annotated[
         float, Quantity('m^2', 'area A_g of one air gap and of the core', 1e-6, 1e-2, _FITTED)
     ] = 2.46e-4

@@ -1,32 +1,206 @@
 """Electronics of all mounts and the engine that rests on them, sample by sample, without bus or clock."""
 
+import math
 import zlib
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mount_driver.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 from mount_models.quantity import checked, with_flattened
-from mount_sim.electronics.electronics import Noise
+from mount_models.sampling import SAMPLE_RATE, sample_time_ns
+from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults.schedule import Faults
-from mount_sim.excitation.excitation import Excitation, Seat
-from mount_sim.excitation.shaking import Shaking
+from mount_sim.excitation.excitation import Excitation, Seat, Shaking
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.car import CarLaw, CarSimulation
-from mount_sim.plant.car_check import check_car
-from mount_sim.plant.check import checked_plant
+from mount_sim.plant.check import check_car, checked_plant
 from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.places import (
     ALONE,
     PLACES,
     check_hold,
-    check_support,
     mount_names,
     support_of,
+    supported_places,
     values_of_mount,
 )
-from mount_sim.plant.plant import PlantSimulation
-from mount_sim.plant.simulated_mount import SimulatedMount
+from mount_sim.plant.plant import Memory, Plant, PlantSimulation
+
+FARTHEST_DISPLACEMENT = DISPLACEMENT_LIMIT / DISPLACEMENT_STEPS
+"""Range of the displacement sensor to either side, m: that of its signal on the bus."""
+
+
+class DivergedError(ValueError):
+    """The simulated plant has no finite state any more; the text says since when and the remedy."""
+
+
+@dataclass
+class BeyondRange:
+    """Samples whose displacement lay beyond the sensor's range: sent as not valid, answered with 0 A."""
+
+    samples: int = 0
+    first: float = math.nan  # s
+
+    def note(self, time: float) -> None:
+        """Take one more, at `time` s."""
+        if not self.samples:
+            self.first = time
+        self.samples += 1
+
+
+@dataclass(frozen=True)
+class Run:
+    """Length of a simulated run in samples, where the excitation begins in it, and their rate in Hz."""
+
+    samples: int
+    excitation_start: int
+    sample_rate: float = SAMPLE_RATE
+
+
+class Ahead(NamedTuple):
+    """What the next n samples are made of.
+
+    The plant, excitation and force on the engine, both (n, steps), whether the coil's driver is open, and
+    numbers for the noise (n, `Noise.NUMBERS`).
+    """
+
+    memory: Memory
+    values: NDArray[np.float64]
+    engine_forces: NDArray[np.float64]
+    driver_open: bool
+    noise: NDArray[np.float64]
+
+
+class SimulatedMount:
+    """One mount in its scenario: `measure` a sample, `advance` to the next with a setpoint, and again.
+
+    A setpoint takes effect at the sample instant after the one that it answers, as the electronics' own
+    sampled current loop takes it over. Without a setpoint for `setpoint_timeout`, counted from when the last
+    one was due, the current goes to 0 A. `faults` change readings, coil current and plant.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        simulation: PlantSimulation,
+        noise: Noise,
+        shaking: Shaking,
+        faults: Faults,
+        move: Callable[[], None],
+    ):
+        """`move` moves plant and car on when all mounts have advanced."""
+        self.faults = faults
+        self._shaking, self._move = shaking, move
+        self.run = run = Run(shaking.samples, shaking.start, shaking.sample_rate)
+        self._sound_plant = plant
+        self._plant = simulation
+        self._noise = noise
+        self.sample_rate = run.sample_rate
+        """Hz"""
+        self.sample_time = sample_time_ns(run.sample_rate)
+        """ns"""
+        self.patience = round(plant.electronics.setpoint_timeout * run.sample_rate)
+        """Samples without a setpoint after which the current goes to 0 A."""
+        self._driver_opens = plant.mount.driver_opens
+        self.sample = 0
+        self.beyond_range = BeyondRange()
+        self.current = 0.0
+        """Current (A) of the coil up to the next sample."""
+        self._silent = 0
+        self._setpoint = 0.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time in s."""
+        return self.sample * (1.0 / self.sample_rate)
+
+    @property
+    def finished(self) -> bool:
+        """Whether all samples of the run were taken."""
+        return self.sample >= self.run.samples
+
+    @property
+    def enabled(self) -> bool:
+        """Whether setpoints come in time."""
+        return self._silent < self.patience
+
+    @property
+    def driver_on(self) -> bool:
+        """Whether the coil's driver gives what is wanted: setpoints come in time, and it is not open."""
+        return self.enabled and not self._driver_open
+
+    @property
+    def truth(self) -> np.void:
+        """What no sensor saw at the last `measure`."""
+        return self._plant.truth
+
+    @property
+    def truth_bytes(self) -> bytes:
+        """The same as little-endian float64 numbers in the order of `sim/truth`."""
+        return self._plant.truth_bytes
+
+    def measure(self) -> Reading:
+        """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
+        faults = self.faults
+        if faults.due(self.time):
+            faults.look(self.time)
+            self._plant.change(faults.through('plant', self._sound_plant))
+        reading = Reading(*self._plant.read(self._noise.next()))
+        if not abs(reading.displacement) <= FARTHEST_DISPLACEMENT:
+            self._doubt(reading.displacement)
+        return faults.through('reading', reading) if faults.present else reading
+
+    def forget(self) -> None:
+        """Take no setpoint of the past for one of the present, as electronics that were without power."""
+        self._silent = self.patience
+
+    def advance(self, setpoint: float | None, late: int = 0) -> None:
+        """Go on to the next sample with a new setpoint (A), or None if none has come since the last one.
+
+        `late` is the number of samples since it was due. After the end of the run nothing shakes the mount.
+        """
+        if setpoint is None:
+            self._silent += 1
+        else:
+            self._silent, self._setpoint = late, setpoint
+        current = self._setpoint if self.driver_on else 0.0
+        self.current = self.faults.through('current', current) if self.faults.present else current
+        self.sample += 1
+        self._move()
+
+    def ahead(self, count: int) -> Ahead:
+        """Return what the next samples of a mount alone need in a compiled loop; none of them is taken yet.
+
+        They are at least one and at most `count`. The loop does for each what `measure` and `advance` with a
+        setpoint do; `skip` notes how far it came.
+        """
+        until_open = self.run.excitation_start - self.sample
+        if self._driver_opens and until_open > 0:
+            count = min(count, until_open)
+        values, forces = self._shaking.ahead(self.sample, min(count, self.run.samples - self.sample))
+        return Ahead(self._plant.memory, values, forces, self._driver_open, self._noise.ahead(len(values)))
+
+    def skip(self, count: int, setpoint: float) -> None:
+        """Note that a compiled loop took `count` samples and advanced the last one with `setpoint` (A)."""
+        self._noise.skip(count)
+        self._silent, self._setpoint = 0, setpoint
+        self.sample += count
+
+    def _doubt(self, displacement: float) -> None:
+        if not math.isfinite(displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        self.beyond_range.note(self.time)
+
+    @property
+    def _driver_open(self) -> bool:
+        return self._driver_opens and self.sample >= self.run.excitation_start
 
 
 class SimulatedCar:
@@ -40,11 +214,12 @@ class SimulatedCar:
         general = mount_parameters(values)
         names = mount_names(general.mounts)
         seat, step_time = excitation.seat, excitation.step_time
-        chosen = {name: mount_parameters(values, name) for name in names or (ALONE,)}
+        supported = supported_places(general.places, names) if names else []
+        chosen = {name: mount_parameters(values, name) for name in (*(names or (ALONE,)), *supported)}
         plants = {name: parameters.plant for name, parameters in chosen.items()}
-        if names:
-            chosen |= {name: mount_parameters(values, name) for name in supported_places(general, names)}
-            plants |= {name: _without_electronics(chosen[name], name) for name in chosen if name not in names}
+        for name in supported:
+            support = getattr(general.places, name).support
+            plants[name] = plants[name]._replace(mount=seated_mount(support))
         simulations = {name: PlantSimulation(plant, seat, step_time) for name, plant in plants.items()}
         for plant in plants.values():
             checked_plant(plant, seat, step_time)
@@ -86,14 +261,3 @@ class SimulatedCar:
 def mount_parameters(values: Mapping[str, Any], name: str = '') -> SimParameters:
     """Return the parameters of mount_sim as they hold for the mount `name`, or in general."""
     return with_flattened(SimParameters(), values_of_mount(values, name))
-
-
-def supported_places(parameters: SimParameters, mounts: tuple[str, ...]) -> list[str]:
-    """Return the places with a support without electronics."""
-    supports = {name: check_support(name, getattr(parameters.places, name).support) for name in PLACES}
-    return [name for name, support in supports.items() if name not in mounts and support != 'none']
-
-
-def _without_electronics(parameters: SimParameters, name: str):
-    support = getattr(parameters.places, name).support
-    return parameters.plant._replace(mount=seated_mount(support))

@@ -4,30 +4,72 @@
     m_b z_b'' = F_s - F_c,              F_c = k_c (z_b - z_c) + c_c (z_b' - z_c')
     m_c z_c'' = F_c + F,   m_e z_e'' = F_e - F,   F = elastomer force + friction force at x = z_e - z_c
 
+Elastomer at x: k_e x + f_1 + f_2 + f_3,  f_j' = k_j x' - f_j / tau_j,  tau_j = 1 / (2 pi corner frequency).
+
 z: heights of wheel (u), body (b), local chassis at the mount (c), engine (e) and road (r) from their rest;
 F: mount force on the chassis, positive for x > 0. Semi-implicit Euler; 50 us is short enough for all modes.
 """
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
-from mount_sim.plant.elastomer import Elastomer, branch_step, elastomer_force
 
 FloatArray = npt.NDArray[np.float64]
 
-_BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
+BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
 _BODIES = ('wheel', 'body', 'chassis', 'engine')
 VEHICLE_STATE = record_type(
-    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + _BRANCHES
+    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + BRANCHES
 )
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
-ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *_BRANCHES])
+ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *BRANCHES])
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
+
+
+class Elastomer(NamedTuple):
+    """Static stiffness k_e, stiffness k_j and corner frequency of each branch; loss factor 0.06 .. 0.08."""
+
+    static_stiffness: Annotated[float, Quantity('N/m', 'k_e: stiffness at rest', 1e3, 1e7)] = 1.6e5
+    slow_stiffness: Annotated[float, Quantity('N/m', 'k_1 of the slow branch', 0.0, 1e7)] = 1.6e4
+    middle_stiffness: Annotated[float, Quantity('N/m', 'k_2 of the middle branch', 0.0, 1e7)] = 1.6e4
+    fast_stiffness: Annotated[float, Quantity('N/m', 'k_3 of the fast branch', 0.0, 1e7)] = 1.6e4
+    slow_corner: Annotated[float, Quantity('Hz', 'corner frequency of the slow branch', 0.01, 1e3)] = 2.0
+    middle_corner: Annotated[float, Quantity('Hz', 'corner frequency of the middle branch', 0.01, 1e3)] = 10.0
+    fast_corner: Annotated[float, Quantity('Hz', 'corner frequency of the fast branch', 0.01, 1e3)] = 50.0
+
+
+@compiled
+def elastomer_force(elastomer, displacement, state):
+    """Return the force (N) at `displacement` (m) with the forces of the branches in the record `state`."""
+    return (
+        elastomer.static_stiffness * displacement + state.slow_force + state.middle_force + state.fast_force
+    )
+
+
+@compiled
+def stretch_branches(elastomer, state, displacement_change, dt):
+    """Advance the forces of the branches in `state` by `dt` seconds with `displacement_change` in m.
+
+    Exact for a constant velocity within the step.
+    """
+    e, change = elastomer, displacement_change
+    state.slow_force = _maxwell_step(state.slow_force, e.slow_stiffness, e.slow_corner, change, dt)
+    state.middle_force = _maxwell_step(state.middle_force, e.middle_stiffness, e.middle_corner, change, dt)
+    state.fast_force = _maxwell_step(state.fast_force, e.fast_stiffness, e.fast_corner, change, dt)
+
+
+@compiled
+def _maxwell_step(force, stiffness, corner, displacement_change, dt):
+    exponent = 2.0 * math.pi * corner * dt
+    lost = -expm1(-exponent)
+    return force * (1.0 - lost) + stiffness * displacement_change * lost / exponent
 
 
 class Vehicle(NamedTuple):
@@ -42,13 +84,6 @@ class Vehicle(NamedTuple):
     suspension_stiffness: Annotated[float, Quantity('N/m', 'k_s: body to wheel', 1e2, 1e7)] = 2.2e4
     suspension_damping: Annotated[float, Quantity('N s/m', 'c_s: body to wheel', 0.0, 1e6)] = 1500.0
     tyre_stiffness: Annotated[float, Quantity('N/m', 'k_t: wheel to road', 1e3, 1e8)] = 2.0e5
-    elastomer: Elastomer = Elastomer()
-
-
-class Engine(NamedTuple):
-    """Engine on its mount, on a chassis whose acceleration is given."""
-
-    engine_mass: Annotated[float, Quantity('kg', 'm_e: share of the engine on this mount', 1.0, 1e4)] = 80.0
     elastomer: Elastomer = Elastomer()
 
 
@@ -69,8 +104,7 @@ def vehicle_step(vehicle, state, road_height, engine_force, friction_force, dt):
     the elastomer, at the present displacement.
     """
     displacement = state.engine_height - state.chassis_height
-    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
-    mount = elastomer_force(vehicle.elastomer, displacement, branch_forces) + friction_force
+    mount = elastomer_force(vehicle.elastomer, displacement, state) + friction_force
     tyre = vehicle.tyre_stiffness * (road_height - state.wheel_height)
     suspension = vehicle.suspension_stiffness * (
         state.wheel_height - state.body_height
@@ -90,23 +124,20 @@ def vehicle_step(vehicle, state, road_height, engine_force, friction_force, dt):
     state.engine_height += dt * state.engine_velocity
 
     velocity = state.engine_velocity - state.chassis_velocity
-    slow, middle, fast = branch_step(vehicle.elastomer, branch_forces, velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(vehicle.elastomer, state, velocity * dt, dt)
     return MountMotion(state.engine_height - state.chassis_height, velocity, mount, chassis_acceleration)
 
 
 @compiled
-def engine_step(engine, state, chassis_acceleration, engine_force, friction_force, dt):
+def engine_step(vehicle, state, chassis_acceleration, engine_force, friction_force, dt):
     """Advance `state`, a record of `ENGINE_STATE`, by `dt` seconds and return the `MountMotion`.
 
     `chassis_acceleration` in m/s^2, up; forces as in `vehicle_step`.
     """
-    branch_forces = (state.slow_force, state.middle_force, state.fast_force)
-    mount = elastomer_force(engine.elastomer, state.displacement, branch_forces) + friction_force
-    state.velocity += dt * ((engine_force - mount) / engine.engine_mass - chassis_acceleration)
+    mount = elastomer_force(vehicle.elastomer, state.displacement, state) + friction_force
+    state.velocity += dt * ((engine_force - mount) / vehicle.engine_mass - chassis_acceleration)
     state.displacement += dt * state.velocity
-    slow, middle, fast = branch_step(engine.elastomer, branch_forces, state.velocity * dt, dt)
-    state.slow_force, state.middle_force, state.fast_force = slow, middle, fast
+    stretch_branches(vehicle.elastomer, state, state.velocity * dt, dt)
     return MountMotion(state.displacement, state.velocity, mount, chassis_acceleration)
 
 

@@ -14,10 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from mount_models.quantity import with_values
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SAMPLE_TIME
-from mount_sim.electronics.warm_coil import TemperatureCoefficients, coil_at
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.reluctance import force as magnetic_force
-from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate, incremental_inductance
+from mount_sim.plant.ripple import (
+    RippleCoil,
+    TemperatureCoefficients,
+    coil_at,
+    current_rate,
+    flux_rate,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -94,12 +99,6 @@ def record_ripple(
         'current_rate_a_per_s': rates * (1.0 + each * random.standard_normal(count)),
         'flux_rate_t_per_s': flux * (1.0 + each * random.standard_normal(count)),
     }
-
-
-def true_inductance(rack: Rack, current: float, gap: float, temperature: float = 20.0) -> float:
-    """Return what a perfect rack would measure (H), to judge a calibration by."""
-    coil = coil_at(rack.coil, rack.temperature, temperature)
-    return float(incremental_inductance(coil, rack.actuator, current, gap))
 
 
 def drawn_rack(seed: int, noise: float = 0.01) -> Rack:

@@ -12,6 +12,7 @@ from engine_mount.recordings.run.place import open_run
 from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.recordings.signals.plausibility import check_size
 from engine_mount.recordings.signals.signal import SECOND
+from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.one_grid import (
     CHASSIS,
@@ -33,7 +34,6 @@ from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.force_table import ForceTable
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_sim.excitation.recorded import LONGEST_GAP
 from mount_sim.plant.closing import ClosingMechanics
 
 DEFAULT_TABLE = 'default'

@@ -9,13 +9,12 @@ from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import BLOCK, CoreOutcome, Sink, coil_temperature, stamp_of, take_one
 from engine_mount.settings.mounts import settings_of_mounts
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.chosen import Parameters
 from mount_init.initialisation import OFF
 from mount_sim.electronics.electronics import status_every
-from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
-from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount, mount_parameters
 
 
 @dataclass

@@ -10,6 +10,7 @@ import numpy as np
 from engine_mount.drives.loop import compiled_loop as loop
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.chosen import Parameters
 from mount_bringup.settings import check_sample_rate
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
@@ -17,12 +18,10 @@ from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_sim.electronics.electronics import Reading, status_every
 from mount_sim.electronics.faults.schedule import check_without_bus
-from mount_sim.excitation.building import build_excitation
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_car import SimulatedCar
-from mount_sim.plant.simulated_mount import BeyondRange, SimulatedMount
+from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount
 
 BLOCK = 1000
 """Samples, chosen: packed and written together."""

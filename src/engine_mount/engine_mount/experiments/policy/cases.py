@@ -11,8 +11,7 @@ from engine_mount.experiments.sweep.evaluation import FIRST_FREQUENCY, RATE
 from mount_control.policy import continuous_viscous
 from mount_models.quantity import Quantity
 from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
-from mount_sim.plant.elastomer import Elastomer
-from mount_sim.plant.vehicle import Vehicle
+from mount_sim.plant.vehicle import Elastomer, Vehicle
 
 NAME = 'policy'
 PAPER, CONTINUOUS = 'switched_viscous', 'continuous_viscous'

@@ -3,11 +3,10 @@
 import functools
 
 from engine_mount.reports.drive.signals import FloatArray
+from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from engine_mount.signals.roads.inversion import road_of
 from mount_models.arithmetic.series import series_of
-from mount_sim.excitation.building import recorded_signal
 from mount_sim.excitation.excitation import Excitation, Seat, idle_force
-from mount_sim.excitation.recorded import acceleration_at
 from mount_sim.excitation.scenario import STEP_TIME, IdleForce, RecordedScenario
 from mount_sim.plant.vehicle import Vehicle
 

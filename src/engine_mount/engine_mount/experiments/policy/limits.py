@@ -10,8 +10,8 @@ from engine_mount.experiments.sweep.evaluation import FIRST_FREQUENCY, RATE, pea
 from engine_mount.reports.drive.signals import FloatArray
 from mount_models.arithmetic.compiled import compiled
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.road import Gap, Sweep, gap_in_road, sweep_road
-from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
+from mount_sim.excitation.scenario import STEP_TIME, SweepScenario
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, vehicle_step
 
 _STEPS = round(SAMPLE_TIME / STEP_TIME)
@@ -48,7 +48,7 @@ def damped(road: FloatArray, damping: float, first: int = 0) -> FloatArray:
 def sweep_limit(level: float, damping: float) -> float:
     """Return the largest displacement (m) from 3 to 14 Hz with an ideal damper always on."""
     time = STEP_TIME * np.arange(round(_SWEEP_SECONDS / STEP_TIME))
-    displacement = damped(sweep_road(time, Sweep(velocity_amplitude=level)), damping)
+    displacement = damped(sweep_road(time, SweepScenario(velocity_amplitude=level)), damping)
     frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
     return peak_in(frequency, displacement, BELOW_ISOLATION) or float('nan')
 

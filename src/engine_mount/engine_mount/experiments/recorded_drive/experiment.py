@@ -32,11 +32,11 @@ from engine_mount.experiments.recorded_drive.evaluation import (
 )
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth
+from engine_mount.signals.excitation import recorded_signal
 from mount_control.policy import switched_viscous
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity, with_flattened
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.building import recorded_signal
 from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
 
 NAME = 'recorded_drive'

@@ -26,6 +26,7 @@ from engine_mount.recordings.run.session import session_parameters
 from engine_mount.recordings.signals.even_grid import evenly_spaced
 from engine_mount.recordings.signals.signal import signal_of
 from engine_mount.settings.options import with_sample_rate
+from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE, acceleration_at
 from mount_bringup.chosen import control_parameters
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.control_loop import SampleCounts
@@ -36,7 +37,6 @@ from mount_models.arithmetic.record import record_type
 from mount_models.quantity import with_flattened
 from mount_ros.topics import SIM_CHASSIS_ACCELERATION
 from mount_sim.excitation.excitation import Excitation, Seat
-from mount_sim.excitation.recorded import LONGEST_GAP, LOWEST_RATE, acceleration_at
 from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.plant import TRUTH

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import SeriesError
 from engine_mount.settings.mounts import mounts_of
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.chosen import Parameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import sample_time_ns
 from mount_ros.topics import SIM_TRUTH
-from mount_sim.excitation.building import build_excitation
-from mount_sim.excitation.excitation import Seat
-from mount_sim.excitation.shaking import LONG_BLOCK, Shaking
+from mount_sim.excitation.excitation import LONG_BLOCK, Seat, Shaking
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import seated_mount
 from mount_sim.plant.plant import PlantSimulation

@@ -8,6 +8,7 @@ from engine_mount.recordings.signals.even_grid import evenly_spaced
 from engine_mount.recordings.signals.plausibility import check_size
 from engine_mount.recordings.signals.resampling import has_step, resampled
 from engine_mount.recordings.signals.signal import SECOND, FloatArray, Signal, SignalError
+from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 from engine_mount.signals.importing.one_grid import (
     CHASSIS,
     DISPLACEMENT,
@@ -22,7 +23,6 @@ from engine_mount.signals.importing.writing import Channel, Times
 from engine_mount.signals.units.quantities import Quantity, quantity
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
-from mount_sim.excitation.recorded import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 
 
 def channels_of(

@@ -17,7 +17,7 @@ GRAVITY_WITHIN = 0.06
 LARGEST_MEAN = 1.6
 """Standard gravities, chosen: no accelerometer at rest shows more, whatever its error."""
 SHAKEN = 50.0
-"""m/s^2, chosen as in `mount_sim.excitation.recorded`: no chassis is shaken more but in a crash."""
+"""m/s^2, chosen as in `engine_mount.signals.excitation`: no chassis is shaken more but in a crash."""
 _USUAL = (0.5, 99.5)
 """Percentiles, chosen: what lies beyond may be faults, of which the command that takes the values tells."""
 _LOOKED_AT = 100_000  # values, chosen: enough for percentiles

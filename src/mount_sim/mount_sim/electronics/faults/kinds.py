@@ -1,17 +1,92 @@
-"""All faults by name, each with its meaning and what it changes."""
+"""All faults by name: what each means, and what it changes while it is present."""
 
 import math
+import zlib
+from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from mount_models.sampling import HIGHEST_CURRENT
+from mount_driver.bus import Frame
+from mount_driver.can_library import can
+from mount_driver.protocol import MountCodec, Status
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
 from mount_sim.electronics.electronics import Reading
-from mount_sim.electronics.faults import frames
-from mount_sim.electronics.faults.fault import Fault, Kind
-from mount_sim.electronics.warm_coil import REFERENCE_CELSIUS, TemperatureCoefficients
+from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
+from mount_sim.random_numbers import RandomNumbers
 
 if TYPE_CHECKING:
     from mount_sim.plant.plant import Plant
+
+Frames = list[can.Message]
+
+
+class Kind(NamedTuple):
+    """What a name stands for, and what it changes while it is present.
+
+    All but `plant` is called once in each sample, in the order in which it stands here: `reading` of the
+    sensors; sample counter and clock (us) as `counters`, which may pass their widths; `frames` that the bus
+    carries in this sample; `status` of the electronics; `current` (A) that the power stage drives.
+    `duration` (s) holds where the text names none.
+    """
+
+    meaning: str
+    reading: 'Callable[[Fault, Reading], Reading] | None' = None
+    counters: 'Callable[[Fault, tuple[int, int]], tuple[int, int]] | None' = None
+    frames: 'Callable[[Fault, Frames], Frames] | None' = None
+    status: 'Callable[[Fault, Status], Status] | None' = None
+    current: 'Callable[[Fault, float], float] | None' = None
+    plant: 'Callable[[Fault, Plant], Plant] | None' = None
+    deaf: bool = False
+    """Setpoints are not received."""
+    duration: float = math.inf
+    from_start: bool = False
+    """It is present from the first sample on and so cannot begin during a run."""
+    for_good: bool = False
+    """It stays after its end."""
+    on_bus: bool = False
+    """It shows in frames alone, so not in a core run, which has none."""
+
+
+@dataclass(eq=False)
+class Fault:
+    """One occurrence of a fault: its times in s of simulated time, and what it remembers."""
+
+    name: str
+    kind: Kind
+    begin: float
+    end: float
+    seed: int = 0
+    sample_rate: float = SAMPLE_RATE
+    injected: bool = False
+    """It came during the run."""
+    deaf: bool = False
+    restarts: bool = False
+    """The electronics begin anew with this sample, their counters of frames and setpoint too."""
+    count: int = 0
+    drift: float = 0.0
+    kept: float = math.nan
+    """The first value, which the fault repeats."""
+    past: deque[Frames] = field(default_factory=deque)
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """From when on (s) it is present, and when no longer."""
+        kind = self.kind
+        return 0.0 if kind.from_start else self.begin, math.inf if kind.for_good else self.end
+
+    @cached_property
+    def random(self) -> RandomNumbers:
+        """Random numbers of this occurrence."""
+        return RandomNumbers((self.seed, zlib.crc32(self.name.encode())))
+
+    def keep(self, value: float) -> float:
+        """Return the first number of the `value`s since the fault began."""
+        if math.isnan(self.kept):
+            self.kept = value
+        return self.kept
+
 
 _CLOCK_JUMP = 10_000_000  # us, chosen: farther than any pause of the frames
 _STEP = 2e-3  # m, chosen
@@ -28,6 +103,150 @@ _HOTTER = 0.4  # 1: rise of the resistance
 _WORN = 200e-6  # m, chosen: contact gap; less is left of the pads than the air gap of 349 um needs
 _HALVES_MEET = 20e-6  # m, chosen: gap at which the core halves touch where no pad is between them
 _BLOCKING = 1e9  # N/m, chosen: stiffness of what lies between the halves
+
+# Of the bus and the counters.
+
+_CODEC = MountCodec()
+_EVERY = 3  # chosen: of so many samples one has damaged frames
+_REORDERED = 10  # chosen: of so many samples one overtakes the one before
+_REPLAYED = 100  # samples, chosen: age of the frames that are sent again
+_BABBLED = 5  # frames in each sample, chosen: about what a bus of 500 kbit/s and 2 Mbit/s can carry besides
+_OWN = {_CODEC.measurement.frame_id, _CODEC.setpoint.frame_id, _CODEC.status.frame_id}
+_FOREIGN = [number for number in range(0x800) if number not in _OWN]
+_LENGTH_LESS = 4  # bytes; CAN FD knows 24 and 20
+_BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
+_ERROR_BYTES = 8
+_CLOCK_DRIFT = 1000e-6  # 1; the driver follows a quartz of at most 500 ppm
+_WIDTH_SAMPLE, _WIDTH_MICROSECOND = 1 << 16, 1 << 32
+_US = 1e6  # us per s
+
+
+def _none_sent(fault: Fault, frames: Frames) -> Frames:
+    """Send no frame."""
+    return []
+
+
+def _bus_off(fault: Fault, frames: Frames) -> Frames:
+    """Send the error frame of a controller that is bus off, then nothing.
+
+    An error frame is local to a controller and no bus carries it. SocketCAN shows the controller's own to the
+    driver; here the simulator gives it to the driver over a bus of this machine.
+    """
+    fault.count += 1
+    error = can.Message(arbitration_id=_BUS_OFF, is_error_frame=True, data=bytes(_ERROR_BYTES))
+    return [error] if fault.count == 1 else []
+
+
+def _lost(share: float) -> Callable[[Fault, Frames], Frames]:
+    """Lose this share of the frames, at random."""
+
+    def some(fault: Fault, frames: Frames) -> Frames:
+        arriving = fault.random.uniform(len(frames)) >= share
+        return [frame for frame, arrives in zip(frames, arriving, strict=True) if arrives]
+
+    return some
+
+
+def _delayed(samples: int) -> Callable[[Fault, Frames], Frames]:
+    """Delay frames by some samples; those under way when the fault ends are lost."""
+
+    def late(fault: Fault, frames: Frames) -> Frames:
+        fault.past.append(_copies(frames))
+        return fault.past.popleft() if len(fault.past) > samples else []
+
+    return late
+
+
+def _duplicated(fault: Fault, frames: Frames) -> Frames:
+    """Send each frame twice."""
+    return [frame for frame in frames for _ in range(2)]
+
+
+def _reordered(fault: Fault, frames: Frames) -> Frames:
+    """Send the frames of every tenth sample after those of the next."""
+    fault.count += 1
+    if fault.count % _REORDERED == 0:
+        fault.past.append(_copies(frames))
+        return []
+    return frames + fault.past.popleft() if fault.past else frames
+
+
+def _frozen_counter(fault: Fault, frames: Frames) -> Frames:
+    """Give all measurements the same alive counter, with a check sum that is right."""
+    for frame in frames:
+        if frame.arbitration_id == _CODEC.measurement.frame_id:
+            alive, measurement = _CODEC.decode_measurement(frame.data)
+            frame.data = _CODEC.encode_measurement(measurement, int(fault.keep(alive)))
+    return frames
+
+
+def _damaged(damage: Callable[[can.Message], None]) -> Callable[[Fault, Frames], Frames]:
+    """Damage the frames of every third sample."""
+
+    def some(fault: Fault, frames: Frames) -> Frames:
+        fault.count += 1
+        if fault.count % _EVERY == 1:
+            for frame in frames:
+                damage(frame)
+        return frames
+
+    return some
+
+
+def _change_byte(frame: can.Message) -> None:
+    """Change the last byte."""
+    frame.data[-1] ^= 0xFF
+
+
+def _shorten(frame: can.Message) -> None:
+    """Remove the last bytes."""
+    frame.data = frame.data[:-_LENGTH_LESS]
+    frame.dlc = len(frame.data)
+
+
+def _replayed(fault: Fault, frames: Frames) -> Frames:
+    """Send after each frame one of 100 samples ago once more, as it was."""
+    fault.past.append(_copies(frames))
+    return frames + fault.past.popleft() if len(fault.past) > _REPLAYED else frames
+
+
+def _babbling(fault: Fault, frames: Frames) -> Frames:
+    """Add frames of another node, with identifiers that are none of this mount's."""
+    numbers = fault.random.uniform(_BABBLED)
+    foreign = (Frame(_FOREIGN[int(number * len(_FOREIGN))], number.tobytes()) for number in numbers)
+    return [*frames, *foreign]
+
+
+def _drifting_clock(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+    """Let the microsecond counter run 1000 ppm too fast."""
+    sample, microseconds = counters
+    return sample, microseconds + round(_CLOCK_DRIFT * (microseconds - round(fault.begin * _US)))
+
+
+def _wrapping_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+    """Let both counters go through their highest value to 0 when the fault begins."""
+    sample, microseconds = counters
+    wrap = round(fault.begin * fault.sample_rate)
+    return (
+        sample + _WIDTH_SAMPLE - wrap % _WIDTH_SAMPLE,
+        microseconds + _WIDTH_MICROSECOND - round(wrap / fault.sample_rate * _US),
+    )
+
+
+def _reset_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+    """Start both counters from 0 when the power is back; until then no setpoint is received."""
+    back = round(fault.end * fault.sample_rate)
+    after = counters[0] - back
+    fault.deaf, fault.restarts = after < 0, after == 0
+    return counters if fault.deaf else (after, round(after / fault.sample_rate * _US))
+
+
+def _copies(frames: Frames) -> Frames:
+    """Return the frames as they are now, which no later change of the given ones changes."""
+    return [Frame(frame.arbitration_id, bytearray(frame.data)) for frame in frames]
+
+
+# Of sensors, status and plant.
 
 
 def _displacement(meaning: str, change: Callable[[Fault, float], float]) -> Kind:
@@ -99,38 +318,34 @@ def _bus(meaning: str, change: Any = None, **options: Any) -> Kind:
 
 
 FAULTS: dict[str, Kind] = {
-    'can_silent': _bus('no frames are sent', frames.none_sent),
-    'bus_off': _bus(
-        'an error frame tells of bus off, then no frame passes either way', frames.bus_off, deaf=True
-    ),
-    'lost_1': _bus('1 % of the frames are lost, at random', frames.lost(0.01)),
-    'lost_5': _bus('5 % of the frames are lost, at random', frames.lost(0.05)),
-    'lost_50': _bus('50 % of the frames are lost, at random', frames.lost(0.5)),
-    'delayed': _bus('frames arrive 5 ms late', frames.delayed(5)),
-    'delayed_50': _bus('frames arrive 50 ms late', frames.delayed(50)),  # later than the setpoint timeout
-    'duplicated': _bus('each frame arrives twice', frames.duplicated),
-    'reordered': _bus('the frames of every tenth sample arrive behind those of the next', frames.reordered),
-    'frozen_counter': _bus('all measurements carry the same alive counter', frames.frozen_counter),
-    'wrong_crc': _bus('the frames of every third sample are damaged', frames.damaged(frames.change_byte)),
-    'wrong_length': _bus(
-        'the frames of every third sample are 4 bytes too short', frames.damaged(frames.shorten)
-    ),
-    'replayed': _bus('behind each frame comes one of 100 samples ago once more', frames.replayed),
-    'babbling': _bus('5 frames with foreign identifiers in each sample', frames.babbling),
+    'can_silent': _bus('no frames are sent', _none_sent),
+    'bus_off': _bus('an error frame tells of bus off, then no frame passes either way', _bus_off, deaf=True),
+    'lost_1': _bus('1 % of the frames are lost, at random', _lost(0.01)),
+    'lost_5': _bus('5 % of the frames are lost, at random', _lost(0.05)),
+    'lost_50': _bus('50 % of the frames are lost, at random', _lost(0.5)),
+    'delayed': _bus('frames arrive 5 ms late', _delayed(5)),
+    'delayed_50': _bus('frames arrive 50 ms late', _delayed(50)),  # later than the setpoint timeout
+    'duplicated': _bus('each frame arrives twice', _duplicated),
+    'reordered': _bus('the frames of every tenth sample arrive behind those of the next', _reordered),
+    'frozen_counter': _bus('all measurements carry the same alive counter', _frozen_counter),
+    'wrong_crc': _bus('the frames of every third sample are damaged', _damaged(_change_byte)),
+    'wrong_length': _bus('the frames of every third sample are 4 bytes too short', _damaged(_shorten)),
+    'replayed': _bus('behind each frame comes one of 100 samples ago once more', _replayed),
+    'babbling': _bus('5 frames with foreign identifiers in each sample', _babbling),
     'deaf': _bus('setpoints are not received', deaf=True),
     'clock_jump': _bus(
         'the microsecond counter is 10 s ahead', counters=lambda _, count: (count[0], count[1] + _CLOCK_JUMP)
     ),
-    'clock_drift': _bus('the microsecond counter runs 1000 ppm too fast', counters=frames.drifting_clock),
+    'clock_drift': _bus('the microsecond counter runs 1000 ppm too fast', counters=_drifting_clock),
     'counter_wrap': _bus(
         'sample and microsecond counter go through 0 at that time',
-        counters=frames.wrapping_counters,
+        counters=_wrapping_counters,
         from_start=True,
     ),
     'electronics_reset': _bus(
         'no power for 100 ms: no frames, 0 A, then all counters from 0',
         lambda fault, sent: [] if fault.deaf else sent,
-        counters=frames.reset_counters,
+        counters=_reset_counters,
         current=lambda fault, wanted: 0.0 if fault.deaf else wanted,
         deaf=True,
         duration=0.1,

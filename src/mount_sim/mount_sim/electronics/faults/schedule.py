@@ -4,38 +4,30 @@ import math
 import re
 from collections import deque
 from collections.abc import Collection, Iterable
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-from mount_driver.can_library import can
-from mount_driver.protocol import Status
 from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_RATE
-from mount_sim.electronics.electronics import Reading
-from mount_sim.electronics.faults.fault import Fault
-from mount_sim.electronics.faults.kinds import FAULTS
-
-if TYPE_CHECKING:
-    from mount_sim.plant.plant import Plant
+from mount_sim.electronics.faults.kinds import FAULTS, Fault
 
 T = TypeVar('T')
 
 FORM = 'NAME@t[:duration], times in s of simulated time since the activation of mount_sim'
+_INJECTED = 'NAME[:duration], NAME ..., durations in s'
 _LONGEST = 7200.0  # s, chosen: as long as a run can be
 _NUMBER = r'[0-9.]+(?:e-?[0-9]+)?'
-_TOLD = re.compile(rf'(?P<name>\w+)@(?P<begin>{_NUMBER})(?::(?P<duration>{_NUMBER}))?')
-_INJECTED = re.compile(rf'(?P<name>\w+)(?::(?P<duration>{_NUMBER}))?')
+_WRITTEN = re.compile(rf'(\w+)(?:@({_NUMBER}))?(?::({_NUMBER}))?')
 
 
 def told_faults(texts: Iterable[str], seed: int = 0, sample_rate: float = SAMPLE_RATE) -> list[Fault]:
     """Return the faults of texts `NAME@t[:duration]`, which stay without one; raises `ParameterError`."""
-    return [_fault(text, _TOLD, FORM, seed, sample_rate) for text in texts]
+    return [_fault(text, FORM, seed, sample_rate) for text in texts]
 
 
 def injected_faults(text: str, seed: int = 0, sample_rate: float = SAMPLE_RATE) -> list[Fault]:
     """Return the faults of a text `NAME[:duration], ...`, as they begin at 0 s; raises `ParameterError`."""
-    form = 'NAME[:duration], NAME ..., durations in s'
     parts = [part.strip() for part in text.split(',') if part.strip()]
-    found = [_fault(part, _INJECTED, form, seed, sample_rate) for part in parts]
+    found = [_fault(part, _INJECTED, seed, sample_rate) for part in parts]
     for fault in found:
         if fault.kind.from_start:
             raise ParameterError(
@@ -84,7 +76,7 @@ class Faults:
         self._faults = told_faults(dict.fromkeys(texts), seed, sample_rate)
         self._orders: deque[Fault | None] = deque()  # None: end what was injected
         self._injected: list[str] = []
-        self._change = min((fault.first for fault in self._faults), default=math.inf)
+        self._change = self._next_change(-math.inf)
 
     @property
     def none_told(self) -> bool:
@@ -99,9 +91,8 @@ class Faults:
         """Begin and end what is due at `time` (s)."""
         while self._orders:
             self._take(self._orders.popleft(), time)
-        self.present = tuple(fault for fault in self._faults if fault.first <= time < fault.last)
-        times = (moment for fault in self._faults for moment in (fault.first, fault.last))
-        self._change = min((moment for moment in times if moment > time), default=math.inf)
+        self.present = tuple(fault for fault in self._faults if fault.times[0] <= time < fault.times[1])
+        self._change = self._next_change(time)
         if self._orders:  # one that came meanwhile
             self._change = -math.inf
 
@@ -126,33 +117,8 @@ class Faults:
         self._change = -math.inf
         return f'ended: {", ".join(names)}' if names else 'no fault was injected'
 
-    # What the faults change, in the order in which it is called in a sample.
-
-    def reading(self, reading: Reading) -> Reading:
-        """Return the sensors' reading."""
-        return self._through('reading', reading)
-
-    def counted(self, sample: int, microseconds: int) -> tuple[int, int]:
-        """Return sample counter and clock of the electronics."""
-        return self._through('counters', (sample, microseconds))
-
-    def on_bus(self, frames: list[can.Message]) -> list[can.Message]:
-        """Return the frames that the bus carries."""
-        return self._through('frames', frames)
-
-    def status(self, status: Status) -> Status:
-        """Return the status that the electronics send."""
-        return self._through('status', status)
-
-    def driven(self, wanted: float) -> float:
-        """Return the current (A) that the power stage drives for the current `wanted` (A)."""
-        return self._through('current', wanted)
-
-    def plant(self, plant: 'Plant') -> 'Plant':
-        """Return the plant, sound as given, as it is with the faults."""
-        return self._through('plant', plant)
-
-    def _through(self, part: str, value: T) -> T:
+    def through(self, part: str, value: T) -> T:
+        """Return a value as the faults that are present change it; `part` is a field of `Kind`."""
         for fault in self.present:
             change = getattr(fault.kind, part)
             if change is not None:
@@ -169,6 +135,10 @@ class Faults:
         """Whether the electronics begin anew with this sample."""
         return any(fault.restarts for fault in self.present)
 
+    def _next_change(self, time: float) -> float:
+        times = (moment for fault in self._faults for moment in fault.times)
+        return min((moment for moment in times if moment > time), default=math.inf)
+
     def _take(self, order: Fault | None, time: float) -> None:
         if order is None:
             self._faults = [fault for fault in self._faults if not fault.injected or fault.kind.for_good]
@@ -177,16 +147,16 @@ class Faults:
             self._faults.append(order)
 
 
-def _fault(text: str, pattern: re.Pattern[str], form: str, seed: int, sample_rate: float) -> Fault:
-    found = pattern.fullmatch(text)
-    if found is None:
+def _fault(text: str, form: str, seed: int, sample_rate: float) -> Fault:
+    found = _WRITTEN.fullmatch(text)
+    if found is None or (found[2] is None) is (form is FORM):
         raise ParameterError(f'fault {text!r:.60} is not written as {form}')
-    name = found['name']
+    name = found[1]
     if name not in FAULTS:
         raise ParameterError(f'fault {name!r} is unknown; known are {", ".join(FAULTS)}')
     kind = FAULTS[name]
-    begin = _time(text, found.groupdict().get('begin') or '0')
-    duration = _time(text, found['duration']) if found['duration'] else kind.duration
+    begin = _time(text, found[2] or '0')
+    duration = _time(text, found[3]) if found[3] else kind.duration
     if duration <= 0.0:
         raise ParameterError(f'fault {text!r}: its duration must be longer than 0 s')
     return Fault(name, kind, begin, begin + duration, seed, sample_rate, deaf=kind.deaf)
