@@ -138,23 +138,19 @@ def read_summary(data: mmap.mmap) -> Summary:
         if opcode not in _SUMMARY:
             continue
         record = parsed(_SUMMARY[opcode], data[begin:position])
+        if isinstance(record, ChunkIndex):
+            record = indexed_chunk(data, record)
         if record is None or position > place:
             return Summary(False)
         found[opcode].append(record)
-    chunks = []
-    for index in sorted(found[Opcode.CHUNK_INDEX], key=lambda index: index.chunk_start_offset):
-        chunk = indexed_chunk(data, index)
-        if chunk is None:
-            return Summary(False)
-        chunks.append(chunk)
-        if len(chunks) % _CHUNKS_AT_ONCE == 0:
+        if len(found[Opcode.CHUNK_INDEX]) % _CHUNKS_AT_ONCE == 0:
             data.madvise(mmap.MADV_DONTNEED)
     return Summary(
         True,
         footer.summary_start,
         {schema.id: schema for schema in found[Opcode.SCHEMA]},
         {channel.id: channel for channel in found[Opcode.CHANNEL]},
-        chunks,
+        sorted(found[Opcode.CHUNK_INDEX], key=lambda chunk: chunk.position),
         next(iter(found[Opcode.STATISTICS]), None),
         found[Opcode.METADATA_INDEX] + found[Opcode.ATTACHMENT_INDEX],
     )

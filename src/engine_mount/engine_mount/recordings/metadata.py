@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import yaml
 
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_recorder.metadata import NANOSECONDS, NO_TIME, ROOT, VERSION, OfferedQos
+from mount_recorder.metadata import NANOSECONDS, ROOT, VERSION, OfferedQos
 
 T = TypeVar('T')
 
@@ -32,21 +32,11 @@ class TopicInformation:
 
 
 @dataclass(frozen=True)
-class FileInformation:
-    """One file of a recording; times in ns."""
-
-    path: str
-    starting_time: int = NO_TIME
-    duration: int = 0
-    message_count: int = 0
-
-
-@dataclass(frozen=True)
 class BagInformation:
     """A whole recording; times in ns."""
 
     topics: tuple[TopicInformation, ...]
-    files: tuple[FileInformation, ...]
+    files: tuple[str, ...]  # their names
     starting_time: int
     duration: int
     message_count: int
@@ -69,23 +59,13 @@ def read_metadata(text: str) -> BagInformation:
 
 
 def _bag(document: Any) -> BagInformation:
-    paths = [_checked(path, str) for path in document['relative_file_paths']]
-    files = [
-        FileInformation(
-            path=_checked(entry['path'], str),
-            starting_time=_checked(entry['starting_time']['nanoseconds_since_epoch'], int),
-            duration=_checked(entry['duration']['nanoseconds'], int),
-            message_count=_count(entry),
-        )
-        for entry in document.get('files') or ()
-    ]
     optional = {
         name: _checked(document.get(name) or '', str)
         for name in ('ros_distro', 'compression_format', 'compression_mode')
     }
     return BagInformation(
         topics=tuple(_topic(entry) for entry in document['topics_with_message_count'] or ()),
-        files=tuple(files) or tuple(FileInformation(path) for path in paths),
+        files=tuple(_checked(path, str) for path in document['relative_file_paths']),
         starting_time=_checked(document['starting_time']['nanoseconds_since_epoch'], int),
         duration=_checked(document['duration']['nanoseconds'], int),
         message_count=_count(document),

@@ -58,7 +58,7 @@ def find_pieces(path: Path) -> Pieces:
         return Pieces(tuple(present), None, (f'{what}; topics and times are those in the files',), complete)
     if information.storage not in ('mcap', 'sqlite3'):
         raise StorageError(f'{path} is stored as {information.storage}; convert it to mcap')
-    listed = [path / Path(file.path).name for file in information.files]
+    listed = [path / Path(file).name for file in information.files]
     missing = [file.name for file in listed if not file.is_file()]
     here = [file for file in listed if file.is_file()] or present
     warnings = []

@@ -1,11 +1,12 @@
 """Opens recordings: those of this project and genuine rosbag2 bags, whole or in part."""
 
+import contextlib
 import copy
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -38,15 +39,6 @@ from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 class ReadingError(ValueError):
     """A recording, or a topic of it, cannot be read; the text gives the reason."""
-
-
-class Arrivals(Protocol):
-    """Samples of a topic: when they were taken and when they came in, ns."""
-
-    @property
-    def stamps(self) -> Times | None: ...
-    @property
-    def receive_times(self) -> Times | None: ...
 
 
 def open_recording(path: str | os.PathLike[str]) -> 'Recording':
@@ -152,7 +144,7 @@ class Recording:
     def time_axis(self) -> TimeAxis:
         """The time axis shown to users, read once: where `times` were read before, without messages."""
         if self._time_axis is None:
-            self._time_axis = self._make_axis({})
+            self._time_axis = self._find_axis()
         return self._time_axis
 
     def __contains__(self, name: str) -> bool:
@@ -212,9 +204,10 @@ class Recording:
         for name, count in counts.items():
             self._note_damage(name, count)
 
-    def axis_from(self, topic: str, first: Arrivals) -> TimeAxis:
-        """Return the time axis by the first messages of its topic alone."""
-        return self._make_axis({topic: first})
+    def axis_from(self, stamps: Times, received: Times) -> TimeAxis:
+        """Return the time axis by these samples of its topic alone, at least one (ns)."""
+        zeros = [step.get(ZERO_KEY) for step in origin(self.information)]
+        return TimeAxis(stamps, received, [zero for zero in zeros if isinstance(zero, int)])
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -228,10 +221,11 @@ class Recording:
 
         Those of sending are kept of setpoints, those of arrival also of the topic of the time axis.
         """
-        anchor = next(iter(anchors(self._types)), '')
-        found = self._times_of(self.topics, anchor if self._time_axis is None else '')
-        if self._time_axis is None:
-            self._time_axis = self._make_axis({anchor: found[anchor]} if anchor else {})
+        anchor = next(iter(anchors(self._types)), '') if self._time_axis is None else ''
+        found = self._times_of(self.topics, anchor)
+        samples = found.get(anchor)
+        if samples and samples.stamps is not None and samples.receive_times is not None:
+            self._time_axis = self.axis_from(samples.stamps, samples.receive_times)
         return found
 
     def resolve(self, name: str) -> str:
@@ -339,22 +333,17 @@ class Recording:
             found[part.topic].add(part)
         return found
 
-    def _make_axis(self, arrivals: Mapping[str, Arrivals]) -> TimeAxis:
-        """Return the time axis; `arrivals` are samples of topics, those of others are read."""
-        steps = [step.get(ZERO_KEY) for step in origin(self.information)]
-        inherited = [zero for zero in steps if isinstance(zero, int)]
+    def _find_axis(self) -> TimeAxis:
         for name in anchors(self._types):
-            known = arrivals.get(name, self._series.get(name))
-            if known is None:
-                known = self._times_of([name], name)[name]
-            try:
-                stamps, received = known.stamps, known.receive_times
-            except SeriesError:  # of a foreign topic
-                continue
-            if stamps is not None and received is not None and len(stamps):
-                return TimeAxis(stamps, received, inherited)
+            samples: Series | TopicTimes | None = self._series.get(name)
+            if samples is None:
+                samples = self._times_of([name], name)[name]
+            with contextlib.suppress(SeriesError):  # of a foreign topic
+                stamps, received = samples.stamps, samples.receive_times
+                if stamps is not None and received is not None and len(stamps):
+                    return self.axis_from(stamps, received)
         only = np.array([self.time_range[0] if self.time_range else 0])
-        return TimeAxis(only, only, inherited)
+        return self.axis_from(only, only)
 
     def _read(self, names: Sequence[str]) -> dict[str, tuple[Payloads, np.ndarray]]:
         """Return bytes and heads of all messages of topics."""

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
-from rosbags.highlevel import AnyReader
 
 import engine_mount
 from engine_mount.recordings.audit import audit
@@ -177,15 +176,6 @@ def test_a_file_cut_between_the_chunks_of_two_groups_gives_those_of_the_first(tm
     series = recording['displacement']
     assert len(series) >= 10
     assert series['mount'].tolist() == list(range(len(series)))
-
-
-def test_independent_readers_give_all_messages_in_the_order_of_log_time(drive):
-    written = list(messages())
-    with (drive / 'drive_0.mcap').open('rb') as file:
-        read = make_reader(file, validate_crcs=True).iter_messages()
-        assert [(channel.topic, found.data, found.log_time) for _, channel, found in read] == written
-    with AnyReader([drive]) as reader:
-        assert [(connection.topic, raw, time) for connection, time, raw in reader.messages()] == written
 
 
 def test_the_arrangement_changes_nothing_that_is_read(drive, tmp_path, monkeypatch):

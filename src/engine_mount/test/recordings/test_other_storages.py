@@ -115,19 +115,6 @@ def test_transaction_that_was_cut_off_is_rolled_back(tmp_path):
     assert not recording.whole
 
 
-def test_closed_database_is_whole_without_a_copy(tmp_path, monkeypatch):
-    folder = written(tmp_path / 'bag', COUNT)
-    monkeypatch.setattr('tempfile.mkdtemp', None)
-    recording = engine_mount.open(folder)
-    assert (recording.message_count, recording.whole, recording.warnings) == (COUNT, True, [])
-
-
-def test_unclosed_database_is_recovered_and_said_to_be_incomplete(unclosed, tmp_path):
-    result = recover(unclosed, tmp_path / 'recovered')
-    assert (result.kept, result.complete) == (COUNT, False)
-    assert engine_mount.open(tmp_path / 'recovered').whole
-
-
 # Messages that are compressed one by one.
 
 

@@ -126,7 +126,7 @@ class Stretches:
 
     def _take_first(self, part: ColumnPart, displacement: '_Waiting') -> None:
         if displacement.newest is None and len(part):
-            self.zero = self._notes.zero = self._recording.axis_from(part.topic, part).zero
+            self.zero = self._notes.zero = self._recording.axis_from(part.stamps, part.receive_times).zero
 
     def _check_order(self, part: ColumnPart, displacement: '_Waiting') -> None:
         stamps = part.stamps
