@@ -21,15 +21,15 @@ from engine_mount.recordings.run.session import (
     session_content,
     session_parameters,
 )
-from engine_mount.settings.options import owned
-from engine_mount.signals.importing.provenance import SCENARIO
-from mount_bringup.chosen import (
+from engine_mount.settings.chosen import (
     Parameters,
     check_policy,
     chosen_control,
     chosen_specimen,
     control_parameters,
 )
+from engine_mount.settings.options import owned
+from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT
