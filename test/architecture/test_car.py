@@ -13,8 +13,8 @@ from test_imports import CAR
 from mount_bringup.graph.nodes import SIMULATED
 
 LAUNCH_FILES = sorted((SOURCES / 'mount_bringup' / 'launch').glob('*.launch.py'))
-SUPERVISORS = ['mount_bringup.graph.run', 'mount_bringup.graph.simulation', 'mount_bringup.graph.replay']
-MODULES = [*(f'{node.package}.node' for node in SIMULATED), *SUPERVISORS]
+SUPERVISORS = ['mount_bringup.graph.run']
+MODULES = [*(f'{node.name}.node' for node in SIMULATED), *SUPERVISORS]
 BEGIN = [*LAUNCH_FILES, *(module_files()[name] for name in MODULES)]
 
 LOAD = """

@@ -13,11 +13,11 @@ from sources import PACKAGES, REPOSITORY, ROS_PACKAGES, SOURCES, modules_of
 from mount_bringup.graph.nodes import SIMULATED
 from mount_ros.topics import RACK_TOPICS, TOPICS
 
-COMMANDS = {'ros2launch', 'ros2bag', 'rosbag2_storage_mcap'}  # called by their name
+COMMANDS = {'ros2launch'}  # called by their name
 UNSEEN = {  # what is needed without an import that can be seen
     'mount_ros': {topic.type.split('/')[0] for topic in TOPICS + RACK_TOPICS},
     'mount_driver': {'msgpack'},  # of python-can, for frames by multicast
-    'mount_bringup': COMMANDS | {node.package for node in SIMULATED},
+    'mount_bringup': COMMANDS | {node.name for node in SIMULATED},
 }
 
 

@@ -201,7 +201,7 @@ def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
     """Return the nodes that publish or take a topic on their data path; the recorder takes all."""
     found = {'mount_recorder'} if kind == 'subscribe' else set()
     for node in SIMULATED:
-        source = (SOURCES / node.package / node.package / 'node.py').read_text()
+        source = (SOURCES / node.name / node.name / 'node.py').read_text()
         for constant in re.findall(rf'path\.{kind}\((?:topics\.)?([A-Z_]+)', source):
             if getattr(topics, constant).name == topic_name:
                 found.add(node.name)

@@ -5,8 +5,7 @@ import re
 import pytest
 from vehicle_file import FILE, text
 
-from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS
-from mount_bringup.graph.order import vehicle_order
+from mount_bringup.graph.run import ordered as order_of
 from mount_bringup.settings import defaults_of_nodes
 
 
@@ -15,9 +14,7 @@ def ordered(monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', '7')
 
     def order(file):
-        given = {argument.name: argument.default for argument in VEHICLE_ARGUMENTS}
-        given |= {'config': str(file), 'record': 'false'}
-        return vehicle_order(given).settings.parameters
+        return order_of(['vehicle', f'config:={file}', 'record:=false']).settings.parameters
 
     return order
 

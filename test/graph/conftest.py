@@ -10,6 +10,16 @@ from mount_driver.protocol import MountCodec
 
 
 @pytest.fixture
+def endless_drive(command):
+    """Return the function that starts a drive without an end: the process, and its folder.
+
+    One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
+    """
+    options = ('--apart', '--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.timeline.start=2.9')
+    return lambda: command.start_drive('--lockstep', *options)
+
+
+@pytest.fixture
 def bus_listener(domain):
     """The setpoints seen on the CAN bus, by a peer that was there all the time."""
     codec = MountCodec()

@@ -12,8 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
+
+import psutil
 
 import engine_mount
 from mount_bringup.graph.domain import DomainError, domain_lock
@@ -21,20 +23,9 @@ from mount_recorder.folders import recordings_of
 
 EARLIEST, LATEST = 0.5, 15.0  # s, chosen: when the signal comes; Python itself needs a while to start
 PATIENCE = 60.0  # s, chosen: until a graph that was told to end counts as hanging
-SHARED_MEMORY = '/dev/shm/'
-OWN_FILES = ('engine_mount_p', 'mount_parameters_')  # beginnings of names of temporary files
+OWN_FILES = ('engine_mount_p*', 'mount_parameters_*')  # names of temporary files
 LOOK_PERIOD = 0.1  # s, chosen
-
-
-@dataclass
-class Outcome:
-    """What came of one start: when it was told to end (s) and how, its code, and what was not as required."""
-
-    told_at: float
-    number: signal.Signals
-    code: int | None
-    by_itself: bool
-    faults: list[str] = field(default_factory=list)
+SHARED_MEMORY = '/dev/shm/'
 
 
 def main() -> int:
@@ -44,91 +35,76 @@ def main() -> int:
     parser.add_argument('--kills', type=int, default=2, help='so many of the starts are ended by SIGKILL')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--domain', type=int, default=100)
-    parser.add_argument('--priority', type=int, default=0)
+    parser.add_argument('--priority', default='0')
     parser.add_argument('options', nargs='*', help='further options of engine-mount drive, behind --')
     chosen = parser.parse_args()
     draw = random.Random(chosen.seed)
     numbers = [signal.SIGKILL] * chosen.kills + [signal.SIGINT] * (chosen.starts - chosen.kills)
     draw.shuffle(numbers)
-    options = ['--domain', str(chosen.domain), '--priority', str(chosen.priority), *chosen.options]
-    outcomes = []
+    failed = 0
     for place, number in enumerate(numbers, 1):
-        outcome = attempt(number, draw.uniform(EARLIEST, LATEST), chosen.domain, options)
-        outcomes.append(outcome)
-        how = ', ended by itself before' if outcome.by_itself else ''
-        words = '; '.join(outcome.faults) or 'as required'
-        print(
-            f'{place:4d} {number.name} at {outcome.told_at:5.2f} s{how}, code {outcome.code}: {words}',
-            flush=True,
-        )
-    failed = sum(bool(outcome.faults) for outcome in outcomes)
-    alone = sum(outcome.by_itself for outcome in outcomes)
-    print(f'{failed} of {len(outcomes)} not as required; {alone} ended by themselves before the signal')
+        at = draw.uniform(EARLIEST, LATEST)
+        faults = attempt(number, at, chosen.domain, ['--priority', chosen.priority, *chosen.options])
+        failed += bool(faults)
+        print(f'{place:4d} {number.name} at {at:5.2f} s: {"; ".join(faults) or "as required"}', flush=True)
+    print(f'{failed} of {len(numbers)} not as required')
     return 1 if failed else 0
 
 
-def attempt(number: signal.Signals, told_at: float, domain: int, options: list[str]) -> Outcome:
-    """Start the graph, end it by a signal `told_at` s later, and look what is left."""
+def attempt(number: signal.Signals, at: float, domain: int, options: list[str]) -> list[str]:
+    """Start the graph, end it by a signal `at` s later, and return what is not as required."""
     folder = Path(tempfile.mkdtemp(prefix='endurance_'))
-    files, before = set[Path](), own_files()
-    log = folder / 'said.txt'
+    log, before = folder / 'said.txt', own_files()
     command = [str(Path(sys.executable).parent / 'engine-mount'), 'drive', '--scenario', 'bench',
-               '--duration', '600', '--no-report', '--out', str(folder / 'run'), *options]  # fmt: skip
+               '--duration', '600', '--no-report', '--out', str(folder / 'run'), '--domain', str(domain),
+               *options]  # fmt: skip
     with log.open('wb') as said:
-        process = subprocess.Popen(
+        graph = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=said, stderr=said, start_new_session=True
         )
-    end = time.monotonic() + told_at
-    while process.poll() is None and time.monotonic() < end:
+    starter = psutil.Process(graph.pid)
+    processes, shared = {starter}, set[Path]()
+    end = time.monotonic() + at
+    while graph.poll() is None and time.monotonic() < end:
         time.sleep(LOOK_PERIOD)
-        files |= files_of(process.pid)
-    by_itself = process.poll() is not None
-    process.send_signal(number)
-    code = wait_for_end(process)
-    outcome = Outcome(told_at, number, code, by_itself)
-    outcome.faults += wrong_end(outcome, log.read_text(errors='replace'))
-    outcome.faults += left_behind(process.pid, domain, files, before)
-    outcome.faults += open_recordings(folder / 'run' / 'recording')
-    if outcome.faults:
-        outcome.faults.append(f'kept: {folder}')
-    else:
-        shutil.rmtree(folder)
-    return outcome
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            processes |= {*starter.children(recursive=True)}
+        shared |= shared_memory(processes)
+    by_itself = graph.poll() is not None
+    graph.send_signal(number)
+    faults = wrong_end(graph, number, by_itself, log)
+    end = time.monotonic() + PATIENCE
+    while (left := remains(processes, shared, domain, before)) and time.monotonic() < end:
+        time.sleep(LOOK_PERIOD)
+    faults += left + open_recordings(folder / 'run' / 'recording')
+    if faults:
+        return [*faults, f'kept: {folder}']
+    shutil.rmtree(folder)
+    return []
 
 
-def wait_for_end(process: subprocess.Popen[bytes]) -> int | None:
-    """Return the exit code, None of one that hangs and was killed."""
-    try:
-        return process.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-        return None
-
-
-def wrong_end(outcome: Outcome, said: str) -> list[str]:
+def wrong_end(
+    graph: subprocess.Popen[bytes], number: signal.Signals, by_itself: bool, log: Path
+) -> list[str]:
     """Return what is wrong with code and words of a graph; one that was too late for 1 kHz may say so."""
-    if '<frozen site>' in said and outcome.number is signal.SIGINT:
+    try:
+        code = graph.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        graph.kill()
+        return [f'it hangs, and was killed (code {graph.wait()})']
+    said = log.read_text(errors='replace')
+    if '<frozen site>' in said and number is signal.SIGINT:
         return []  # Python itself was starting, which no program can mend; nothing was begun
-    wanted = 1 if outcome.by_itself else 130 if outcome.number is signal.SIGINT else -signal.SIGKILL
-    faults = [] if outcome.code == wanted else [f'code {outcome.code} instead of {wanted}']
+    wanted = 1 if by_itself else 130 if number is signal.SIGINT else -signal.SIGKILL
+    faults = [] if code == wanted else [f'code {code} instead of {wanted}']
     return [*faults, *(['traceback'] if 'Traceback' in said else [])]
 
 
-def left_behind(starter: int, domain: int, files: set[Path], before: set[Path]) -> list[str]:
-    """Return processes, files and the place in the domain that a graph still has, after a while."""
-    end = time.monotonic() + PATIENCE
-    while (left := remains(starter, domain, files, before)) and time.monotonic() < end:
-        time.sleep(LOOK_PERIOD)
-    return left
-
-
-def remains(starter: int, domain: int, files: set[Path], before: set[Path]) -> list[str]:
+def remains(processes: set[psutil.Process], shared: set[Path], domain: int, before: set[Path]) -> list[str]:
     """Return what there still is of a graph at this moment, in words."""
-    left = [f'process {pid}' for pid in processes_of(starter)]
-    held = set().union(*(shared_memory(process) for _, process in all_processes()))
-    left += [f'file {path}' for path in sorted(files - held) if path.exists()]
-    left += [f'file {path}' for path in sorted(own_files() - before)]
+    left = [f'process {process.pid}' for process in processes if process.is_running()]
+    files = {path for path in shared - shared_memory(psutil.process_iter()) if path.exists()}
+    left += [f'file {path}' for path in sorted(files | own_files() - before)]
     try:
         with domain_lock(domain, ''):
             pass
@@ -137,56 +113,28 @@ def remains(starter: int, domain: int, files: set[Path], before: set[Path]) -> l
     return left
 
 
-def processes_of(starter: int) -> list[int]:
-    """Return the processes that a supervisor with this number has started."""
-    wanted = f'ENGINE_MOUNT_STARTER={starter}'.encode()
-    return [pid for pid, process in all_processes() if wanted in content(process / 'environ').split(b'\0')]
+def shared_memory(processes: Iterable[psutil.Process]) -> set[Path]:
+    """Return the files of shared memory that processes have mapped."""
+    found = set[Path]()
+    for process in processes:
+        with contextlib.suppress(psutil.Error):  # it has just ended, or is of another user
+            paths = [each.path.removesuffix(' (deleted)') for each in process.memory_maps()]
+            found |= {Path(path) for path in paths if path.startswith(SHARED_MEMORY)}
+    return found
 
 
 def own_files() -> set[Path]:
     """Return the temporary files of all graphs of this machine."""
-    temporary = Path(tempfile.gettempdir())
-    return {path for name in OWN_FILES for path in temporary.glob(f'{name}*')}
-
-
-def files_of(starter: int) -> set[Path]:
-    """Return the shared memory that the graph of this starter holds, its own too."""
-    processes = [Path(f'/proc/{pid}') for pid in (starter, *processes_of(starter))]
-    return set().union(*map(shared_memory, processes))
-
-
-def shared_memory(process: Path) -> set[Path]:
-    """Return the files of shared memory that a process has opened or mapped."""
-    maps = content(process / 'maps').decode(errors='replace').split()
-    found = {word for word in maps if word.startswith(SHARED_MEMORY)}
-    with contextlib.suppress(OSError):  # it has just ended
-        for descriptor in (process / 'fd').iterdir():
-            with contextlib.suppress(OSError):
-                found.add(str(descriptor.readlink()))
-    return {Path(name) for name in found if name.startswith(SHARED_MEMORY)}
-
-
-def all_processes() -> list[tuple[int, Path]]:
-    """Return number and folder of each process of this machine."""
-    return [(int(process.name), process) for process in Path('/proc').glob('[0-9]*')]
-
-
-def content(file: Path) -> bytes:
-    """Return what a file of a process holds, nothing if it has just ended."""
-    try:
-        return file.read_bytes()
-    except OSError:
-        return b''
+    return {path for name in OWN_FILES for path in Path(tempfile.gettempdir()).glob(name)}
 
 
 def open_recordings(first: Path) -> list[str]:
     """Return what is wrong with the recordings of a run: each must be closed."""
     faults = []
     for folder in recordings_of(first):
-        if not (folder / 'metadata.yaml').exists():
-            faults.append(f'{folder.name} is not closed')
-            continue
-        faults += [f'{folder.name}: {warning}' for warning in engine_mount.open(folder).warnings]
+        closed = (folder / 'metadata.yaml').exists()
+        warnings = engine_mount.open(folder).warnings if closed else ['not closed']
+        faults += [f'{folder.name}: {warning}' for warning in warnings]
     return faults
 
 

@@ -42,18 +42,26 @@ def _payloads(folder, topic):
     return [payloads[place] for place in np.argsort(series.stamps, kind='stable')]
 
 
+def _drive_both(command, *options):
+    """Drive in lock-step and in core: all data topics must be equal; return both results."""
+    options = ('--set', 'mount_sim.timeline.start=2.9', *options)
+    both = command.drive('--lockstep', *options), command.drive('--core', *options)
+    assert [result.code for result in both] == [0, 0], both[0].output + both[1].output
+    for topic in DATA_TOPICS:
+        lockstep, core = (_payloads(result.folder, topic) for result in both)
+        assert core, topic
+        assert lockstep == core, topic
+    return both
+
+
 def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equals_the_core_run(command):
     # long enough for two files by size; a split by wall time would depend on the speed of the machine
     options = ('--scenario', 'bench', '--duration', '2', '--set', 'mount_sim.timeline.start=2.9')
-    first = command.drive('--lockstep', *options)
+    first, _ = _drive_both(command, *options)
     second = command.drive('--lockstep', '--namespace', 'mount_right', '--split', '1MB', *options)
-    core = command.drive('--core', *options)
-    assert first.code == second.code == core.code == 0, first.output + second.output + core.output
+    assert second.code == 0, second.output
     for topic in DATA_TOPICS:
-        reference = _payloads(first.folder, topic)
-        assert reference, topic
-        assert _payloads(second.folder, topic) == reference, topic
-        assert _payloads(core.folder, topic) == reference, topic
+        assert _payloads(second.folder, topic) == _payloads(first.folder, topic), topic
     recording = engine_mount.open(second.folder / 'recording')
     topics = set(recording.topics)
     assert topics - {'/diagnostics'} == {name for name in topics if name.startswith('/mount_right/')}
@@ -64,17 +72,13 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
 
 @pytest.mark.slow
 def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switching_too(command):
-    options = (
-        '--mount', 'hydro', '--set', 'mount_control.policy=switched_viscous',
+    _, core = _drive_both(
+        command, '--mount', 'hydro', '--set', 'mount_control.policy=switched_viscous',
         '--set', 'mount_control.switching=always', '--scenario', 'sweep',
         '--duration', '1', '--set', 'mount_sim.timeline.start=3',
         '--set', 'mount_sim.sweep.first_frequency=8', '--set', 'mount_sim.idle.amplitude=200',
         '--set', 'mount_sim.electronics.coil_temperature=55.04',
     )  # fmt: skip
-    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
-    assert lockstep.code == core.code == 0, lockstep.output + core.output
-    for topic in DATA_TOPICS:
-        assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
     measured = engine_mount.open(core.folder / 'recording')['coil_temperature']['temperature']
     assert set(measured) == {55.0}
     active = engine_mount.open(core.folder / 'recording')['control_trace']['damping_active']
@@ -84,18 +88,13 @@ def test_lockstep_equals_the_core_run_with_another_mount_excitation_and_switchin
 
 @pytest.mark.slow
 def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(command):
-    options = ('--sample-rate', '2000', '--scenario', 'bench', '--duration', '0.5')
-    options += ('--set', 'mount_sim.timeline.start=2.9')
-    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
-    assert lockstep.code == core.code == 0, lockstep.output + core.output
-    for topic in DATA_TOPICS:
-        assert _payloads(lockstep.folder, topic) == _payloads(core.folder, topic), topic
-    for result in (lockstep, core):
+    both = _drive_both(command, '--sample-rate', '2000', '--scenario', 'bench', '--duration', '0.5')
+    for result in both:
         recording = engine_mount.open(result.folder / 'recording')
         assert recorded_sample_rate(recording) == 2000.0
         assert set(np.diff(recording['displacement'].stamps)) == {500_000}
         assert result.figures['lost_samples'] == result.figures['unanswered_samples'] == 0
-    replayed = replay_without_output(ReplayOrder(core.folder / 'recording'))
+    replayed = replay_without_output(ReplayOrder(both[1].folder / 'recording'))
     assert replayed.agreement is not None
     assert replayed.agreement.equal
 
@@ -106,13 +105,7 @@ def test_lockstep_equals_the_core_run_over_a_measured_road(command):
     height = 0.01 * np.sin(2.0 * np.pi * places / 1.1) + 0.004 * np.sin(2.0 * np.pi * places / 0.3)
     road = command.folder / 'road.csv'
     np.savetxt(road, np.c_[places, height], delimiter=',', header='distance [m],height [m]', comments='')
-    options = ('--road', str(road), '--speed', '20/3.6', '--set', 'mount_sim.timeline.start=2.9')
-    lockstep, core = command.drive('--lockstep', *options), command.drive('--core', *options)
-    assert lockstep.code == core.code == 0, lockstep.output + core.output
-    for topic in DATA_TOPICS:
-        payloads = _payloads(core.folder, topic)
-        assert payloads, topic
-        assert _payloads(lockstep.folder, topic) == payloads, topic
+    _, core = _drive_both(command, '--road', str(road), '--speed', '20/3.6')
     assert np.ptp(engine_mount.open(core.folder / 'recording')['sim/truth']['road_height']) > 0.01
 
 

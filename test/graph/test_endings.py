@@ -1,52 +1,47 @@
 """Whatever ends a drive, the coil is at 0 A, the recording is closed and the exit code tells the reason."""
 
+import contextlib
 import itertools
 import json
 import os
 import re
 import signal
-import subprocess
 
+import psutil
 import pytest
 from ros_testing import wait_until
 
 import engine_mount
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
-
-# One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
-ENDLESS = (
-    '--lockstep', '--apart', '--scenario', 'bench', '--duration', '600',
-    '--set', 'mount_sim.timeline.start=2.9',
-)  # fmt: skip
+from mount_bringup.graph.nodes import SIMULATED
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
 
-def _node_pids(parent: int) -> dict[str, int]:
-    """Return {node: pid} of the children of the command."""
+def _nodes(parent: int) -> dict[str, psutil.Process]:
+    """Return {node: process} of those that the command has started and that still run."""
+    children = psutil.Process(parent).children() if psutil.pid_exists(parent) else ()
     found = {}
-    listing = subprocess.run(
-        ['ps', '-ww', '-o', 'pid=,args=', '--ppid', str(parent)], capture_output=True, text=True, check=False
-    ).stdout
-    for line in listing.splitlines():
-        pid, _, arguments = line.strip().partition(' ')
-        for name in ('mount_recorder', 'mount_driver', 'mount_sim', 'mount_init', 'mount_control'):
-            if f'from {name}.node' in arguments:
-                found[name] = int(pid)
+    for child in children:
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            command = ' '.join(child.cmdline())
+            found |= {node.name: child for node in SIMULATED if f'from {node.name}.node' in command}
     return found
 
 
 @pytest.mark.slow
-def test_ctrl_c_during_the_start_ends_every_node(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_ctrl_c_during_the_start_ends_every_node(endless_drive, bus_listener):
+    process, out = endless_drive()
     wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the start of all nodes', LIMIT)
     _interrupt(process)
     assert not bus_listener or bus_listener[-1].current == 0.0
 
 
-def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(
+    endless_drive, bus_listener
+):
+    process, out = endless_drive()
     wait_until(lambda: any(setpoint.current > 1.0 for setpoint in bus_listener), 'the ramp', LIMIT)
     _interrupt(process)
     _expect_a_sound_end(bus_listener, out)
@@ -54,9 +49,9 @@ def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_rec
 
 @pytest.mark.slow
 def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while_it_damps(
-    command, bus_listener, domain
+    endless_drive, command, bus_listener, domain
 ):
-    first, out = command.start_drive(*ENDLESS)
+    first, out = endless_drive()
     wait_until(lambda: bus_listener, 'the first graph', LIMIT)
     second = command.drive('--scenario', 'bench', '--duration', '1')
     assert second.code == 1
@@ -67,10 +62,10 @@ def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while
 
 
 @pytest.mark.slow
-def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_listener):
-    process, out = command.start_drive(*ENDLESS)
+def test_death_of_the_control_node_ends_the_drive_and_names_it(endless_drive, bus_listener):
+    process, out = endless_drive()
     wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)
-    os.kill(_node_pids(process.pid)['mount_control'], signal.SIGKILL)
+    os.kill(_nodes(process.pid)['mount_control'].pid, signal.SIGKILL)
     output, _ = process.communicate(timeout=LIMIT)
     assert process.returncode == 1
     assert 'mount_control ended with code -9' in output
@@ -79,14 +74,14 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(command, bus_list
 
 
 @pytest.mark.slow
-def test_nodes_end_when_their_supervisor_is_killed(command, bus_listener):
-    process, _ = command.start_drive(*ENDLESS)
+def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
+    process, _ = endless_drive()
     wait_until(lambda: len(bus_listener) > 100, 'setpoints', LIMIT)
-    nodes = _node_pids(process.pid)
+    nodes = _nodes(process.pid)
     assert len(nodes) == 5
     process.kill()
     process.communicate(timeout=LIMIT)
-    wait_until(lambda: not any(_alive(pid) for pid in nodes.values()), 'the end of all nodes', LIMIT)
+    wait_until(lambda: not any(node.is_running() for node in nodes.values()), 'the end of all nodes', LIMIT)
     assert bus_listener[-1].current == 0.0
 
 
@@ -105,17 +100,17 @@ def _drive_with_a_control_that_stands_still(command, bus_listener) -> str:
         '--priority', '0',
     )  # fmt: skip
     wait_until(lambda: _damping(bus_listener) or process.poll() is not None, 'damping', LIMIT)
-    nodes = _node_pids(process.pid)
+    nodes = _nodes(process.pid)
     if 'mount_control' not in nodes:
         return process.communicate()[0]
-    os.kill(nodes['mount_control'], signal.SIGSTOP)
+    os.kill(nodes['mount_control'].pid, signal.SIGSTOP)
     try:
         wait_until(lambda: bus_listener[-1].current == 0.0, '0 A', LIMIT)
         seen = len(bus_listener)
         wait_until(lambda: len(bus_listener) >= seen + 25, '0.5 s of 0 A every 20 ms', LIMIT)
         assert {setpoint.current for setpoint in bus_listener[seen:]} == {0.0}
     finally:
-        os.kill(nodes['mount_control'], signal.SIGCONT)
+        os.kill(nodes['mount_control'].pid, signal.SIGCONT)
     output, _ = process.communicate(timeout=LIMIT)
     if 'too late for 1 kHz' in output:  # then what stood still may not have been active yet
         return output
@@ -172,7 +167,7 @@ def _interrupt(process) -> None:
     output, _ = process.communicate(timeout=LIMIT)
     assert process.returncode == 130, output
     assert 'interrupted' in output
-    wait_until(lambda: not _node_pids(process.pid), 'the end of all nodes', LIMIT)
+    wait_until(lambda: not _nodes(process.pid), 'the end of all nodes', LIMIT)
 
 
 def _expect_a_sound_end(setpoints, out) -> None:
@@ -189,12 +184,3 @@ def _damping(setpoints) -> bool:
     steps = [after - before for before, after in itertools.pairwise(recent) if after != before]
     peaks = sum(before > 0.0 > after for before, after in itertools.pairwise(steps))
     return len(recent) == 300 and min(recent) > 0.4 and peaks >= 3
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    with open(f'/proc/{pid}/stat') as stat:
-        return stat.read().rsplit(') ', 1)[1][0] != 'Z'

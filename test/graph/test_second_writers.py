@@ -13,12 +13,6 @@ from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
 from mount_ros.environment import prepare_environment
 
-# One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
-ENDLESS = (
-    '--lockstep', '--apart', '--scenario', 'bench', '--duration', '600',
-    '--set', 'mount_sim.timeline.start=2.9',
-)  # fmt: skip
-
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
 # Answers each sample with 3 A, its stamp sound; or sends each displacement once more half a sample later.
@@ -53,9 +47,11 @@ rclpy.spin(node)
         ),
     ],
 )
-def test_a_second_node_ends_the_drive_at_0_ampere_with_its_name(command, bus_listener, topic, sentence):
+def test_a_second_node_ends_the_drive_at_0_ampere_with_its_name(
+    endless_drive, command, bus_listener, topic, sentence
+):
     prepare_environment()
-    process, out = command.start_drive(*ENDLESS)
+    process, out = endless_drive()
     said = []
     reading = threading.Thread(target=lambda: said.append(process.communicate()[0]))
     reading.start()

@@ -20,8 +20,8 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.settings.chosen import policy_of
 from engine_mount.signals.excitation import build_excitation
-from mount_bringup.chosen import policy_of
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
 from mount_models.damper import damper_curve

@@ -9,7 +9,7 @@ from engine_mount.drives.loop import run as core_run
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
-from mount_bringup.chosen import chosen_control
+from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
 from mount_ros.messages.cdr import serialised

@@ -18,7 +18,7 @@ from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.reports.run_facts import run_facts
 from engine_mount.reports.signals import Signals
-from mount_bringup.chosen import policy_of, with_recorded_policy
+from engine_mount.settings.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import ParameterError
 from mount_recorder.session import session_text

@@ -6,4 +6,4 @@ from mount_bringup.graph.launch import launch_description
 
 
 def generate_launch_description() -> LaunchDescription:
-    return launch_description('vehicle', 'vehicle.yaml')
+    return launch_description('vehicle')

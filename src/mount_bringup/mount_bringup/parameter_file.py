@@ -20,7 +20,11 @@ def settings_of_file(
     `known` is {node: {parameter: default}}. Raises `SettingError` for a file that cannot be read or names
     none of these nodes, and `ParameterError` for a parameter that none of those named has.
     """
-    return settings_in(_content(file), str(file), namespace, known)
+    try:
+        content = yaml_in_file(file)
+    except YamlError as error:
+        raise SettingError(f'parameter file {file} {error}') from None
+    return settings_in(content, str(file), namespace, known)
 
 
 def settings_in(
@@ -30,54 +34,37 @@ def settings_in(
     if not isinstance(content, Mapping):
         raise SettingError(f'parameter file {file} must name nodes with their {_VALUES}')
     settings: dict[str, dict[str, Any]] = {}
-    for pattern, values in _entries(content):
-        nodes = [node for node in known if _named(pattern, node)]
+    for path, value in _leaves(content, ()):
+        if _VALUES not in path:
+            raise SettingError(f'{"/".join(["", *path])} must have {_VALUES}; instead received {value!r}')
+        place = path.index(_VALUES)
+        *spaces, last = '/'.join(path[:place]).strip('/').split('/')
+        name = '.'.join(path[place + 1 :])
+        nodes = [node for node in known if last in (node, '*', '**')]
         if not nodes:
+            pattern = '/'.join(path[:place])
             raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
-        for name, value in _flat(values):
-            owners = [node for node in nodes if general_name_of(node, name) in known[node]]
-            if not owners:
-                names = {name for node in nodes for name in known[node]}
-                check_name(f'{" or ".join(nodes)} ({file})', name, names)
-            for node in owners:
-                if _matches(pattern, f'{namespace.strip("/")}/{node}'):
-                    settings.setdefault(node, {})[name] = value
+        owners = [node for node in nodes if general_name_of(node, name) in known[node]]
+        if not owners:
+            names = {name for node in nodes for name in known[node]}
+            check_name(f'{" or ".join(nodes)} ({file})', name, names)
+        for node in owners:
+            if _matches([*spaces, last], f'{namespace.strip("/")}/{node}'):
+                settings.setdefault(node, {})[name] = value
     return settings
 
 
-def _content(file: Path) -> Any:
-    try:
-        return yaml_in_file(file)
-    except YamlError as error:
-        raise SettingError(f'parameter file {file} {error}') from None
+def _leaves(content: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the keys to each value; names may be nested as in namespaces."""
+    if isinstance(content, Mapping):
+        for key, inner in content.items():
+            yield from _leaves(inner, (*path, str(key)))
+    else:
+        yield path, content
 
 
-def _entries(content: Mapping[str, Any], path: str = '') -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the pattern of node names and the values of each entry; names may be nested as in namespaces."""
-    for key, inner in content.items():
-        if not isinstance(inner, Mapping):
-            raise SettingError(f'{path}/{key} must have {_VALUES}; instead received {inner!r}')
-        if key == _VALUES:
-            yield path, inner
-        else:
-            yield from _entries(inner, f'{path}/{str(key).strip("/")}')
-
-
-def _flat(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f'{prefix}{name}.')
-        else:
-            yield f'{prefix}{name}', value
-
-
-def _named(pattern: str, node: str) -> bool:
-    """Whether a pattern can mean `node` in some namespace."""
-    return pattern.rpartition('/')[2] in (node, '*', '**')
-
-
-def _matches(pattern: str, name: str) -> bool:
+def _matches(pattern: list[str], name: str) -> bool:
     """Whether a full name matches, `*` standing for one part of it and `**` for any number of them."""
     parts = {'**': '(/[^/]+)*', '*': '/[^/]+'}
-    expression = ''.join(parts.get(part, '/' + re.escape(part)) for part in pattern.strip('/').split('/'))
+    expression = ''.join(parts.get(part, '/' + re.escape(part)) for part in pattern)
     return re.fullmatch(expression, f'/{name.strip("/")}') is not None

@@ -1,5 +1,6 @@
 """Compiles what the nodes would compile at their first start: the executable `mount_prepare`."""
 
+import itertools
 from collections.abc import Sequence
 
 from mount_control.controller import load_compiled_law
@@ -22,12 +23,11 @@ def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tup
     load_compiled_laws(specimen)
     for policy in policies:
         load_compiled_law(control_settings({'policy': policy}, specimen))
-    for scenario in scenarios:
+    for scenario, mounts in itertools.product(scenarios, _MOUNTS):
         excitation = build_excitation(SimParameters(scenario=scenario))
-        cars = [SimulatedCar({'scenario': scenario, 'mounts': mounts}, excitation) for mounts in _MOUNTS]
-        for each in (mount for car in cars for mount in car.mounts.values()):
-            each.measure()
-            each.advance(0.0)
+        for mount in SimulatedCar({'scenario': scenario, 'mounts': mounts}, excitation).mounts.values():
+            mount.measure()
+            mount.advance(0.0)
 
 
 def main() -> None:

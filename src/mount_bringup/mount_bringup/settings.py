@@ -2,9 +2,8 @@
 
 import contextlib
 import difflib
-import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
@@ -27,25 +26,24 @@ class SettingError(ParameterError):
 
 def defaults_of_nodes(nodes: Sequence[str] = NODES) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: default}} of all that can be set from outside."""
-    return {node: dict(_defaults(node)) for node in NODES if node in nodes}
+    return {node: _defaults(node) for node in NODES if node in nodes}
 
 
-def _defaults(node: str) -> Mapping[str, Any]:
+def _defaults(node: str) -> dict[str, Any]:
     if node == 'mount_control':
-        return control.defaults()  # not kept: a policy may be registered later
-    return _kept_defaults(node)
+        return control.defaults()
+    return {name: value for declared in _declared(node) for name, value in flattened(declared).items()}
 
 
-@functools.cache
-def _kept_defaults(node: str) -> Mapping[str, Any]:
+def _declared(node: str) -> tuple[NamedTuple, ...]:
+    """Return the declared parameters of a node."""
     if node == 'mount_sim':
         from mount_sim.parameters import NodeParameters, SimParameters  # not in the car
 
-        return flattened(SimParameters()) | flattened(NodeParameters())
+        return SimParameters(), NodeParameters()
     if node == 'mount_recorder':
-        return flattened(RecorderParameters())
-    own = DriverParameters() if node == 'mount_driver' else InitParameters()
-    return flattened(own) | flattened(SpecimenChoice())
+        return (RecorderParameters(),)
+    return DriverParameters() if node == 'mount_driver' else InitParameters(), SpecimenChoice()
 
 
 def checked_settings(
@@ -71,7 +69,7 @@ def checked_settings(
             check_name(node, general_name_of(kind, name), known[kind])
         checked[node] = {
             name: _typed(f'{node}.{name}', value, known[kind][general_name_of(kind, name)])
-            for name, value in _with_damper_text(kind, values).items()
+            for name, value in values.items()
         }
     return checked
 
@@ -85,28 +83,18 @@ def general_name_of(node: str, name: str) -> str:
     return general_name(name)
 
 
-def _with_damper_text(node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return `values` with the damper as one text that needs no file, as a session can keep it."""
-    damper = values.get('damper')
-    if node != 'mount_control' or not isinstance(damper, (str, Mapping)):
-        return values
-    return {**values, 'damper': damper_text(damper)}
-
-
-def _texts(name: str, value: Any) -> list[str]:
-    if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
-        return list(value)
-    raise ParameterError(
-        f'{name} must be a list of at least one text, or be left out; instead received {value!r}'
-    )
-
-
 def _typed(name: str, value: Any, default: Any) -> Any:
+    if name.endswith('mount_control.damper') and isinstance(value, (str, Mapping)):
+        return damper_text(value)  # one text that needs no file, as a session can keep it
     if isinstance(default, float) and not isinstance(value, bool):
         with contextlib.suppress(TypeError, ValueError):
             return float(value)  # of 3e-5 too, which is text in YAML
     if isinstance(default, tuple):
-        return _texts(name, value)
+        if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
+            return list(value)
+        raise ParameterError(
+            f'{name} must be a list of at least one text, or be left out; instead received {value!r}'
+        )
     if not isinstance(value, type(default)):
         raise ParameterError(
             f'{name} must be a {type(default).__name__} such as {default!r}; instead received {value!r}'

@@ -21,10 +21,7 @@ def test_each_domain_and_namespace_has_a_port_of_its_own_where_nobody_else_is_gi
     assert len(set(ports)) == len(places)
     assert max(ports) < 32768  # above, Linux gives ports to whoever asks for any
     assert min((port - 7400) % 250 for port in ports) >= 130  # below are the participants of the domain
-
-
-def test_slashes_around_a_namespace_do_not_change_its_port():
-    assert can_port(1, '/left/') == can_port(1, 'left') != can_port(1, '')
+    assert can_port(1, '/left/') == can_port(1, 'left')
     assert can_port(1, '/') == can_port(1, '')
 
 
@@ -33,7 +30,7 @@ def test_a_second_graph_in_a_namespace_is_refused_until_the_first_has_ended():
         domain_lock(3, 'left'),
         domain_lock(3, 'right'),
         domain_lock(4, 'left'),
-        pytest.raises(DomainError, match=r'already runs in ROS domain 3, namespace /left \(process \d'),
+        pytest.raises(DomainError, match='already runs in ROS domain 3, namespace /left'),
     ):
         domain_lock(3, '/left').__enter__()
     with domain_lock(3, 'left'):
@@ -50,7 +47,7 @@ def test_a_graph_that_was_killed_holds_its_place_no_more_and_leaves_no_file(tmp_
         [sys.executable, '-c', hold], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as holder:
         assert holder.stdout.readline() == b'held\n'
-        with pytest.raises(DomainError, match=rf'namespace /left \(process {holder.pid}\)'):
+        with pytest.raises(DomainError, match='namespace /left'):
             domain_lock(5, 'left').__enter__()
         holder.kill()
         holder.wait()
@@ -62,8 +59,6 @@ def test_namespaces_that_would_share_a_can_bus_do_not_run_at_the_same_time(monke
     monkeypatch.setattr(domain, '_PLACES', 1)
     with (
         domain_lock(3, 'left'),
-        pytest.raises(
-            DomainError, match=r'namespace /left .* CAN bus would have port 8281 as that of /right'
-        ),
+        pytest.raises(DomainError, match='namespace /right, or in one whose CAN bus would have port 8281'),
     ):
         domain_lock(3, 'right').__enter__()

@@ -10,11 +10,10 @@ from unittest.mock import MagicMock
 import pytest
 
 import mount_bringup
-from mount_bringup.graph.run import GRAPHS
+from mount_bringup.graph.launch_arguments import GRAPHS, arguments_of
 
 PACKAGE = Path(mount_bringup.__file__).parents[1]
 MODULES = ('launch', 'launch.actions', 'launch.events', 'launch.events.process', 'launch.logging')
-REPLAYED = str(Path(__file__).resolve().parents[3] / 'bags' / 'reference' / 'gap')
 
 
 class Launched:
@@ -47,29 +46,20 @@ def launch(monkeypatch):
     sys.modules.pop('mount_bringup.graph.launch')
 
 
-@pytest.mark.parametrize('given', [{'name': 'sim'}, {'name': 'vehicle'}, {'name': 'replay', 'bag': REPLAYED}])
-def test_every_argument_has_a_description_and_goes_to_the_supervisor(launch, given):
-    name = given['name']
-    launched = Launched(launch, recording='bags/none', **given)
-    assert all(declared['description'] for declared in launched.declared.values())
-    assert {'namespace', 'config', 'record', 'recording', 'policy', 'priority', 'log_level'} < set(
-        launched.declared
-    )
-    program, *words = launched.command[2:]
-    assert 'from mount_bringup.graph.run import main' in program
-    assert words[0] == name
-    assert [word.partition(':=')[0] for word in words[1:]] == [each.name for each in GRAPHS[name]()[0]]
-    assert 'recording:=bags/none' in words
-
-
-@pytest.mark.parametrize('name', ['sim', 'vehicle'])
-def test_the_graph_takes_the_common_arguments(launch, name):
+@pytest.mark.parametrize('name', GRAPHS)
+def test_every_argument_has_a_description_and_goes_to_the_supervisor(launch, name):
     launched = Launched(launch, name, recording='bags/none')
+    assert all(declared['description'] for declared in launched.declared.values())
     assert {
         'namespace', 'config', 'record', 'recording', 'policy', 'damper', 'parameters_file', 'specimen',
         'port', 'duration', 'priority', 'composed', 'restarts', 'log_level', 'sample_rate', 'mounts',
     } < set(launched.declared)  # fmt: skip
     assert Path(launched.declared['config']['default_value']) == PACKAGE / 'config' / f'{name}.yaml'
+    program, *words = launched.command[2:]
+    assert 'from mount_bringup.graph.run import main' in program
+    assert words[0] == name
+    assert [word.partition(':=')[0] for word in words[1:]] == [each.name for each in arguments_of(name)]
+    assert 'recording:=bags/none' in words
 
 
 def test_the_supervisor_ends_with_launch_and_is_not_killed_while_a_recorder_writes(launch):
@@ -87,19 +77,13 @@ def test_the_real_time_priority_that_launch_runs_at_is_the_loops_and_not_that_of
     assert 'priority:=10' in Launched(launch, 'sim', recording='bags/none', priority='10').command
 
 
-@pytest.mark.parametrize('code', [0, -2])
-def test_the_end_of_the_supervisor_ends_launch_as_a_success(launch, code):
+def test_launch_ends_as_the_supervisor_does(launch):
     on_exit = Launched(launch, 'sim', recording='bags/none').process['on_exit']
-    assert on_exit(SimpleNamespace(returncode=code), None) is launch.EmitEvent.return_value
-
-
-@pytest.mark.parametrize(
-    ('code', 'sentence'), [(1, 'ended with code 1, for the reason'), (-9, 'ended with code -9')]
-)
-def test_a_failure_of_the_supervisor_ends_launch_as_a_failure(launch, code, sentence):
-    on_exit = Launched(launch, 'vehicle', recording='bags/none').process['on_exit']
-    with pytest.raises(RuntimeError, match=f'mount_supervisor {sentence}'):
-        on_exit(SimpleNamespace(returncode=code), None)
+    for code in (0, -2):
+        assert on_exit(SimpleNamespace(returncode=code), None) is launch.EmitEvent.return_value
+    for code, reason in ((1, ', for the reason'), (-9, '$')):
+        with pytest.raises(RuntimeError, match=f'mount_supervisor ended with code {code}{reason}'):
+            on_exit(SimpleNamespace(returncode=code), None)
 
 
 def test_an_unknown_argument_is_refused_but_not_where_another_launch_file_includes_ours(launch, monkeypatch):
@@ -110,15 +94,8 @@ def test_an_unknown_argument_is_refused_but_not_where_another_launch_file_includ
     Launched(launch, 'vehicle', record='false')
 
 
-@pytest.mark.parametrize('name', ['sim', 'vehicle'])
-@pytest.mark.parametrize(
-    ('given', 'sentence'),
-    [
-        ({'record': 'false', 'config': '/nowhere/car.yaml'}, 'parameter file /nowhere/car.yaml'),
-        ({'recording': str(PACKAGE)}, 'exists already'),
-    ],
-)
-def test_what_cannot_be_is_refused_before_a_process_starts(launch, name, given, sentence):
-    with pytest.raises(ValueError, match=sentence):
-        Launched(launch, name, **given)
+@pytest.mark.parametrize('name', GRAPHS)
+def test_what_cannot_be_is_refused_before_a_process_starts(launch, name):
+    with pytest.raises(ValueError, match='exists already'):
+        Launched(launch, name, recording=str(PACKAGE))
     assert not launch.ExecuteProcess.called

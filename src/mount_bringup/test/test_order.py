@@ -1,174 +1,250 @@
-"""The graph that the arguments of a launch file order."""
+"""The graph that the arguments of a launch file order, and the nodes, processes and mounts in it."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 import mount_bringup
 from mount_bringup.graph.domain import can_port
-from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS, texts_of
-from mount_bringup.graph.nodes import RECORDER
-from mount_bringup.graph.order import vehicle_order
-from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
-from mount_bringup.settings import SettingError
+from mount_bringup.graph.graph import Graph
+from mount_bringup.graph.launch_arguments import arguments_of
+from mount_bringup.graph.nodes import (
+    CONTROL,
+    DRIVER,
+    INIT,
+    RECORDER,
+    SIM,
+    SIMULATED,
+    VEHICLE,
+    GraphSettings,
+    Grouping,
+    ending_order,
+    groups,
+    of_mounts,
+)
+from mount_bringup.graph.run import ordered
+from mount_bringup.settings import SettingError, checked_settings
 from mount_models.quantity import ParameterError
+from mount_sim.plant.mounts import MOUNTS as SEATED
 
 CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
+MOUNTS = ('left', 'right')
+OF_TWO = (
+    '/**/mount_control: {ros__parameters: {highest_current: 2.0}}\n'
+    '/**/left/mount_control: {ros__parameters: {highest_current: 1.5}}\n'
+)
 
 
-@pytest.fixture(autouse=True)
-def own_domain(monkeypatch):
+@pytest.fixture
+def order(monkeypatch, tmp_path):
+    """Return the function that orders a graph; a text with a colon as `config` is written to a file."""
     monkeypatch.setenv('ROS_DOMAIN_ID', '7')
 
+    def of_arguments(graph, config=None, **given):
+        file = CONFIG / f'{graph}.yaml' if config is None else config
+        if ': ' in str(file):
+            file = tmp_path / 'own.yaml'
+            file.write_text(config)
+        given = {'config': file, 'recording': 'bags/first', **given}
+        return ordered([graph, *(f'{name}:={text}' for name, text in given.items())])
 
-def sim(**given):
-    given = {'config': str(CONFIG / 'sim.yaml'), 'recording': 'bags/first', **given}
-    defaults = {argument.name: argument.default for argument in SIM_ARGUMENTS}
-    return sim_order({**defaults, **given})
-
-
-def vehicle(**given):
-    given = {'config': str(CONFIG / 'vehicle.yaml'), 'recording': 'bags/first', **given}
-    defaults = {argument.name: argument.default for argument in VEHICLE_ARGUMENTS}
-    return vehicle_order({**defaults, **given})
+    return of_arguments
 
 
-def test_the_shipped_files_order_the_graph_and_its_bus_has_the_port_of_domain_and_namespace():
-    parameters = sim(namespace='/left').settings.parameters
-    assert parameters['mount_sim']['port'] == parameters['mount_driver']['port'] == can_port(7, 'left')
-    assert parameters['mount_recorder'] == {'uri': 'bags/first'}
-    assert parameters['mount_control'] == {'continuous_viscous.eigenfrequency': 8.0}
-    car = vehicle().settings.parameters
+@pytest.fixture
+def parameters(order):
+    """Return the function that returns the parameters of an ordered graph."""
+    return lambda *words, **given: order(*words, **given).settings.parameters
+
+
+def names(nodes):
+    return [node.full_name for node in nodes]
+
+
+def test_the_shipped_files_order_the_graph_and_its_bus_has_the_port_of_domain_and_namespace(parameters):
+    sim = parameters('sim', namespace='/left')
+    assert sim['mount_sim']['port'] == sim['mount_driver']['port'] == can_port(7, 'left')
+    assert sim['mount_recorder'] == {'uri': 'bags/first'}
+    assert sim['mount_control'] == {'continuous_viscous.eigenfrequency': 8.0}
+    car = parameters('vehicle')
     assert car['mount_driver']['interface'] == 'socketcan'
     assert 'mount_sim' not in car
 
 
-def test_arguments_win_over_the_file_and_the_file_over_what_is_not_given(tmp_path):
-    file = tmp_path / 'own.yaml'
-    file.write_text(
+def test_arguments_win_over_the_file_and_the_file_over_what_is_not_given(parameters):
+    text = (
         '/**/mount_control: {ros__parameters: {eigenfrequency: 9, damper: viscous_3000}}\n'
         '/**/mount_driver: {ros__parameters: {port: 9000}}\n'
         '/**/mount_sim: {ros__parameters: {port: 9000}}\n'
     )
-    parameters = sim(config=str(file), mount='hydro', port='9001', duration='5').settings.parameters
-    assert repr(parameters['mount_control']['eigenfrequency']) == '9.0'
-    assert parameters['mount_control']['damper'] == 'viscous_3000'
-    assert (parameters['mount_sim']['port'], parameters['mount_driver']['port']) == (9001, 9001)
-    assert repr(parameters['mount_sim']['timeline.duration']) == '5.0'
-    assert parameters['mount_sim']['mount'] == 'hydro'
-    kept = sim(config=str(file)).settings.parameters
+    given = parameters('sim', text, mount='hydro', port='9001', duration='5', fault='coil_open@8, lost_5@6:2')
+    assert repr(given['mount_control']['eigenfrequency']) == '9.0'
+    assert given['mount_control']['damper'] == 'viscous_3000'
+    assert (given['mount_sim']['port'], given['mount_driver']['port']) == (9001, 9001)
+    assert repr(given['mount_sim']['timeline.duration']) == '5.0'
+    assert given['mount_sim']['mount'] == 'hydro'
+    assert given['mount_sim']['faults'] == ['coil_open@8', 'lost_5@6:2']
+    kept = parameters('sim', text, recording='2026')
     assert (kept['mount_sim']['port'], kept['mount_driver']['port']) == (9000, 9000)
+    assert kept['mount_recorder']['uri'] == '2026'
 
 
-def test_texts_stay_texts():
-    assert sim(recording='2026').settings.parameters['mount_recorder']['uri'] == '2026'
+def test_a_mount_that_damps_always_takes_its_control_along(parameters):
+    assert parameters('sim', mount='friction_always_on')['mount_control']['switching'] == 'always'
 
 
-def test_faults_are_given_with_commas_between_them_and_checked():
-    parameters = sim(fault='coil_open@8, lost_5@6:2').settings.parameters
-    assert parameters['mount_sim']['faults'] == ['coil_open@8', 'lost_5@6:2']
-    with pytest.raises(ParameterError, match="fault 'fire' is unknown"):
-        sim(fault='fire@2')
+def test_every_simulated_mount_stands_in_the_help_of_its_argument():
+    [meaning] = [argument.meaning for argument in arguments_of('sim') if argument.name == 'mount']
+    assert meaning.partition(': ')[2].split(', ') == list(SEATED)
 
 
-def test_a_mount_that_damps_always_takes_its_control_along():
-    assert sim(mount='friction_always_on').settings.parameters['mount_control']['switching'] == 'always'
+def test_without_a_recording_there_is_no_recorder(order):
+    without = order('sim', record='false', recording='')
+    assert RECORDER not in without.nodes
+    assert set(without.settings.parameters) == {'mount_driver', 'mount_sim', 'mount_init', 'mount_control'}
 
 
-def test_without_a_recording_there_is_no_recorder():
-    order = sim(record='false', recording='')
-    assert RECORDER not in order.nodes
-    assert set(order.settings.parameters) == {'mount_driver', 'mount_sim', 'mount_init', 'mount_control'}
-
-
-def test_scenario_and_duration_of_an_order():
-    assert (vehicle().scenario, vehicle().duration) == ('car', float('inf'))
-    assert vehicle(duration='30').duration == 30.0
-    assert sim(scenario='bench').scenario == 'bench'
-    assert (sim().scenario, sim(duration='2').duration) == ('motorway', float('inf'))
+def test_duration_place_and_processes_of_an_order(order):
+    car = order('vehicle', duration='30', composed='true', namespace='right', recording='a:=b')
+    assert (car.duration, car.settings.namespace, car.settings.domain) == (30.0, 'right', 7)
+    assert car.settings.grouping is Grouping.COMPOSED
+    assert car.settings.parameters['mount_recorder']['uri'] == 'a:=b'
+    assert order('vehicle').duration == float('inf')
+    assert order('sim', duration='2').duration == float('inf')
 
 
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
         ({'recording': ''}, 'a recording needs a folder'),
-        ({'policy': 'best'}, "policy 'best' is unknown"),
-        ({'mount': 'rubber'}, "mount 'rubber' is unknown"),
-        ({'scenario': 'race'}, "scenario 'race' is unknown"),
-        ({'damper': 'soft', 'policy': 'switched_viscous'}, "'soft'"),
+        ({'recording': str(CONFIG)}, 'exists already; a recording is never written over'),
+        ({'mounts': 'left,top'}, "'top' is no place"),
+        ({'mount': 'friction_always_on', 'policy': 'continuous_viscous'}, 'needs mount_control.policy'),
         ({'damper': 'viscous_2000', 'policy': 'continuous_viscous'}, 'add policy:=switched_viscous'),
-        ({'port': '['}, r'^port:=\[ is not valid YAML'),
+        ({'port': '['}, 'mount_driver.port must be a int'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
-        ({'port': '80'}, r'port \(80 1\) must lie within 1024'),
-        ({'priority': '-1'}, r'priority:=-1 must be a number within 0 \.\. 98'),
-        ({'parameters_file': 'none.yaml'}, 'none.yaml'),
-        ({'config': 'none.yaml'}, 'none.yaml cannot be read'),
-    ],
-)
-def test_what_cannot_be_is_refused_before_a_process_starts(given, words):
-    with pytest.raises(ValueError, match=words):
-        sim(**given)
-
-
-def test_a_simulator_is_no_node_of_the_car(tmp_path):
-    file = tmp_path / 'own.yaml'
-    file.write_text('/**/mount_sim: {ros__parameters: {seed: 2}}')
-    with pytest.raises(ParameterError, match='is no node of the graph'):
-        vehicle(config=str(file))
-
-
-def test_the_can_bus_of_a_vehicle_stands_in_its_file_and_an_argument_wins(tmp_path):
-    file = tmp_path / 'own.yaml'
-    file.write_text('/**/mount_driver: {ros__parameters: {interface: kvaser, channel: can3}}')
-    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
-    assert (driver['interface'], driver['channel']) == ('kvaser', 'can3')
-    assert vehicle(config=str(file), channel='can4').settings.parameters['mount_driver']['channel'] == 'can4'
-    file.write_text('/**/mount_control: {ros__parameters: {highest_current: 2.0}}')
-    driver = vehicle(config=str(file)).settings.parameters['mount_driver']
-    assert (driver['interface'], driver['channel']) == ('socketcan', 'can0')
-
-
-def test_a_missing_config_file_is_refused(tmp_path):
-    with pytest.raises(ParameterError, match=r'parameter file .*/none.yaml'):
-        sim(config=str(tmp_path / 'none.yaml'))
-
-
-@pytest.mark.parametrize(
-    ('text', 'sentence'),
-    [
+        ({'priority': '-1'}, 'priority:=-1 must be a number within 0 .. 98'),
+        ({'config': '/nowhere/none.yaml'}, 'parameter file /nowhere/none.yaml cannot be read'),
+        ({'scenary': 'bench'}, 'scenary:=bench is no argument of this launch file; did you mean scenario:=?'),
+        ({'qqq': '1'}, 'known are config'),
         (
-            '/**/mount_sim: {ros__parameters: {mount_left.sample_rate: 2000.0}}',
+            {
+                'config': '/**/mount_sim: {ros__parameters: {mount_left.sample_rate: 2000.0}}',
+                'mounts': 'left,right',
+            },
             "'sample_rate' is common to all mounts: set it without mount_left",
         ),
         (
-            '/left/mount_control: {ros__parameters: {sample_rate: 2000.0}}',
-            r'mount_control.sample_rate \(2000 Hz\) must equal mount_driver.sample_rate \(1000 Hz\); set one',
+            {
+                'config': '/left/mount_control: {ros__parameters: {sample_rate: 2000.0}}',
+                'mounts': 'left,right',
+            },
+            'mount_control.sample_rate (2000 Hz) must equal mount_driver.sample_rate (1000 Hz); set one',
         ),
     ],
 )
-def test_a_sample_rate_of_one_mount_alone_is_refused(tmp_path, text, sentence):
-    file = tmp_path / 'own.yaml'
-    file.write_text(text)
-    with pytest.raises(ParameterError, match=sentence):
-        sim(config=str(file), mounts='left,right')
-
-
-def test_an_existing_folder_is_refused_before_anything_starts(tmp_path):
-    sim(recording=str(tmp_path / 'new'))
-    sim(record='false', recording=str(tmp_path))
-    with pytest.raises(SettingError, match=r'exists already; a recording is never written over'):
-        vehicle(recording=str(tmp_path))
+def test_what_cannot_be_is_refused_before_a_process_starts(order, given, words):
+    with pytest.raises(ValueError, match=re.escape(words)):
+        order('sim', **given)
 
 
 @pytest.mark.parametrize(
-    ('word', 'remedy'),
+    ('command', 'words'),
+    [(['car'], 'the first word must be one of vehicle, sim'), (['sim', 'bench'], 'bench is no argument')],
+)
+def test_a_command_that_is_not_written_as_it_must_be_is_refused(command, words):
+    with pytest.raises(SettingError, match=words):
+        ordered(command)
+
+
+def test_a_simulator_is_no_node_of_the_car(order):
+    with pytest.raises(ParameterError, match='is no node of the graph'):
+        order('vehicle', '/**/mount_sim: {ros__parameters: {seed: 2}}')
+
+
+def test_the_can_bus_of_a_vehicle_stands_in_its_file_and_an_argument_wins(parameters):
+    text = '/**/mount_driver: {ros__parameters: {interface: kvaser, channel: can3}}'
+    driver = parameters('vehicle', text)['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('kvaser', 'can3')
+    assert parameters('vehicle', text, channel='can4')['mount_driver']['channel'] == 'can4'
+    driver = parameters('vehicle', OF_TWO)['mount_driver']
+    assert (driver['interface'], driver['channel']) == ('socketcan', 'can0')
+
+
+def test_each_simulated_mount_has_its_nodes_bus_and_parameters(parameters):
+    given = parameters('sim', OF_TWO, mounts='left,right')
+    assert list(given) == names(of_mounts(SIMULATED, MOUNTS))
+    ports = [given[f'{mount}/mount_driver']['port'] for mount in MOUNTS]
+    assert [given['mount_sim'][f'mount_{mount}.port'] for mount in MOUNTS] == ports
+    assert ports[0] != ports[1]
+    assert given['mount_recorder']['mounts'] == 'left,right'
+    assert [given[f'{mount}/mount_control']['highest_current'] for mount in MOUNTS] == [1.5, 2.0]
+
+
+def test_each_mount_in_the_car_has_its_channel(order, parameters):
+    given = parameters('vehicle', OF_TWO, mounts='left,right', channels='can0, can1')
+    assert [given[f'{mount}/mount_driver']['channel'] for mount in MOUNTS] == ['can0', 'can1']
+    with pytest.raises(ValueError, match='the mounts left and right have one CAN bus, can0'):
+        order('vehicle', OF_TWO, mounts='left,right')
+    for channels in ('can0', 'can0,can0'):
+        with pytest.raises(ValueError, match='must name a channel for each of the mounts'):
+            order('vehicle', OF_TWO, mounts='left,right', channels=channels)
+
+
+def test_a_file_gives_each_mount_in_the_car_its_channel_and_one_of_them_its_own_friction(parameters):
+    given = parameters('vehicle', CONFIG / 'two_mounts.yaml', mounts='left,right')
+    assert [given[f'{mount}/mount_driver']['channel'] for mount in MOUNTS] == ['can0', 'can1']
+    assert 'friction.scale' not in given['left/mount_control']
+    assert given['right/mount_control']['friction.scale'] == 0.9
+    assert given['mount_recorder']['on_full'] == 'continue'
+
+
+def test_settings_of_one_mount_are_typed_and_checked_as_those_of_all():
+    checked = checked_settings(
+        {'mount_sim': {'mount_left.friction.scale': 1}, 'left/mount_driver': {'port': 2000}}
+    )
+    assert checked == {'mount_sim': {'mount_left.friction.scale': 1.0}, 'left/mount_driver': {'port': 2000}}
+    for wrong in ({'left/mount_sim': {}}, {'mount_sim': {'mount_left.frictoin.scale': 1.0}}):
+        with pytest.raises(ParameterError):
+            checked_settings(wrong)
+
+
+def test_nodes_of_each_mount_start_side_by_side_and_end_before_the_electronics():
+    nodes = of_mounts(SIMULATED, MOUNTS)
+    assert names(nodes) == [
+        'mount_recorder',
+        *('left/mount_driver', 'right/mount_driver', 'mount_sim'),
+        *('left/mount_init', 'right/mount_init', 'left/mount_control', 'right/mount_control'),
+    ]
+    assert names(ending_order(nodes))[-3:] == ['left/mount_driver', 'mount_sim', 'mount_recorder']
+    ended = ['mount_control', 'mount_init', 'mount_driver', 'mount_sim', 'mount_recorder']
+    assert names(ending_order(SIMULATED)) == ended
+    assert names(ending_order(VEHICLE)) == [name for name in ended if name != 'mount_sim']
+
+
+@pytest.mark.parametrize(
+    ('grouping', 'expected'),
     [
-        ('scenary:=bench', r'did you mean scenario:=\?'),
-        ('qqq:=1', 'known are config'),
-        ('bench', 'is no argu'),
+        (Grouping.APART, [[RECORDER], [DRIVER], [SIM], [INIT], [CONTROL]]),
+        (Grouping.COMPOSED, [[RECORDER], [DRIVER, INIT, CONTROL], [SIM]]),
+        (Grouping.TOGETHER, [[RECORDER, DRIVER, SIM, INIT, CONTROL]]),
     ],
 )
-def test_an_argument_that_the_launch_file_does_not_have_is_refused(word, remedy):
-    assert texts_of(['scenario:=bench', 'fault:=a:=b'], SIM_ARGUMENTS)['fault'] == 'a:=b'
-    with pytest.raises(SettingError, match=remedy):
-        texts_of(['scenario:=bench', word], SIM_ARGUMENTS)
+def test_which_nodes_share_a_process(grouping, expected):
+    assert groups(SIMULATED, grouping) == expected
+    composed = [names(group) for group in groups(of_mounts(SIMULATED, MOUNTS), Grouping.COMPOSED)]
+    assert ['right/mount_driver', 'right/mount_init', 'right/mount_control'] in composed
+    assert len(composed) == 4
+
+
+def test_topics_that_are_waited_for_are_those_of_the_mount():
+    nodes = recorder, left, right = of_mounts((RECORDER, DRIVER), MOUNTS)
+    graph = Graph(nodes, GraphSettings(namespace='/car'))
+    unmatched = '/car/left/current_setpoint, /car/right/displacement, /car/left/event'
+    graph.figures = lambda node: {'unmatched': unmatched}
+    assert graph.missing_topics(left) == ['/car/left/current_setpoint']
+    assert graph.missing_topics(right) == ['/car/right/displacement']
+    assert graph.missing_topics(recorder) == ['/car/left/current_setpoint', '/car/right/displacement']
+    graph.figures = lambda node: {}
+    assert graph.missing_topics(left) == ['its first diagnostics']

@@ -14,7 +14,7 @@ OF_ROS = {USE_SIM_TIME, 'start_type_description_service'}
 
 @pytest.fixture(params=SIMULATED, ids=lambda node: node.name)
 def node(request, context):
-    module = importlib.import_module(f'{request.param.package}.node')
+    module = importlib.import_module(f'{request.param.name}.node')
     made = getattr(module, request.param.class_name)(context=context)
     yield made
     made.close()

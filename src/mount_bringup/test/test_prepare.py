@@ -1,5 +1,6 @@
 """What is compiled ahead is what the nodes would compile."""
 
+import os
 import subprocess
 import sys
 
@@ -29,6 +30,7 @@ def test_a_node_finds_everything_compiled_that_it_needs(domain):
         capture_output=True,
         text=True,
         check=True,
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)},
     )
     count, _, missing = run.stdout.strip().partition(' ')
     assert int(count) > 0

@@ -1,7 +1,9 @@
-"""The order of the steps of a recovery, and of a new initialisation, on a graph that only notes them."""
+"""What follows the failure of nodes: action, limit, the order of its steps; and a new initialisation."""
 
+import re
+import time
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -12,86 +14,129 @@ from rcl_interfaces.srv import SetParameters
 from ros_testing import LIMIT
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph import supervisor
-from mount_bringup.graph.failures import NodeFailure, NodesFailedError, RecoveryAction
-from mount_bringup.graph.graph import CONFIGURE, DEACTIVATE
+from mount_bringup.graph.graph import CONFIGURE
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
     INIT,
     RECORDER,
+    SIM,
     SIMULATED,
     GraphError,
     GraphSettings,
     of_mounts,
 )
-from mount_bringup.graph.recovery import Recovery, initialise_again
+from mount_bringup.graph.recovery import (
+    ACTIONS,
+    NodesFailedError,
+    Recovery,
+    RecoveryAction,
+    recovery_action,
+    table_holds,
+)
 from mount_bringup.graph.supervisor import Supervisor
 
-LABELS = {CONFIGURE: 'configure', DEACTIVATE: 'deactivate'}
-DRIVING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '0',
-           'last_stamp': '9000000000', 'sample_rate': '1000'}  # fmt: skip
-TABLE = {'state': 'active', 'last_stamp': '5000000000'}
+MEASURING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000', 'lost': '5',
+             'last_stamp': '10000000000', 'sample_rate': '1000.0'}  # fmt: skip
+LATCHED = {'state': 'active', 'last_stamp': '4000000000'}
+INITIALISED = ['activate mount_driver', 'activate mount_init', 'activate mount_control']
+MOUNTS = ['left', 'right']
+
+
+@pytest.mark.parametrize(
+    ('nodes', 'holds', 'expected'),
+    [
+        ((RECORDER,), False, RecoveryAction.RECORD_ANEW),
+        ((CONTROL,), True, RecoveryAction.DAMP_ON),
+        ((CONTROL,), False, RecoveryAction.INITIALISE),
+        ((INIT,), True, RecoveryAction.STAND_BY),
+        ((INIT, CONTROL), True, RecoveryAction.INITIALISE),  # the table was latched by the node that died
+        ((DRIVER,), True, RecoveryAction.INITIALISE),
+        ((RECORDER, CONTROL), True, RecoveryAction.DAMP_ON),
+        ((), True, RecoveryAction.INITIALISE),  # the electronics were reset
+        ((SIM, CONTROL), True, RecoveryAction.END),
+    ],
+)
+def test_what_follows_the_failure_of_nodes(nodes, holds, expected):
+    assert recovery_action(nodes, table_holds=holds) is expected
+    assert {*ACTIONS} == {node.name for node in SIMULATED}
+
+
+@pytest.mark.parametrize(
+    ('driver', 'init', 'expected'),
+    [
+        ({}, {}, True),
+        ({'gaps': '1'}, {}, False),
+        ({'restarts': '1'}, {}, False),
+        ({'samples': '5900'}, {}, False),  # activated since: electronics and driver may have been away
+        ({'sample_rate': '2000.0'}, {}, False),  # 9000 samples are 4.5 s
+        ({'state': 'inactive'}, {}, False),
+        ({'needs_initialisation': 'True'}, {}, False),
+        ({}, {'state': 'inactive'}, False),
+        ({'samples': 'unknown'}, {}, False),
+        ({}, {'last_stamp': ''}, False),
+    ],
+)
+def test_a_table_holds_only_while_the_driver_has_measured_without_a_break_since_before_it(
+    driver, init, expected
+):
+    assert table_holds({**MEASURING, **driver}, {**LATCHED, **init}) is expected
 
 
 class Answer:
+    """The answer to a request, at once."""
+
     def __init__(self, result):
-        self._result = result
-
-    def done(self):
-        return True
-
-    def result(self):
-        return self._result
+        self.done, self.result = lambda: True, lambda: result
 
 
 class Graph:
-    """A graph in which everything works; `loses` may name a node at whose configuration another fails."""
+    """A graph that notes what is done; while `during` is configured, `lost` fails."""
 
     def __init__(self, folder='', nodes=SIMULATED, resting=()):
-        self.nodes = nodes
-        self.done = []
-        self.parameters = {RECORDER.name: {'uri': f'{folder}/recording'}}
-        self.reports = SimpleNamespace(forget=lambda node: None)
+        self.nodes, self.resting, self.done, self.reports = nodes, resting, [], self
+        self.settings = GraphSettings(parameters={RECORDER.name: {'uri': f'{folder}/recording'}})
         self.last = {node.full_name: {'state': 'active'} for node in nodes}
-        self.last |= {DRIVER.name: dict(DRIVING), INIT.name: dict(TABLE)}
-        self.next = dict(DRIVING)
-        self.loses = {}
-        self.resting = resting
+        self.last |= {DRIVER.name: dict(MEASURING), INIT.name: dict(LATCHED)}
+        self.next, self.during, self.lost = {}, None, None
 
     def figures(self, node):
         return self.last.get(node.full_name, {})
 
     def fresh_figures(self, node):
-        if node.is_a(INIT):
-            return {'sentence': f'gap of {node.full_name}'}
         self.last[node.full_name].update(self.next)
-        return self.figures(node)
+        return {'sentence': f'gap of {node.full_name}'} if node.is_a(INIT) else self.figures(node)
 
-    def start_again(self, nodes):
-        self.done += [f'start {node.full_name}' for node in nodes]
+    def forget(self, node):
+        pass
+
+    def process(self, node):
+        start = partial(self.done.append, f'start {node.full_name}')
+        return SimpleNamespace(nodes=(node,), start_again=start)
 
     def client(self, kind, service):
         answer = GetState.Response(current_state=State(id=State.PRIMARY_STATE_UNCONFIGURED))
         return SimpleNamespace(service_is_ready=lambda: True, call_async=lambda _: Answer(answer))
 
-    def call(self, kind, service, request):
-        if kind is SetParameters:
-            [parameter] = request.parameters
-            value = parameter.value
-            value = value.string_value or value.double_value or value.bool_value
-            self.done.append(f'{service.removesuffix("/set_parameters")}.{parameter.name} = {value}')
-            return SetParameters.Response(results=[SetParametersResult(successful=True)])
-        resting = service.removesuffix('/get_state') in self.resting
-        state = State.PRIMARY_STATE_INACTIVE if resting else State.PRIMARY_STATE_ACTIVE
-        return GetState.Response(current_state=State(id=state))
+    def call(self, kind, service, parameters):
+        assert kind is SetParameters
+        [parameter] = parameters
+        value = parameter.value
+        value = value.string_value or value.double_value or value.bool_value
+        self.done.append(f'{service.removesuffix("/set_parameters")}.{parameter.name} = {value}')
+        return SetParameters.Response(results=[SetParametersResult(successful=True)])
+
+    def deactivate(self, node):
+        if node.full_name not in self.resting:
+            self.done.append(f'deactivate {node.full_name}')
 
     def transition(self, nodes, transition):
         [node] = nodes
-        self.done.append(f'{LABELS[transition]} {node.full_name}')
-        if transition == CONFIGURE and node.name in self.loses:
-            lost = self.loses.pop(node.name)
-            raise NodesFailedError(NodeFailure((lost,), f'{lost.name} ended'))
+        assert transition == CONFIGURE
+        self.done.append(f'configure {node.full_name}')
+        if node == self.during:
+            self.during = None
+            raise NodesFailedError((self.lost,), f'{self.lost.name} ended')
 
     def activate(self, nodes):
         self.done += [f'activate {node.full_name}' for node in nodes]
@@ -108,112 +153,111 @@ def graph(tmp_path):
     return Graph(tmp_path)
 
 
-def recovered(graph, *nodes, limit=3, reports=None):
-    recovery = Recovery(graph, graph, graph, limit)
-    recovery.report = [].append if reports is None else reports.append
-    recovery.recover(NodeFailure(nodes, 'lost'))
-    [restart] = recovery.restarts
-    return restart.action
+@pytest.fixture
+def recovered(graph):
+    """Return the function that recovers from failures of nodes: the last action, and what was reported."""
+
+    def recover(*nodes, limit=3, times=1, reason='lost'):
+        graph.settings = replace(graph.settings, restart_limit=limit)
+        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)], graph.activate), []
+        recovery.report = reports.append
+        for _ in range(times):
+            recovery.recover(NodesFailedError(nodes, reason))
+        assert len(recovery.restarts) == times
+        return recovery.restarts[-1].action, reports
+
+    return recover
 
 
-def test_a_recorder_goes_on_in_another_folder_and_nothing_else_is_touched(graph, tmp_path):
-    assert recovered(graph, RECORDER) is RecoveryAction.RECORD_ANEW
+OFF = ['deactivate mount_control', 'deactivate mount_init', 'deactivate mount_driver']
+
+
+@pytest.mark.parametrize(
+    ('nodes', 'driver', 'steps'),
+    [
+        (
+            [RECORDER],
+            {},
+            [
+                'start mount_recorder',
+                'mount_recorder.uri = FOLDER/recording',
+                'configure mount_recorder',
+                'match',
+                'activate mount_recorder',
+            ],
+        ),
+        (
+            [CONTROL],
+            {},
+            [
+                'start mount_control',
+                'mount_control.measured_before = True',
+                'configure mount_control',
+                'match',
+                'activate mount_control',
+            ],
+        ),
+        (
+            [CONTROL],
+            {'gaps': '1'},
+            [
+                'start mount_control',
+                *OFF[1:],
+                'mount_control.measured_before = False',
+                'configure mount_control',
+                'match',
+                *INITIALISED,
+            ],
+        ),
+        ([DRIVER], {}, ['start mount_driver', *OFF[:2], 'configure mount_driver', 'match', *INITIALISED]),
+        ([], {}, [*OFF, 'match', *INITIALISED]),
+        ([INIT], {}, ['start mount_init', 'configure mount_init', 'match']),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+def test_the_steps_of_a_recovery_in_their_order(graph, recovered, tmp_path, nodes, driver, steps):
+    graph.last[DRIVER.name] |= driver
+    recovered(*nodes)
+    assert [step.replace(str(tmp_path), 'FOLDER') for step in graph.done] == steps
+
+
+def test_a_recorder_goes_on_in_another_folder(graph, recovered, tmp_path):
     (tmp_path / 'recording').mkdir()
-    assert graph.done == [
-        'start mount_recorder',
-        f'mount_recorder.uri = {tmp_path}/recording',
-        'configure mount_recorder',
-        'match',
-        'activate mount_recorder',
-    ]
-    graph.done.clear()
-    recovered(graph, RECORDER)
+    recovered(RECORDER)
     assert graph.done[1] == f'mount_recorder.uri = {tmp_path}/recording_restarted_2'
 
 
-def test_a_control_is_told_that_its_table_holds_and_damps_again(graph):
-    assert recovered(graph, CONTROL) is RecoveryAction.DAMP_ON
-    assert graph.done == [
-        'start mount_control',
-        'mount_control.measured_before = True',
-        'configure mount_control',
-        'match',
-        'activate mount_control',
-    ]
-
-
-INITIALISED = ['activate mount_driver', 'activate mount_init', 'activate mount_control']
-
-
-def test_a_control_without_a_table_that_holds_waits_for_a_new_initialisation(graph):
-    graph.last[DRIVER.name]['gaps'] = '1'
-    assert recovered(graph, CONTROL) is RecoveryAction.INITIALISE
-    assert graph.done == [
-        'start mount_control',
-        'deactivate mount_init',
-        'deactivate mount_driver',
-        'mount_control.measured_before = False',
-        'configure mount_control',
-        'match',
-        *INITIALISED,
-    ]
-
-
-def test_measurements_that_break_off_while_control_starts_end_in_a_new_initialisation(graph):
-    graph.next['restarts'] = '1'
-    assert recovered(graph, CONTROL) is RecoveryAction.INITIALISE
+def test_a_break_of_the_measurements_during_the_restart_of_a_control_leads_to_an_initialisation(
+    graph, recovered
+):
+    graph.next = {'gaps': '1'}
+    assert recovered(CONTROL)[0] is RecoveryAction.INITIALISE
     assert graph.done[-3:] == INITIALISED
-    assert graph.done.index('mount_control.measured_before = False') > graph.done.index('match')
+    last = len(graph.done) - 1 - graph.done[::-1].index('mount_control.measured_before = False')
+    assert last > graph.done.index('match')
 
 
-def test_a_driver_started_again_is_told_how_hot_its_coil_was_if_the_one_before_knew(graph):
-    graph.last[DRIVER.name] |= {'coil_model_celsius': '131.5', 'coil_model_known': 'True'}
-    recovered(graph, DRIVER)
-    given = graph.done.index('mount_driver.coil_celsius_before = 131.5')
-    assert given < graph.done.index('configure mount_driver')
-    other = Graph(Path(graph.parameters[RECORDER.name]['uri']).parent)
-    other.last[DRIVER.name] |= {'coil_model_celsius': '152.2', 'coil_model_known': 'False'}
-    recovered(other, DRIVER)
-    assert not any('coil_celsius_before' in each for each in other.done)
+@pytest.mark.parametrize('known', ['True', 'False'])
+def test_a_driver_started_again_gets_the_temperature_of_its_coil_if_the_one_before_knew(
+    graph, recovered, known
+):
+    graph.last[DRIVER.name] |= {'coil_model_celsius': '131.5', 'coil_model_known': known}
+    recovered(DRIVER)
+    before = graph.done[: graph.done.index('configure mount_driver')]
+    assert ('mount_driver.coil_celsius_before = 131.5' in before) == (known == 'True')
+    assert any('coil_celsius_before' in step for step in graph.done) == (known == 'True')
 
 
-def test_a_lost_driver_is_started_before_anything_is_waited_for_and_comes_back_with_an_initialisation(graph):
-    assert recovered(graph, DRIVER) is RecoveryAction.INITIALISE
-    assert graph.done == [
-        'start mount_driver',
-        'deactivate mount_control',
-        'deactivate mount_init',
-        'configure mount_driver',
-        'match',
-        *INITIALISED,
-    ]
-
-
-def test_electronics_that_were_reset_are_initialised_without_a_restart(graph):
-    assert recovered(graph) is RecoveryAction.INITIALISE
-    assert graph.done == [
-        'deactivate mount_control',
-        'deactivate mount_init',
-        'deactivate mount_driver',
-        'match',
-        *INITIALISED,
-    ]
-
-
-def test_an_initialisation_that_has_done_its_work_stands_by(graph):
-    assert recovered(graph, INIT) is RecoveryAction.STAND_BY
-    assert graph.done == ['start mount_init', 'configure mount_init', 'match']
-
-
-def test_a_control_that_somebody_deactivated_is_not_activated(graph):
+def test_a_control_that_somebody_deactivated_is_not_activated(graph, recovered):
     graph.last[CONTROL.name]['state'] = 'inactive'
-    recovered(graph, DRIVER)
+    recovered(DRIVER)
     assert graph.done[-2:] == INITIALISED[:2]
 
 
-def test_a_node_that_fails_during_the_recovery_is_recovered_with_the_first(graph):
-    graph.loses, reports = {DRIVER.name: CONTROL}, []
-    assert recovered(graph, DRIVER, reports=reports) is RecoveryAction.INITIALISE
+def test_a_node_that_fails_during_the_recovery_is_recovered_with_the_first(graph, recovered):
+    graph.during, graph.lost = DRIVER, CONTROL
+    action, reports = recovered(DRIVER)
+    assert action is RecoveryAction.INITIALISE
     assert graph.done.count('start mount_driver') == 2
     assert 'start mount_control' in graph.done
     assert graph.done[-3:] == INITIALISED
@@ -222,75 +266,83 @@ def test_a_node_that_fails_during_the_recovery_is_recovered_with_the_first(graph
     ]
 
 
-def test_a_node_that_fails_again_and_again_ends_the_graph_and_is_reported_once_each_time(graph):
-    graph.loses, reports = {CONTROL.name: CONTROL}, []
-    with pytest.raises(GraphError, match='mount_control ended; mount_control was lost 2 times'):
-        recovered(graph, CONTROL, limit=1, reports=reports)
-    assert reports == ['lost; it is started again and activated with the table that holds']
+@pytest.mark.parametrize(
+    ('failure', 'sentence'),
+    [
+        (([CONTROL], 0), 'lost'),  # in the error alone
+        (([SIM], 3), 'lost; without it there is no coil to drive: the graph ends'),
+        (
+            ([CONTROL], 2),
+            'lost; mount_control was lost 3 times within 60 s (limit 2), so the graph is given up at 0 A: '
+            'read the logs for the cause',
+        ),
+        (([], 1), 'electronics was lost 2 times'),
+    ],
+)
+def test_a_failure_that_ends_the_graph_is_an_error_with_its_reason(recovered, failure, sentence):
+    nodes, limit = failure
+    with pytest.raises(GraphError, match=re.escape(sentence)):
+        recovered(*nodes, limit=limit, times=limit + 1)
 
 
-def test_without_restarts_a_failure_stands_in_the_error_alone(graph):
-    reports = []
-    with pytest.raises(GraphError, match=r'^lost$'):
-        recovered(graph, CONTROL, limit=0, reports=reports)
-    assert reports == graph.done == []
+def test_failures_of_long_ago_do_not_count(graph, recovered, monkeypatch):
+    now = iter(range(0, 10_000, 40))  # s: two readings of the clock for each recovery
+    monkeypatch.setattr(time, 'monotonic', lambda: next(now))
+    recovered(INIT, limit=1, times=4)
+    assert graph.done.count('start mount_init') == 4
 
 
-def test_damping_ends_first_and_the_control_comes_back_last(graph):
-    assert initialise_again(graph, graph, '') == 'mount_init: gap of mount_init'
-    assert graph.done == [
-        'deactivate mount_control',
-        'deactivate mount_init',
-        'deactivate mount_driver',
-        'match',
-        *INITIALISED,
-    ]
+def initialised_again(graph, mount):
+    return Recovery(graph, [], graph.activate).initialise_again(mount)
 
 
-def test_a_control_that_was_refused_is_activated_too():
-    graph = Graph(resting=('mount_control',))
-    initialise_again(graph, graph, '')
-    assert 'deactivate mount_control' not in graph.done
-    assert 'activate mount_control' in graph.done
+@pytest.mark.parametrize('resting', [(), (CONTROL.name,)])
+def test_damping_ends_first_and_the_control_comes_back_last_even_if_it_was_refused_before(resting):
+    graph = Graph(resting=resting)
+    assert initialised_again(graph, '') == 'mount_init: gap of mount_init'
+    assert graph.done == [*OFF[len(resting) :], 'match', *INITIALISED]
 
 
 def test_of_several_mounts_one_is_initialised_or_all():
-    graph = Graph(nodes=of_mounts(SIMULATED, ['left', 'right']))
-    assert initialise_again(graph, graph, 'right') == 'right/mount_init: gap of right/mount_init'
+    graph, both = (Graph(nodes=of_mounts(SIMULATED, MOUNTS)) for _ in range(2))
+    assert initialised_again(graph, 'right') == 'right/mount_init: gap of right/mount_init'
     assert not any('left' in step for step in graph.done)
-    both = Graph(nodes=graph.nodes)
-    gaps = initialise_again(both, both, '')
-    assert gaps == '; '.join(f'{mount}/mount_init: gap of {mount}/mount_init' for mount in ('left', 'right'))
+    gaps = initialised_again(both, '')
+    assert gaps == '; '.join(f'{mount}/mount_init: gap of {mount}/mount_init' for mount in MOUNTS)
     controls, inits = (
-        [both.done.index(f'deactivate {replace(kind, mount=mount).full_name}') for mount in ('left', 'right')]
-        for kind in (CONTROL, INIT)
+        [both.done.index(f'deactivate {mount}/{kind.name}') for mount in MOUNTS] for kind in (CONTROL, INIT)
     )
     assert max(controls) < min(inits) < both.done.index('match')
 
 
 @pytest.fixture
-def service(domain, tmp_path, monkeypatch):
+def service(domain, tmp_path):
     """Return the function that calls the service of a supervisor, and its answer."""
-    graph = Supervisor(of_mounts((DRIVER,), ['left', 'right']), GraphSettings(domain=domain), tmp_path)
+    graph = Supervisor(of_mounts((DRIVER,), MOUNTS), GraphSettings(domain=domain), tmp_path)
     graph.open()
 
     def answer_of(initialise=None, mount=''):
         graph._recovers = initialise is not None
-        monkeypatch.setattr(supervisor, 'initialise_again', initialise)
-        answer = graph.call(Trigger, f'/engine_mount_supervisor/{mount}reinitialize', Trigger.Request())
+        graph.recovery.initialise_again = lambda mount: initialise(graph, mount)
+        answer = graph.call(Trigger, f'/engine_mount_supervisor/{mount}reinitialize')
         return answer.success, answer.message
 
     yield answer_of
     assert graph.stop() == []
 
 
-def test_the_answer_holds_the_gaps(service):
-    answer = service(lambda graph, activation, mount: f'mount_init of {mount!r}', 'right/')
-    assert answer == (True, "initialised anew; mount_init of 'right'")
+def test_the_answer_holds_the_gaps_and_the_graph_is_served_meanwhile(service):
+    def initialise(graph, mount):
+        served = []
+        graph.node.create_timer(0.01, lambda: served.append(True))
+        graph.wait_until(lambda: bool(served), LIMIT, 'a timer')
+        return f'mount_init of {mount!r}'
+
+    assert service(initialise, 'right/') == (True, "initialised anew; mount_init of 'right'")
 
 
 def test_a_refusal_is_answered_with_its_reason(service):
-    def refuse(graph, activation, mount):
+    def refuse(graph, mount):
         raise GraphError('mount_init refused to activate: no pads')
 
     reason = 'not initialised, the coil stays at 0 A: mount_init refused to activate: no pads'
@@ -298,13 +350,3 @@ def test_a_refusal_is_answered_with_its_reason(service):
     success, message = service()
     assert not success
     assert message.startswith('not initialised: the graph starts, recovers or runs in lock-step')
-
-
-def test_the_graph_is_served_during_an_initialisation(service):
-    def initialise(graph, activation, mount):
-        served = []
-        graph.node.create_timer(0.01, lambda: served.append(True))
-        graph.wait_until(lambda: bool(served), LIMIT, 'a timer')
-        return 'served'
-
-    assert service(initialise) == (True, 'initialised anew; served')

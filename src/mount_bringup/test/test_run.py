@@ -5,13 +5,13 @@ import os
 import pytest
 
 from mount_bringup.graph import domain, run
-from mount_bringup.graph.failures import NodeFailure, RecoveryAction, Restart
 from mount_bringup.graph.graph import Graph
 from mount_bringup.graph.nodes import CONTROL, VEHICLE, GraphError, GraphSettings
+from mount_bringup.graph.recovery import RecoveryAction, Restart
 from mount_bringup.graph.shutdown import Interrupted
 from mount_bringup.graph.supervisor import Supervisor
 
-LOST = Restart(0, NodeFailure((CONTROL,), 'mount_control ended'), RecoveryAction.DAMP_ON, 1.5)
+LOST = Restart(0, (CONTROL,), 'mount_control ended', RecoveryAction.DAMP_ON, 1.5)
 
 
 class Supervised:
@@ -76,24 +76,16 @@ def test_every_end_stops_the_graph_and_what_went_wrong_is_told_and_ends_with_cod
     assert 'versions:' in graph.session
 
 
-@pytest.mark.parametrize(
-    ('words', 'sentence'),
-    [
-        (['chanel:=can1'], 'chanel:=can1 is no argument of this launch file; did you mean channel:=?'),
-        (['can1'], 'can1 is no argument'),
-        (['priority:=200'], 'priority:=200 must be a number within 0 .. 98'),
-    ],
-)
-def test_what_cannot_be_is_refused_before_anything_starts(supervise, words, sentence):
+def test_what_cannot_be_is_refused_before_anything_starts(supervise):
     graph = Supervised()
-    code, output = supervise(graph, *words)
+    code, output = supervise(graph, 'chanel:=can1')
     assert (code, graph.stopped) == (1, 0)
-    assert sentence in output
+    assert 'chanel:=can1 is no argument of this launch file; did you mean channel:=?' in output
 
 
-def test_help_tells_how_to_call_it(capsys):
+def test_help_shows_the_call(capsys):
     assert run.run(['--help']) == 0
-    assert capsys.readouterr().out.startswith('usage: mount_supervisor vehicle|sim|replay')
+    assert capsys.readouterr().out.startswith('usage: mount_supervisor vehicle|sim')
 
 
 def test_a_second_graph_in_a_namespace_is_refused(supervise):
@@ -103,19 +95,26 @@ def test_a_second_graph_in_a_namespace_is_refused(supervise):
     assert 'already runs in ROS domain 5, namespace /left' in output
 
 
-def test_the_command_orders_the_graph_of_its_arguments(monkeypatch):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '7')
-    order = run.ordered(['vehicle', 'namespace:=right', 'record:=false', 'duration:=30', 'composed:=true'])
-    assert (order.settings.namespace, order.settings.domain, order.duration) == ('right', 7, 30.0)
-    assert order.settings.grouping.name == 'COMPOSED'
-    assert run.ordered(['sim', 'record:=false', 'scenario:=bench']).scenario == 'bench'
-    with pytest.raises(ValueError, match='the first word must be one of vehicle, sim, replay'):
-        run.ordered(['car'])
-
-
 def test_a_supervisor_ends_with_the_process_that_has_started_it(monkeypatch, tmp_path):
     graph = Supervisor(VEHICLE, GraphSettings(), tmp_path)
     monkeypatch.setattr(Graph, 'serve_once', lambda graph: None)
     graph._starter._had_ended = True
     with pytest.raises(GraphError, match=r'the process that started this one .* has ended'):
         graph.wait_until(lambda: False, 1.0, 'nothing')
+
+
+def test_a_middleware_that_does_not_start_is_an_error_of_the_graph_and_leaves_nothing_to_close():
+    graph = Graph(VEHICLE, GraphSettings(domain=-1))
+    with pytest.raises(GraphError, match=r'^the middleware does not start: Domain id \(-1\) '):
+        graph.open()
+    graph.close()
+
+
+def test_the_end_notes_each_node_that_was_activated_again_once_with_a_count(tmp_path):
+    graph = Supervisor(VEHICLE, GraphSettings(), tmp_path)
+    graph.repeats = {'mount_init': ['no ripple'], 'mount_driver': ['reset'] * 3}
+    assert graph.stop() == []
+    assert graph.notes == [
+        'no ripple; it was activated again',
+        'reset; it was activated again, the last of 3 times',
+    ]

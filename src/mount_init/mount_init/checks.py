@@ -8,17 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mount_init.errors import (
-    AmbiguousCurveError,
-    ContradictionError,
-    CurrentNotFollowingError,
-    ImpreciseError,
-    NoContactError,
-    SupplyError,
-    TooFewRipplesError,
-    UnusableReadingsError,
-    WrongCoilError,
-)
+from mount_init.errors import CurrentNotFollowingError, InitialisationError
 from mount_init.estimate import ContactGap, Dwell, InductanceCurve, RestGap
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
@@ -42,9 +32,9 @@ def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParamet
 
 
 def check_agreement(what: str, first: float, second: float, limit: float, remedy: str) -> None:
-    """Raise `ContradictionError` unless two gaps (m) agree within `limit` (m)."""
+    """Raise `InitialisationError` unless two gaps (m) agree within `limit` (m)."""
     if abs(first - second) > limit:
-        raise ContradictionError(
+        raise InitialisationError(
             f'{what} ({first * 1e6:.1f} and {second * 1e6:.1f} um) must agree within {limit * 1e6:.1f} um; '
             f'{remedy}'
         )
@@ -53,7 +43,7 @@ def check_agreement(what: str, first: float, second: float, limit: float, remedy
 def check_resistance(
     specimen: Specimen, supply: RampSupply, celsius: float, parameters: InitParameters
 ) -> None:
-    """Raise `WrongCoilError` unless the resistance is that of the specimen at a temperature (degC).
+    """Raise `InitialisationError` unless the resistance is that of the specimen at a temperature (degC).
 
     Where that is unknown (NaN), any temperature of a working coil is granted. While the supply changes, one
     part of the ramp must show it.
@@ -71,14 +61,14 @@ def check_resistance(
     limits = f'{low:.3f} .. {high:.3f} ohm, that of {specimen.name} {where}'
     if not supply.steady:
         shown = ' and '.join(f'{ohm:.3f}' for ohm in found) or 'none, so unevenly'
-        raise SupplyError(
+        raise InitialisationError(
             f'voltage of the bridge by the coil ripple changed between {supply.lowest:.1f} and '
             f'{supply.highest:.1f} V during the ramp, and no part of it shows a resistance within {limits} '
             f'({shown}); activate again while the supply is steady, else check the coil'
         )
     (ohm,) = found
     cause = 'are turns shorted?' if ohm < low else 'is a contact loose, or the coil hotter than told?'
-    raise WrongCoilError(
+    raise InitialisationError(
         f'resistance of the coil ({ohm:.3f} ohm, link voltage {supply.whole.link_voltage:.1f} V) '
         f'must lie within {limits}; {cause} Check coil '
         'and cable, coil_temperature and the specimen'
@@ -86,7 +76,7 @@ def check_resistance(
 
 
 def check_single_crossing(curve: InductanceCurve, specimen: Specimen) -> None:
-    """Raise `AmbiguousCurveError` unless L_i falls through its level exactly once above the rest current.
+    """Raise `InitialisationError` unless L_i falls through its level exactly once above the rest current.
 
     Below the crossing L_i may rise and fall again while the halves close; it must only stay above the level.
     """
@@ -96,21 +86,21 @@ def check_single_crossing(curve: InductanceCurve, specimen: Specimen) -> None:
         if len(changes) != 1 or not inductance[0] > level:
             places = ', '.join(f'{0.5 * (current[k] + current[k + 1]):.2f} A' for k in changes) or 'nowhere'
             reach = f'{np.min(inductance) * 1e3:.1f} .. {np.max(inductance) * 1e3:.1f} mH'
-            raise AmbiguousCurveError(
+            raise InitialisationError(
                 f'inductance on the way {name} must fall through {level * 1e3:.1f} mH exactly once; it '
                 f'crosses {places} (range {reach}): do the pads close and stay closed? Check the sensors'
             )
 
 
 def check_steady_fall(curve: InductanceCurve, specimen: Specimen, parameters: InitParameters) -> None:
-    """Raise `AmbiguousCurveError` unless L_i falls from bin to bin around its only crossing."""
+    """Raise `InitialisationError` unless L_i falls from bin to bin around its only crossing."""
     for name, current, inductance in _known_parts(curve, specimen.rest_current):
         (place,) = _level_changes(inductance, specimen.crossing_inductance)
         centre = 0.5 * (current[place] + current[place + 1])
         near = np.flatnonzero(np.abs(current - centre) <= parameters.monotone_half_width)
         for k in near[:-1]:
             if inductance[k + 1] >= inductance[k]:
-                raise AmbiguousCurveError(
+                raise InitialisationError(
                     f'inductance on the way {name} must fall steadily within '
                     f'{parameters.monotone_half_width:.2f} A of the crossing; from {current[k]:.2f} to '
                     f'{current[k + 1]:.2f} A it rises from {inductance[k] * 1e3:.2f} to '
@@ -125,13 +115,13 @@ def check_contact(
     crossing_current: float,
     parameters: InitParameters,
 ) -> None:
-    """Raise `NoContactError` or `ContradictionError` unless the pads were free and then pressed.
+    """Raise `InitialisationError` unless the pads were free and then pressed.
 
-    Raises `ImpreciseError` unless the scatter leaves both gaps precise enough.
+    Raises `InitialisationError` unless the scatter leaves both gaps precise enough.
     """
     travel = rest.at_rest_current - contact.gap
     if travel < parameters.smallest_travel:
-        raise NoContactError(
+        raise InitialisationError(
             f'contact gap ({contact.gap * 1e6:.1f} um) must lie at least '
             f'{parameters.smallest_travel * 1e6:.1f} um below the gap at {specimen.rest_current:.2f} A '
             f'({rest.at_rest_current * 1e6:.1f} um): either the halves are blocked and never close, or the '
@@ -139,7 +129,7 @@ def check_contact(
         )
     if contact.normal_force_at_crossing <= 0.0:
         pull = float(checked_force(specimen.force_law, crossing_current, contact.at_crossing))
-        raise ContradictionError(
+        raise InitialisationError(
             f'spring force at the crossing ({pull - contact.normal_force_at_crossing:.1f} N for a way of '
             f'{(rest.gap - contact.at_crossing) * 1e6:.1f} um) must stay below the pull of the magnet '
             f'({pull:.1f} N), else the pads are not in contact; check the springs and spring_stiffness of '
@@ -150,7 +140,7 @@ def check_contact(
         ('contact gap', contact.std, parameters.largest_contact_gap_std),
     ):
         if not std <= largest:
-            raise ImpreciseError(
+            raise InitialisationError(
                 f'standard deviation of the {name} ({std * 1e6:.2f} um) must not exceed '
                 f'{largest * 1e6:.2f} um; the ripple is too noisy: check its sensors, or lengthen '
                 'dwell_duration and ramp_duration'
@@ -158,9 +148,9 @@ def check_contact(
 
 
 def check_peak_force(table: FloatArray, parameters: InitParameters) -> None:
-    """Raise `ContradictionError` unless the table of shape (2, N) reaches a useful normal force."""
+    """Raise `InitialisationError` unless the table of shape (2, N) reaches a useful normal force."""
     if table[1, -1] < parameters.smallest_peak_force:
-        raise ContradictionError(
+        raise InitialisationError(
             f'normal force at {table[0, -1]:.2f} A ({table[1, -1]:.1f} N) must reach '
             f'{parameters.smallest_peak_force:.1f} N; the gaps leave the magnet too weak: check pads and '
             'springs'
@@ -172,7 +162,7 @@ def _known_parts(curve: InductanceCurve, rest_current: float) -> Iterator[tuple[
     for name, inductance in (('up', curve.up), ('down', curve.down)):
         known = np.isfinite(inductance) & (curve.current > rest_current)
         if known.sum() < 2:
-            raise AmbiguousCurveError(
+            raise InitialisationError(
                 f'inductance on the way {name} is known at {int(known.sum())} currents above '
                 f'{rest_current:.2f} A, needed are 2; check the ripple sensors'
             )
@@ -186,53 +176,44 @@ def _level_changes(inductance: FloatArray, level: float) -> list[int]:
 
 
 def check_rate(duration: int, count: int, parameters: InitParameters) -> None:
-    """Raise `UnusableReadingsError` unless the `count` samples of a ramp took the right time (ns)."""
+    """Raise `InitialisationError` unless the `count` samples of a ramp took the right time (ns)."""
     rate = 1e9 * (count - 1) / max(1, duration)
     if abs(rate - parameters.sample_rate) > _RATE_TOLERANCE * parameters.sample_rate:
-        raise UnusableReadingsError(
+        raise InitialisationError(
             f'coil_ripple came at {rate:.0f} Hz, but sample_rate of mount_init is {parameters.sample_rate:g} '
             f'Hz (limit {100.0 * _RATE_TOLERANCE:g} %); start the whole graph with one sample_rate'
         )
 
 
 def check_readings(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
-    """Raise `TooFewRipplesError` or `UnusableReadingsError` unless the whole ramp has good readings."""
-    _check_count(readings, ramp, parameters)
-    _check_signs(readings, parameters)
-    _check_alive(readings, ramp, parameters)
-
-
-def _check_count(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
-    finite = np.isfinite(readings.current)
+    """Raise `InitialisationError` unless the whole ramp has enough readings, of the right sign and alive."""
     for part in ('dwell_before', 'up', 'down', 'dwell_after'):
-        inside = finite[getattr(ramp, part)]
-        needed = math.ceil(parameters.valid_share * inside.size)
-        found = int(inside.sum())
+        inside = np.isfinite(readings.current[getattr(ramp, part)])
+        needed, found = math.ceil(parameters.valid_share * inside.size), int(inside.sum())
         if found < needed:
-            raise TooFewRipplesError(
+            raise InitialisationError(
                 f'air gap not estimated: {found} of {inside.size} ripple samples valid in the part '
                 f'"{part.replace("_", " ")}", needed are {needed}; check the coil ripple measurement'
             )
-
-
-def _check_signs(readings: Readings, parameters: InitParameters) -> None:
-    for name, unit, rate in _kinds(readings)[1:]:
+    kinds = (
+        ('slope of the coil current', 'A/s', readings.current_rate),
+        ('slope of the flux density', 'T/s', readings.flux_rate),
+        ('coil current', 'A', readings.current),
+    )
+    for name, unit, rate in kinds[:2]:
         rate = rate[np.isfinite(rate)]
         wrong = rate[rate <= 0.0]
         if wrong.size > parameters.rejected_share * rate.size:
-            raise UnusableReadingsError(
+            raise InitialisationError(
                 f'{name} after switching to plus must be positive; {wrong.size} of {rate.size} samples are '
                 f'not, such as {wrong[0]:g} {unit}: check the polarity of the coil and of its sensors'
             )
-
-
-def _check_alive(readings: Readings, ramp: Ramp, parameters: InitParameters) -> None:
     longest = max(2, round(parameters.stuck_duration * parameters.sample_rate))
-    for name, unit, values in _kinds(readings):
-        for part in (ramp.up, ramp.down):
-            length, value = _longest_constant_run(values[part])
+    for name, unit, values in kinds:
+        for side in (ramp.up, ramp.down):
+            length, value = _longest_constant_run(values[side])
             if length > longest:
-                raise UnusableReadingsError(
+                raise InitialisationError(
                     f'{name} stayed at {value:g} {unit} for {length} samples while the current was ramped, '
                     f'more than {longest}; the sensor is stuck: check it and its connection'
                 )
@@ -247,11 +228,3 @@ def _longest_constant_run(values: FloatArray) -> tuple[int, float]:
     lengths = np.diff(np.append(starts, values.size))
     longest = int(np.argmax(lengths))
     return int(lengths[longest]), float(values[starts[longest]])
-
-
-def _kinds(readings: Readings) -> tuple[tuple[str, str, FloatArray], ...]:
-    return (
-        ('coil current', 'A', readings.current),
-        ('slope of the coil current', 'A/s', readings.current_rate),
-        ('slope of the flux density', 'T/s', readings.flux_rate),
-    )

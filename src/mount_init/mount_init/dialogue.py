@@ -11,9 +11,8 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
 
-from mount_init.errors import CoilBusyError, DriverRefusalError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.initialisation import OFF, Initialisation
 
 _CHECK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
@@ -21,11 +20,7 @@ _LONGEST_AGE = 2.0  # s, chosen: every node publishes its verdict once a second
 _VERDICT_PERIOD = 0.02  # s, chosen: how soon a verdict is noticed
 
 
-class _Sample(NamedTuple):
-    stamp: int
-    current: float
-    current_rate: float
-    flux_rate: float
+_Sample = tuple[int, float, float, float]  # stamp (ns), current (A), slopes of current and flux density
 
 
 class CoilDialogue:
@@ -51,12 +46,12 @@ class CoilDialogue:
     def take_ripple(self, stamp: int, current: float, current_rate: float, flux_rate: float) -> None:
         """Take a ripple sample of time `stamp` (ns); answer it if a ramp runs."""
         with self._lock:
-            if self._newest is not None and stamp <= self._newest.stamp:
+            if self._newest is not None and stamp <= self._newest[0]:
                 if self._ramp is not None:
                     return  # a sample that comes twice or late is not answered again
-                if stamp < self._newest.stamp:
+                if stamp < self._newest[0]:
                     self._answered = self._foreign_stamp = None  # the electronics' time has started anew
-            self._newest = _Sample(stamp, current, current_rate, flux_rate)
+            self._newest = (stamp, current, current_rate, flux_rate)
             self._newest_arrival = time.monotonic()
             if self._ramp is not None:
                 self._answer(self._ramp, self._newest)
@@ -78,7 +73,7 @@ class CoilDialogue:
         """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
         with self._lock:
             if self._ramp is not None:
-                self._intruder = CoilBusyError(sentence)
+                self._intruder = InitialisationError(sentence)
                 self._end()
 
     # What the transition does.
@@ -90,20 +85,17 @@ class CoilDialogue:
             self._foreign_arrival = time.monotonic()
 
     def await_quiet(self, duration: float, ending: threading.Event) -> None:
-        """Return when no other node has sent a setpoint for `duration` (s), or raise `CoilBusyError` soon.
+        """Return when no other node has sent a setpoint for `duration` (s), else raise `InitialisationError`.
 
         A node that has just been deactivated is given the time to fall silent.
         """
-        for last in (False, True):
-            remaining = self._foreign_arrival + duration - time.monotonic()
-            if remaining <= 0.0:
-                return
-            if last:
-                raise CoilBusyError(
-                    f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed '
-                    f'are {duration * 1e3:.0f} ms without any; deactivate mount_control first'
-                )
+        if (remaining := self._foreign_arrival + duration - time.monotonic()) > 0.0:
             ending.wait(remaining)
+        if (remaining := self._foreign_arrival + duration - time.monotonic()) > 0.0:
+            raise InitialisationError(
+                f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed '
+                f'are {duration * 1e3:.0f} ms without any; deactivate mount_control first'
+            )
 
     def run(
         self,
@@ -136,7 +128,7 @@ class CoilDialogue:
                         f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
                     )
                 if reason := objection():
-                    raise DriverRefusalError(reason)
+                    raise InitialisationError(reason)
             if self._intruder is not None:
                 raise self._intruder
         finally:
@@ -155,15 +147,15 @@ class CoilDialogue:
             self._intruder = None
             self._own.clear()  # those that never came back
             self._ramp, self._ramp_start = ramp, None
-            answers = [answer for answer in (self._answered, self._foreign_stamp) if answer is not None]
-            if self._newest is not None and all(self._newest.stamp > answer for answer in answers):
+            answers = self._answered, self._foreign_stamp
+            if self._newest is not None and all(a is None or self._newest[0] > a for a in answers):
                 self._answer(ramp, self._newest)
 
     def _answer(self, ramp: Initialisation, sample: _Sample) -> None:
         if self._ramp_start is None:
-            self._ramp_start = sample.stamp
-        self._answered = sample.stamp
-        self._send(sample.stamp, ramp.step(*sample))
+            self._ramp_start = sample[0]
+        self._answered = sample[0]
+        self._send(sample[0], ramp.step(*sample))
         if ramp.finished:
             self._end()
 

@@ -10,12 +10,11 @@ rest averaged; the crossing is a parabola fitted with Tukey's bisquare weights (
 import math
 from collections import deque
 from dataclasses import dataclass
-from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
-from mount_init.errors import OutsideCalibrationError, UnusableReadingsError
+from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray
 from mount_init.supply import crossing_at_curves, inductance_at_curves
@@ -42,19 +41,11 @@ _GAP_STEP = 1e-8  # m
 _CURRENT_STEP = 1e-5  # A
 
 
-class TemperatureSource(Enum):
-    """Where the temperature of an initialisation comes from."""
-
-    MEASURED = 'measured'
-    PARAMETER = 'parameter'
-    UNKNOWN = 'unknown'
-
-
 class CoilTemperature(NamedTuple):
-    """A coil temperature in degC, NaN where it is unknown, and its source."""
+    """A coil temperature in degC, NaN where it is unknown, and its source: measured, parameter or unknown."""
 
-    celsius: float = math.nan
-    source: TemperatureSource = TemperatureSource.UNKNOWN
+    celsius: float
+    source: str
 
 
 class TemperatureReadings:
@@ -82,11 +73,8 @@ class TemperatureReadings:
 def coil_temperature(readings: TemperatureReadings, stamp: int | None, given: float) -> CoilTemperature:
     """Return the reading at `stamp` (ns), else the `given` temperature (degC, NaN: none)."""
     measured = readings.at(stamp) if stamp is not None else math.nan
-    if not math.isnan(measured):
-        return CoilTemperature(measured, TemperatureSource.MEASURED)
-    if not math.isnan(given):
-        return CoilTemperature(given, TemperatureSource.PARAMETER)
-    return CoilTemperature()
+    celsius, source = (given, 'parameter') if math.isnan(measured) else (measured, 'measured')
+    return CoilTemperature(celsius, 'unknown' if math.isnan(celsius) else source)
 
 
 @dataclass(frozen=True)
@@ -128,7 +116,7 @@ class ContactGap:
 
 
 def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: InitParameters) -> Dwell:
-    """Return the mean over one dwell, outliers left out; raises `UnusableReadingsError` if they are many.
+    """Return the mean over one dwell, outliers left out; raises `InitialisationError` if they are many.
 
     The standard deviation takes the ripples as independent.
     """
@@ -139,7 +127,7 @@ def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: In
     kept = deviation <= max(_FARTHEST * scatter, _ROUNDING * float(np.median(values)))
     rejected = int(inductance.size - kept.sum())
     if rejected - int((~finite).sum()) > parameters.rejected_share * values.size:
-        raise UnusableReadingsError(
+        raise InitialisationError(
             f'{values.size - int(kept.sum())} of {values.size} inductances at rest are outliers, more than '
             f'{parameters.rejected_share:.0%}; check the ripple sensors and their cables'
         )
@@ -153,7 +141,7 @@ def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: In
 
 
 def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsius: float) -> RestGap:
-    """Return the gap at 0 A from the inductance (H) at the rest current; raises `OutsideCalibrationError`.
+    """Return the gap at 0 A from the inductance (H) at the rest current; raises `InitialisationError`.
 
     The inductance is carried back from the coil temperature (degC) to that of the curves, unless that is
     unknown (NaN). The magnet already closes the halves a little at the rest current, so
@@ -167,7 +155,7 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsi
             specimen.force_law, specimen.spring_stiffness, at_rest, specimen.rest_current
         )
     except (OutsideCurveError, OutsideLawError) as error:
-        raise OutsideCalibrationError(
+        raise InitialisationError(
             f'rest gap not estimated (are the halves mounted as calibrated?): {error}'
         ) from error
     closing = _force_per_gap(specimen, specimen.rest_current, at_rest) / specimen.spring_stiffness
@@ -182,7 +170,7 @@ def contact_gap(
     A temperature that is unknown (NaN) is taken for that of the curves.
 
     At the crossing the pads are compressed by F_N = F(i, d) - k_s (d_rest - d), so d_c = d + F_N / k_p.
-    Raises `OutsideCalibrationError`. A negative F_N is returned as it is, for `checks` to judge.
+    Raises `InitialisationError`. A negative F_N is returned as it is, for `checks` to judge.
     """
     spring, pads = specimen.spring_stiffness, specimen.pad_stiffness
     try:
@@ -191,7 +179,7 @@ def contact_gap(
         gap_slope = float(gap_per_crossing_current(specimen.gap_curves, at_curves))
         force = float(checked_force(specimen.force_law, current, gap))
     except (OutsideCurveError, OutsideLawError) as error:
-        raise OutsideCalibrationError(
+        raise InitialisationError(
             f'contact gap not estimated (pads worn out, or no rod?): {error}'
         ) from error
     normal_force = force - spring * (rest.gap - gap)

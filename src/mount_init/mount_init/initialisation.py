@@ -19,18 +19,10 @@ from mount_init.checks import (
     check_single_crossing,
     check_steady_fall,
 )
-from mount_init.errors import (
-    CurrentNotFollowingError,
-    InitialisationError,
-    OutsideCalibrationError,
-    OverloadError,
-    SpecimenMismatchError,
-    TooFewRipplesError,
-)
+from mount_init.errors import CurrentNotFollowingError, InitialisationError
 from mount_init.estimate import (
     CoilTemperature,
     ContactGap,
-    Dwell,
     RestGap,
     TemperatureReadings,
     coil_temperature,
@@ -50,7 +42,7 @@ from mount_init.supply import (
 )
 from mount_models.actuator.law import OutsideLawError, checked_current_for_force, checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
-from mount_models.coil.crossing import Crossing, find_crossing
+from mount_models.coil.crossing import CrossingError, find_crossing
 from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.specimen import Specimen
 
@@ -72,8 +64,6 @@ _INTERRUPTIONS = 40  # chosen: each costs some 0.3 s; `total_timeout` ends them 
 class Evidence:
     """What a result rests on."""
 
-    dwell_before: Dwell
-    crossing_up: Crossing
     rest: RestGap
     contact: ContactGap
     temperature: CoilTemperature
@@ -116,7 +106,7 @@ class Initialisation:
         temperatures: TemperatureReadings | None = None,
     ):
         if parameters.peak_current > specimen.current_limit:
-            raise SpecimenMismatchError(
+            raise InitialisationError(
                 f'peak_current ({parameters.peak_current:.3f} A) must not exceed current_limit '
                 f'({specimen.current_limit:.3f} A) of the specimen; lower peak_current'
             )
@@ -170,13 +160,17 @@ class Initialisation:
         if self._first_stamp is None:
             self._first_stamp = stamp
         deviates = not abs(current - self._last) <= self.parameters.following_error
-        if self._approach is None:
+        if self._approach is not None:
+            self._carry(deviates, current)
+        else:
             if number == self.length // 2:
                 self._middle_stamp = stamp
-            valid = self.readings.add(current, current_rate, flux_rate)
-            self._watch(valid, deviates, current, flux_rate)
-        else:
-            self._carry(deviates, current)
+            if self.readings.add(current, current_rate, flux_rate):
+                self._invalid = 0
+            else:
+                self._note_invalid()
+            if self._failure is None and current == current:
+                self._watch(deviates, current, flux_rate)
         if self._failure is not None:
             self._last = OFF
         elif self._approach is None:
@@ -188,11 +182,11 @@ class Initialisation:
     def note_late(self, count: int) -> None:
         """Take how many setpoints came too late during the ramp by `mount_driver`; raise what follows of it.
 
-        Raises `OverloadError` where they are why the coil did not follow, and `CurrentNotFollowingError`
-        where its current was away though none was late.
+        Raises `InitialisationError` where they are why the coil did not follow, and
+        `CurrentNotFollowingError` where its current was away though none was late.
         """
         if isinstance(self._failure, CurrentNotFollowingError) and count:
-            raise OverloadError(
+            raise InitialisationError(
                 f'{count} setpoints came too late or not at all for the 20 ms limit of mount_driver and the '
                 f'electronics, which then keep the coil at 0 A (interrupted {self.interruptions} times, '
                 f'limit {_INTERRUPTIONS}): {_OVERLOAD}'
@@ -203,9 +197,9 @@ class Initialisation:
                 'no setpoint came too late: check coil, cable and connectors'
             )
 
-    def silence(self, duration: float) -> TooFewRipplesError:
+    def silence(self, duration: float) -> InitialisationError:
         """Return the refusal for samples that stopped to come for `duration` (s)."""
-        return TooFewRipplesError(
+        return InitialisationError(
             f'air gap not estimated: {self.readings.valid} of {self.length} ripple samples, none in the last '
             f'{duration:.1f} s; is mount_driver active?'
         )
@@ -215,7 +209,7 @@ class Initialisation:
         if self._failure is not None:
             raise self._failure
         if not self.finished:
-            raise TooFewRipplesError(
+            raise InitialisationError(
                 f'air gap not estimated: {self.readings.received} of {self.length} ripple samples '
                 'received; is mount_driver active?'
             )
@@ -227,7 +221,10 @@ class Initialisation:
         temperature = coil_temperature(
             self._temperatures, self._middle_stamp, self.parameters.coil_temperature_celsius
         )
-        return _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
+        try:
+            return _estimate(self.specimen, self.parameters, self.ramp, self.readings, temperature)
+        except CrossingError as error:
+            raise InitialisationError(str(error)) from error
 
     def _carry(self, deviates: bool, current: float) -> None:
         """Go back to the ramp after an interruption: the coil must follow again, then it is led there."""
@@ -258,20 +255,16 @@ class Initialisation:
             f'{self.parameters.following_error:g} A; {why}'
         )
 
-    def _watch(self, valid: bool, deviates: bool, current: float, flux_rate: float) -> None:
+    def _note_invalid(self) -> None:
+        self._invalid += 1
+        if self._invalid > self.parameters.invalid_duration * self.parameters.sample_rate:
+            self._failure = InitialisationError(
+                f'air gap not estimated: {self._invalid} ripple samples in a row were invalid, more than '
+                f'{self.parameters.invalid_duration:g} s; check the coil ripple measurement'
+            )
+
+    def _watch(self, deviates: bool, current: float, flux_rate: float) -> None:
         parameters = self.parameters
-        if not valid:
-            self._invalid += 1
-            if self._invalid > parameters.invalid_duration * parameters.sample_rate:
-                self._failure = TooFewRipplesError(
-                    f'air gap not estimated: {self._invalid} ripple samples in a row were invalid, more than '
-                    f'{parameters.invalid_duration:g} s; check the coil ripple measurement'
-                )
-                return
-        else:
-            self._invalid = 0
-        if current != current:
-            return
         deviated, self._deviating = self._deviating, self._deviating + 1 if deviates else 0
         self._followed |= not deviates and current > parameters.following_error
         gone = deviates and current <= parameters.following_error  # 0 A: as the safe state makes it
@@ -348,9 +341,8 @@ def _estimate(
         )
         offset = offset_current(law, spring, rest.gap, contact.gap, parameters.light_pressure)
     except (ForceTableError, OutsideLawError) as error:
-        raise OutsideCalibrationError(f'current-force table: {error}') from error
+        raise InitialisationError(f'current-force table: {error}') from error
     check_peak_force(table, parameters)
-    found = (dwells[0], crossings[0], rest, contact, temperature, supply)
     return InitialisationResult(
         rest.gap,
         contact.gap,
@@ -359,7 +351,7 @@ def _estimate(
         contact_force(spring, rest.gap, contact.gap),
         offset,
         table,
-        Evidence(*found, samples=readings.valid, skipped=readings.skipped),
+        Evidence(rest, contact, temperature, supply, readings.valid, readings.skipped),
     )
 
 

@@ -1,10 +1,11 @@
 """ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
 
 import math
-import time
+from collections.abc import Iterator
+from dataclasses import replace
 
 from mount_init.dialogue import CoilDialogue, DriverReport
-from mount_init.errors import DriverRefusalError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult, load_compiled_laws
 from mount_init.parameters import InitParameters
@@ -12,13 +13,12 @@ from mount_models.arithmetic.compiled import compilation_told
 from mount_models.specimen import Specimen, chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
-from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
-from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.messages.sensors import temperature_of
 from mount_ros.messages.verdicts import Level, flags_of, verdicts_of
-from mount_ros.nodes.diagnostics import WINDOW, Finding, SlidingWindow, Verdict, verdict_on
+from mount_ros.nodes.diagnostics import Finding, Verdict, verdict_on
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
@@ -38,7 +38,7 @@ class MountInit(SafeLifecycleNode):
         super().__init__('mount_init', **arguments)
         declare(self, InitParameters())
         declare(self, SpecimenChoice())
-        self._dialogue: CoilDialogue | None = None
+        self._dialogue = CoilDialogue(self._publish_setpoint)
         self._result: tuple[int, InitialisationResult] | None = None
         self._unsubscribed = False
 
@@ -50,8 +50,6 @@ class MountInit(SafeLifecycleNode):
         Initialisation(self._specimen, self._init_parameters)  # refuses what does not fit together
         with compilation_told(self.get_logger().info):
             load_compiled_laws(self._specimen)
-        self._malformed, self._malformed_reason = 0, ''
-        self._malformed_before = SlidingWindow(0)
         self._temperatures = TemperatureReadings()
         self._driver = DriverReport(self._init_parameters.peak_current)
         self._driver_name = f'{self.get_namespace().strip("/")}/mount_driver'.lstrip('/')
@@ -64,25 +62,24 @@ class MountInit(SafeLifecycleNode):
         self._send_table = path.sender(topics.CURRENT_FORCE_TABLE)
         self._dialogue = CoilDialogue(self._publish_setpoint)
         path.subscribe(topics.COIL_TEMPERATURE, self._on_temperature)
-        self._subscribe_streams(path)
+        self._subscribe_streams()
         path.start()
 
     def activate(self) -> None:
-        assert self._dialogue is not None
         self.real_time.begin(self)  # the ramp is part of the activation
         if self._unsubscribed:
             self._dialogue.forget_streams()
-            self._subscribe_streams(self._path)
+            self._subscribe_streams()
         self.wait_for_sole_publishers()
         self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
         if reason := self._driver.settled(False, _DRIVER_TIMEOUT, self.ending):
-            raise DriverRefusalError(reason)
+            raise InitialisationError(reason)
         ramp = Initialisation(self._specimen, self._init_parameters, self._temperatures)
         try:
-            result = self._ramp(self._dialogue, ramp)
+            result = self._ramp(ramp)
         except InitialisationError as error:
             if reason := self._driver.settled(True, _DRIVER_TIMEOUT, self.ending):
-                raise DriverRefusalError(reason) from error
+                raise InitialisationError(reason) from error
             raise
         assert ramp.last_stamp is not None
         table = to_message(ramp.last_stamp, result.table)
@@ -99,33 +96,28 @@ class MountInit(SafeLifecycleNode):
 
     def deactivate(self) -> None:
         self._result = None
-        if self._dialogue is not None:
-            self._dialogue.switch_off()
+        self._dialogue.switch_off()
 
     def cleanup(self) -> None:
         self.deactivate()
 
     def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
-        if self._dialogue is not None and (confirmed or suspected):
+        if confirmed or suspected:
             self._dialogue.give_way(confirmed or suspected)
 
     def judge(self) -> Verdict:
         assert self._result is not None
-        lately = self._malformed - self._malformed_before.earlier(time.monotonic(), self._malformed)
-        found, stamp = [], self._result[0]
-        if lately:
-            sentence = f'{lately} messages could not be read (limit: none in {WINDOW:g} s)'
-            found = [Finding(Level.WARN, 'malformed', f'{sentence}; {self._malformed_reason}')]
-        told = verdict(self._result[1], self._specimen, self._init_parameters)
-        figures = {**told.figures, 'messages_malformed': self._malformed, 'last_stamp': stamp}
-        return verdict_on([*told.findings, *found], told.sentence, figures)
+        stamp, result = self._result
+        found = verdict(result, self._specimen, self._init_parameters)
+        figures = {**found.figures, 'messages_malformed': self._path.refused, 'last_stamp': stamp}
+        return replace(found, figures=figures)
 
-    def _ramp(self, dialogue: CoilDialogue, ramp: Initialisation) -> InitialisationResult:
+    def _ramp(self, ramp: Initialisation) -> InitialisationResult:
         parameters = self._init_parameters
         # in lock-step only silence can tell a stalled chain from a slow machine
         total_timeout = math.inf if self.lockstep else parameters.total_timeout
         before = self._driver.late_setpoints or 0
-        dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
+        self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
         if ramp.disturbed:
             self._driver.wait_for_next(_VERDICT_TIMEOUT, self.ending)
             late = self._driver.late_setpoints
@@ -137,23 +129,18 @@ class MountInit(SafeLifecycleNode):
         self._path.publisher_watch.check()  # the diagnostics pause meanwhile
         return self._driver.refusal
 
-    def _subscribe_streams(self, path: DataPath) -> None:
-        path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
-        path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
-        path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
+    def _subscribe_streams(self) -> None:
+        self._path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
+        self._path.subscribe(topics.CURRENT_SETPOINT, self._on_setpoint)
+        self._path.subscribe(topics.DIAGNOSTICS, self._on_verdicts)
         self._unsubscribed = False
 
     def _publish_setpoint(self, stamp: int, current: float) -> None:
         self._send_setpoint(self._setpoint.pack(stamp, (current,)))
 
     def _on_ripple(self, raw: bytes) -> None:
-        try:
-            stamp, (current, _), (current_rate, flux_rate) = self._ripple.unpack(raw)
-        except ScalarsError as error:
-            self._note_malformed(error)
-            return
-        if self._dialogue is not None:
-            self._dialogue.take_ripple(stamp, current, current_rate, flux_rate)
+        stamp, (current, _), rates = self._ripple.unpack(raw)
+        self._dialogue.take_ripple(stamp, current, *rates)
 
     def _on_temperature(self, raw: bytes) -> None:
         self._temperatures.take(*temperature_of(raw))
@@ -165,17 +152,8 @@ class MountInit(SafeLifecycleNode):
                 self._driver.take(flags.switched_off or flags.held, report.sentence, report.figures)
 
     def _on_setpoint(self, raw: bytes) -> None:
-        try:
-            stamp, (current,), _ = self._setpoint.unpack(raw)
-        except ScalarsError as error:
-            self._note_malformed(error)
-            return
-        if self._dialogue is not None:
-            self._dialogue.take_setpoint(stamp, current)
-
-    def _note_malformed(self, error: ScalarsError) -> None:
-        self._malformed += 1
-        self._malformed_reason = str(error)
+        stamp, (current,), _ = self._setpoint.unpack(raw)
+        self._dialogue.take_setpoint(stamp, current)
 
 
 def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Verdict:
@@ -187,7 +165,7 @@ def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitPa
         'offset_current_A': f'{result.offset_current:.4f}',
         'highest_normal_force_N': f'{result.table[1, -1]:.1f}',
         'coil_temperature_celsius': f'{evidence.temperature.celsius:.1f}',
-        'coil_temperature_from': evidence.temperature.source.value,
+        'coil_temperature_from': evidence.temperature.source,
         'resistance_ohm': f'{supply.whole.ohm:.3f}',
         'resistance_std_ohm': f'{supply.whole.std:.4f}',
         'link_voltage_V': f'{supply.whole.link_voltage:.2f}',
@@ -198,9 +176,8 @@ def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitPa
         'samples_used': evidence.samples,
         'samples_invalid': evidence.skipped,
     }
-    warning = _warning(result, specimen, parameters)
-    found = [Finding(Level.WARN, 'result', warning)] if warning else []
-    return verdict_on(found, _summary(result), figures)
+    found = [Finding(Level.WARN, 'result', each) for each in _warnings(result, specimen, parameters)]
+    return verdict_on(found[:1], _summary(result), figures)
 
 
 def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
@@ -209,10 +186,11 @@ def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
     return float(pressed_gap - specimen.force_law.gap_low)
 
 
-def _warning(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> str:
-    reserve = wear_reserve(result, specimen)
+def _warnings(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Iterator[str]:
+    """Yield what a result that holds is warned of, gravest first."""
+    evidence, reserve = result.evidence, wear_reserve(result, specimen)
     if reserve < _WEAR_RESERVE:
-        return (
+        yield (
             f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
             f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
         )
@@ -221,23 +199,22 @@ def _warning(result: InitialisationResult, specimen: Specimen, parameters: InitP
         ('contact gap', result.contact_gap_std, parameters.largest_contact_gap_std),
     ):
         if std > _OF_LIMIT * largest:
-            return (
+            yield (
                 f'standard deviation of the {name} ({std * 1e6:.2f} um) is more than half of its limit '
                 f'{largest * 1e6:.2f} um; check the ripple sensors'
             )
-    skipped, total = result.evidence.skipped, result.evidence.samples + result.evidence.skipped
-    if skipped > _SKIPPED_SHARE * total:
-        return (
-            f'{skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; check the '
-            'coil ripple measurement'
+    total = evidence.samples + evidence.skipped
+    if evidence.skipped > _SKIPPED_SHARE * total:
+        yield (
+            f'{evidence.skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; '
+            'check the coil ripple measurement'
         )
-    if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
-        return (
+    if specimen.temperature is not None and math.isnan(evidence.temperature.celsius):
+        yield (
             f'{_summary(result)}; not compensated for the coil temperature, which is unknown: right at '
             f'{specimen.temperature.calibration_celsius:.0f} degC only; do the electronics report it '
             '(topic coil_temperature)? Else set coil_temperature_celsius'
         )
-    return ''
 
 
 def _summary(result: InitialisationResult) -> str:

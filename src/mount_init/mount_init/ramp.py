@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from mount_init.errors import SpecimenMismatchError
+from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_models.coil.gap import measured_inductance
 
@@ -37,12 +37,12 @@ def current_ramp(parameters: InitParameters, rest_current: float) -> Ramp:
     the default values, of some 140 A/s that 14 V allow at low current.
     """
     if not 0.0 < rest_current < parameters.peak_current:
-        raise SpecimenMismatchError(
+        raise InitialisationError(
             f'rest current of the specimen ({rest_current:.3f} A) must lie between 0 A and peak_current '
             f'({parameters.peak_current:.3f} A); check the specimen'
         )
     if not parameters.settle_duration < parameters.dwell_duration:
-        raise SpecimenMismatchError(
+        raise InitialisationError(
             f'settle_duration ({parameters.settle_duration:g} s) must lie below dwell_duration '
             f'({parameters.dwell_duration:g} s); otherwise no sample of the dwell is used'
         )

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_init.errors import AmbiguousCurveError, SupplyError
+from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
-from mount_models.coil.crossing import Crossing, CrossingError, find_crossing
+from mount_models.coil.crossing import Crossing, find_crossing
 from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
 from mount_models.coil.gap import OutsideCurveError, ScaledPolynomial, evaluate
 from mount_models.coil.resistance import (
@@ -57,8 +57,8 @@ def inductance_at_supply_of_curves(
 ) -> tuple[FloatArray, RampSupply]:
     """Return L_i (H), shape (N,), as it would be at the voltage of the gap curves, and the supply.
 
-    At that voltage, within 1 % of R / U, they are the readings themselves, to the bit. Raises `SupplyError`,
-    and `AmbiguousCurveError` where no crossing is found. `celsius` may be NaN, if the temperature is unknown.
+    At that voltage, within 1 % of R / U, they are the readings themselves, to the bit. `celsius` may be NaN,
+    if the temperature is unknown. Raises `InitialisationError`, and `CrossingError` without a crossing.
     """
     current, inductance = readings.current, readings.inductance(specimen.turns_area)
     volts = specimen.turns_area * readings.flux_rate
@@ -72,8 +72,7 @@ def inductance_at_supply_of_curves(
 
     resistance = whole.ohm
     voltage = _smooth(volts + resistance * current, driven, parameters)
-    spread = voltage[driven].max() - voltage[driven].min()
-    steady = bool(spread <= 2.0 * _STEADY * abs(whole.link_voltage))
+    steady = bool(np.ptp(voltage[driven]) <= 2.0 * _STEADY * abs(whole.link_voltage))
     if steady:
         voltage = np.full(current.size, whole.link_voltage)
     else:  # a straight line over the current tells no resistance then
@@ -129,13 +128,8 @@ def inductance_at_supply_of_curves(
 def inductance_crossing(
     specimen: Specimen, parameters: InitParameters, current: FloatArray, inductance: FloatArray
 ) -> Crossing:
-    """Return where one ramp's inductance (H) falls through its crossing; raises `AmbiguousCurveError`."""
-    try:
-        return find_crossing(
-            current, inductance, specimen.crossing_inductance, parameters.crossing_half_width
-        )
-    except CrossingError as error:
-        raise AmbiguousCurveError(str(error)) from error
+    """Return where one ramp's inductance (H) falls through its crossing; raises `CrossingError`."""
+    return find_crossing(current, inductance, specimen.crossing_inductance, parameters.crossing_half_width)
 
 
 def inductance_at_curves(specimen: Specimen, inductance: float, celsius: float) -> float:
@@ -156,13 +150,13 @@ def crossing_at_curves(specimen: Specimen, current: float, celsius: float) -> fl
 
 
 def check_reach(specimen: Specimen, readings: Readings, ramp: Ramp) -> None:
-    """Raise `SupplyError` where the supply leaves nothing to drive the current as high as the ramp asks."""
+    """Raise `InitialisationError` where the supply cannot drive the current as high as the ramp asks."""
     peak = slice(ramp.up.stop - _PEAK, ramp.down.start + _PEAK)
     current, flux_rate = readings.current[peak], readings.flux_rate[peak]
     if np.isfinite(flux_rate).any():
         doubt = saturated(specimen, float(np.nanmedian(current)), float(np.nanmedian(flux_rate)))
         if doubt:
-            raise SupplyError(doubt)
+            raise InitialisationError(doubt)
 
 
 def saturated(specimen: Specimen, current: float, flux_rate: float) -> str:
@@ -200,7 +194,7 @@ def _median(values: FloatArray) -> float:
 
 def _check_range(supply: RampSupply, low: float, high: float, reason: str) -> None:
     if supply.lowest < low or supply.highest > high:
-        raise SupplyError(
+        raise InitialisationError(
             f'voltage of the bridge by the coil ripple ({supply.lowest:.1f} .. {supply.highest:.1f} V) must '
             f'lie within {low:.3g} .. {high:.3g} V, {reason}'
         )

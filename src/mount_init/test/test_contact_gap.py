@@ -48,11 +48,6 @@ def test_an_initialisation_without_noise_finds_the_contact_force_within_one_per_
     assert contact_force(SPRING, rest, contact) == pytest.approx(true_contact_force(MOUNT), rel=0.01)
 
 
-def test_the_gap_at_the_crossing_is_not_yet_the_contact_gap(initialised):
-    raw, _, _ = initialised
-    assert 1e6 * raw == pytest.approx(341.2, abs=0.2)
-
-
 def test_correcting_the_contact_gap_to_zero_load_avoids_most_of_the_force_error(initialised):
     raw, contact, rest = initialised
     currents = np.linspace(0.48, 1.15, 200)

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from mount_init.dialogue import CoilDialogue
-from mount_init.errors import CoilBusyError, InitialisationError, TooFewRipplesError
+from mount_init.errors import InitialisationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 
@@ -73,15 +73,6 @@ def test_every_sample_of_the_ramp_is_answered_once_with_its_own_stamp(bench):
     assert [stamp for stamp, _ in bench.setpoints] == [n * STEP for n in range(1, bench.ramp.length + 1)]
     assert [current for _, current in bench.setpoints] == bench.ramp.ramp.setpoints.tolist()
     assert bench.ramp.last_stamp == bench.ramp.length * STEP
-
-
-def test_after_the_ramp_nothing_is_answered(bench):
-    bench.start()
-    for number in range(1, bench.ramp.length + 4):
-        bench.sample(number)
-    assert bench.join() is None
-    assert len(bench.setpoints) == bench.ramp.length
-    assert bench.setpoints[-1][1] == 0.0
 
 
 def test_without_a_ramp_nothing_is_answered(bench):
@@ -163,24 +154,10 @@ def test_silence_ends_the_ramp_with_zero_current(bench):
     for number in range(1, 38):
         bench.sample(number)
     error = bench.join()
-    assert isinstance(error, TooFewRipplesError)
+    assert isinstance(error, InitialisationError)
     assert '37 of 275 ripple samples, none in the last 0.1 s; is mount_driver active?' in str(error)
     assert bench.setpoints[-2][1] > 0.0
     assert bench.setpoints[-1] == (37 * STEP, 0.0)
-
-
-def test_silence_from_the_start_publishes_nothing(bench):
-    bench.start(silence=0.05)
-    assert '0 of 275 ripple samples' in str(bench.join())
-    assert bench.setpoints == []
-
-
-def test_repeated_samples_count_as_silence(bench):
-    bench.start(silence=0.1)
-    bench.sample(1)
-    while bench._thread.is_alive():
-        bench.sample(1)
-    assert isinstance(bench.join(), TooFewRipplesError)
 
 
 def test_a_ramp_that_takes_too_long_is_given_up(bench):
@@ -211,18 +188,9 @@ def test_a_setpoint_of_another_node_ends_the_ramp_with_zero_current(bench):
         bench.echo()
     bench.dialogue.take_setpoint(99 * STEP, 1.234)
     error = bench.join()
-    assert isinstance(error, CoilBusyError)
+    assert isinstance(error, InitialisationError)
     assert '1.234 A during the ramp; deactivate mount_control' in str(error)
     assert bench.setpoints[-1] == (99 * STEP, 0.0)
-
-
-def test_a_late_setpoint_for_a_sample_before_the_ramp_disturbs_nothing(bench):
-    bench.start()
-    bench.sample(10)
-    bench.dialogue.take_setpoint(9 * STEP, 0.0)
-    for number in range(11, 10 + bench.ramp.length):
-        bench.sample(number)
-    assert bench.join() is None
 
 
 def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
@@ -235,23 +203,17 @@ def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
     bench.dialogue.take_setpoint(5 * STEP, 0.5)
     other = threading.Thread(target=drive)
     other.start()
-    with pytest.raises(CoilBusyError, match=r'needed are 100 ms without any; deactivate mount_control first'):
+    with pytest.raises(InitialisationError, match='100 ms without any; deactivate mount_control first'):
         bench.dialogue.await_quiet(0.1, bench.ending)
     stop.set()
     other.join()
-
-
-def test_another_node_that_has_just_fallen_silent_is_waited_for(bench):
-    bench.dialogue.take_setpoint(5 * STEP, 0.5)
-    bench.dialogue.await_quiet(0.05, bench.ending)
-    bench.dialogue.await_quiet(0.05, bench.ending)
 
 
 def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample_is_answered(bench):
     bench.sample(1)
     bench.dialogue.forget_streams()
     bench.ending.set()  # a wait ends at once
-    with pytest.raises(CoilBusyError):
+    with pytest.raises(InitialisationError):
         bench.dialogue.await_quiet(100.0, bench.ending)
     bench.ending.clear()
     bench.dialogue.await_quiet(0.02, bench.ending)

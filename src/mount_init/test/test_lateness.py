@@ -4,7 +4,7 @@ from collections import deque
 
 import pytest
 
-from mount_init.errors import CurrentNotFollowingError, OverloadError
+from mount_init.errors import CurrentNotFollowingError, InitialisationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 
@@ -77,14 +77,14 @@ def test_setpoints_that_come_late_now_and_then_are_carried_over(simulated_actuat
 
 def test_setpoints_that_always_come_late_are_refused_by_their_name(simulated_actuator, specimen):
     ramp, electronics = run(simulated_actuator(), specimen, lambda number: 25)
-    with pytest.raises(OverloadError, match=r'\d+ setpoints came too late .* 20 ms limit .* overloaded: end'):
+    with pytest.raises(InitialisationError, match=r'\d+ setpoints came too late .* 20 ms .* overloaded: end'):
         ramp.note_late(electronics.late)
 
 
 def test_setpoints_that_come_late_too_often_are_refused_by_their_name(simulated_actuator, specimen):
     often = stalled(*((begin, begin + 25) for begin in range(100, 40_000, 100)))
     ramp, electronics = run(simulated_actuator(), specimen, often)
-    with pytest.raises(OverloadError, match='interrupted 41 times, limit 40'):
+    with pytest.raises(InitialisationError, match='interrupted 41 times, limit 40'):
         ramp.note_late(electronics.late)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_init.errors import OutsideCalibrationError
+from mount_init.errors import InitialisationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 
@@ -92,7 +92,6 @@ def test_prototype_of_the_paper_is_found(simulated_actuator, specimen, run_initi
     assert result.evidence.rest.at_rest_current * 1e6 == pytest.approx(492.0, abs=0.2)
     # there the pads are pressed already
     assert result.evidence.contact.at_crossing * 1e6 == pytest.approx(341.2, abs=0.1)
-    assert result.evidence.crossing_up.current == pytest.approx(1.381, abs=0.001)
     assert result.contact_force == pytest.approx(22.26, rel=0.01)
     assert result.offset_current == pytest.approx(0.4935, rel=0.01)
     assert result.table[1, -1] == pytest.approx(304.8, rel=0.01)
@@ -120,7 +119,6 @@ def test_outliers_do_not_pull_the_estimates(recorded, specimen):
     result = estimate(samples, specimen)
     assert result.rest_gap * 1e6 == pytest.approx(508.0, abs=4.0)
     assert result.contact_gap * 1e6 == pytest.approx(349.0, abs=2.0)
-    assert result.evidence.dwell_before.rejected > 0
 
 
 def test_samples_with_nan_are_skipped_and_counted(recorded, specimen):
@@ -158,5 +156,5 @@ def test_gaps_are_compensated_for_the_temperature_of_the_coil(
 
 def test_a_coil_too_hot_for_the_compensation_is_refused(simulated_actuator, specimen, run_initialisation):
     parameters = InitParameters(coil_temperature_celsius=150.0)
-    with pytest.raises(OutsideCalibrationError, match=r'coil temperature \(150\.0 degC\)'):
+    with pytest.raises(InitialisationError, match=r'coil temperature \(150\.0 degC\)'):
         run_initialisation(simulated_actuator(), specimen, parameters)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mount_init.errors import CurrentNotFollowingError, InitialisationError, SupplyError
+from mount_init.errors import CurrentNotFollowingError, InitialisationError
 from mount_init.parameters import InitParameters
 
 NOISE = 0.01 * 0.5**0.5  # of each slope: 1 % on L_i
@@ -83,11 +83,11 @@ def test_at_the_supply_of_the_curves_readings_are_used_as_they_are_to_the_bit(in
 
 @pytest.mark.parametrize('volts', [7.9, 18.2])
 def test_a_supply_beyond_the_range_of_the_curves_is_refused(initialise_at, volts):
-    with pytest.raises(SupplyError, match=f'{volts} .. {volts} V. must lie within 8 .. 18 V'):
+    with pytest.raises(InitialisationError, match=f'{volts} .. {volts} V. must lie within 8 .. 18 V'):
         initialise_at(lambda _: volts)
 
 
-@pytest.mark.parametrize(('volts', 'error'), [(7.9, CurrentNotFollowingError), (9.3, SupplyError)])
+@pytest.mark.parametrize(('volts', 'error'), [(7.9, CurrentNotFollowingError), (9.3, InitialisationError)])
 def test_a_supply_that_cannot_drive_the_ramp_is_named(initialise_at, volts, error):
     hot = COLD._replace(coil_temperature_celsius=90.0)
     with pytest.raises(
@@ -104,7 +104,7 @@ def test_a_supply_that_changes_hides_no_wrong_coil(initialise_at):
 
 def test_a_supply_that_changes_too_unevenly_is_refused_with_its_range(initialise_at):
     with pytest.raises(
-        SupplyError, match=r'changed between 1[23]\.\d and 1[45]\.\d V .* while the supply is steady'
+        InitialisationError, match=r'changed between 1[23]\.\d and 1[45]\.\d V .* while the supply is steady'
     ):
         initialise_at(lambda now: 14.0 + np.sin(44.0 * now))
 
@@ -112,5 +112,5 @@ def test_a_supply_that_changes_too_unevenly_is_refused_with_its_range(initialise
 def test_without_temperature_compensation_another_supply_is_refused(initialise_at, specimen):
     plain = dataclasses.replace(specimen, temperature=None)
     initialise_at(lambda _: 14.4, specimen=plain)
-    with pytest.raises(SupplyError, match=r'12\.0 V. must lie within 12\.9 \.\. 15\.1 V'):
+    with pytest.raises(InitialisationError, match=r'12\.0 V. must lie within 12\.9 \.\. 15\.1 V'):
         initialise_at(lambda _: 12.0, specimen=plain)

@@ -77,12 +77,6 @@ def test_messages_arrive_in_the_thread_of_the_data(pair):
     assert receiver.threads == {'data'}
 
 
-def test_data_arrives_while_the_owner_serves_nothing(pair):
-    receiver, send = pair  # nobody spins the owners' nodes here
-    send(1)
-    wait_until(lambda: receiver.stamps == [1], 'arrival')
-
-
 def test_a_path_that_was_never_started_can_be_stopped_twice(make_end):
     end = make_end('idle')
     end.path.subscribe(DISPLACEMENT, end.take)
@@ -129,23 +123,6 @@ def test_a_callback_that_raises_costs_its_own_message_only(pair, capfd, working)
         send(stamp)
     wait_until(lambda: len(receiver.stamps) >= seen + 7, 'arrival of all messages')
     assert 'message of displacement not used: ValueError: indigestible' in capfd.readouterr().err
-
-
-def test_the_end_does_not_hang_after_a_callback_that_raised(make_end):
-    sender, receiver = make_end('sender'), make_end('receiver')
-    publish = sender.path.sender(DISPLACEMENT)
-    raised = threading.Event()
-
-    def choke(raw):
-        raised.set()
-        raise RuntimeError('indigestible')
-
-    receiver.path.subscribe(DISPLACEMENT, choke)
-    receiver.path.start()
-    wait_until(lambda: not receiver.path.unmatched() and not sender.path.unmatched(), 'connection')
-    publish(sender.layout.pack(1, (0.0,)))
-    assert raised.wait(LIMIT)
-    receiver.close()
 
 
 def test_topics_without_another_side_are_named_once_and_in_order(make_end):
@@ -212,16 +189,6 @@ def test_attended_work_is_done_between_messages_and_without_any(pair):
     assert set(doing) == {'data'}
 
 
-def test_work_that_is_never_done_keeps_no_message_waiting(pair):
-    receiver, send = pair
-    receiver.path.add_poll(lambda: True)
-    for stamp in range(20):
-        send(stamp)
-        wait_until(lambda stamp=stamp: receiver.stamps[-1:] == [stamp], 'arrival')
-    assert receiver.stamps == list(range(20))
-    assert receiver.threads == {'data'}
-
-
 def test_no_message_is_lost_or_doubled_where_work_begins_and_ends(pair):
     receiver, send = pair
     for stamp in range(0, 40, 4):
@@ -258,19 +225,6 @@ def test_a_sample_passes_through_the_chain_in_one_round(context, make_end):
     wait_until(lambda: arrived, 'arrival')
     source.path.remove_polls()
     assert arrived == [3]
-
-
-def test_work_that_raises_ends_neither_the_thread_nor_the_service(pair, capfd):
-    receiver, send = pair
-
-    def work():
-        raise ValueError('too hard')
-
-    receiver.path.add_poll(work)
-    send(1)
-    wait_until(lambda: receiver.stamps == [1], 'arrival')
-    receiver.path.stop()
-    assert 'work not done: ValueError: too hard' in capfd.readouterr().err
 
 
 # What happens when the thread itself fails. Whoever would wait for ever does so in a thread of the test.
@@ -327,19 +281,6 @@ def test_the_end_of_the_thread_is_told_and_nobody_waits_for_it(context, make_end
     # to be served no more is what has happened already
     assert _outcome(end.path.remove_polls) is None
     assert _outcome(end.path.stop) is None
-
-
-@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
-def test_who_waits_when_the_thread_ends_gets_the_reason(pair, monkeypatch):
-    receiver, _ = pair
-
-    def fail(executor):
-        raise RuntimeError('the executor is broken')
-
-    monkeypatch.setattr(mount_ros.data_thread, '_drain', fail)
-    refusal = _outcome(receiver.path.add_poll, lambda: False)
-    assert isinstance(refusal, DataThreadEndedError)
-    assert 'RuntimeError: the executor is broken' in str(refusal)
 
 
 def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypatch):

@@ -120,20 +120,6 @@ def test_nothing_is_taken_behind_the_end_of_a_path_that_waits_for_the_message_un
     assert len(taken) == 1
 
 
-def test_an_exception_of_the_receiver_is_not_the_sender_s(make_path, context):
-    thread = DataThread(context)
-    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
-    send = sender.sender(DISPLACEMENT)
-
-    def take(raw):
-        raise ZeroDivisionError('no')
-
-    receiver.subscribe(DISPLACEMENT, take, directly=True)
-    send(sample(1))
-    assert receiver.refused == 1
-    assert 'ZeroDivisionError: no' in receiver.refusal
-
-
 def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware(make_path, context):
     thread = DataThread(context)
     sender, receiver = make_path('sender', thread), make_path('receiver', thread)

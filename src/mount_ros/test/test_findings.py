@@ -11,7 +11,6 @@ from mount_ros.nodes.diagnostics import (
     Finding,
     Level,
     SlidingWindow,
-    Verdict,
     verdict_on,
 )
 
@@ -42,10 +41,6 @@ def test_a_burst_counts_for_as_long_as_the_window_lasts_and_is_told_in_the_same_
     assert told[-1] == (Level.OK, 'well')
 
 
-def test_what_was_counted_before_the_first_look_counts():
-    assert SlidingWindow(0).earlier(5.0, 3) == 0
-
-
 def test_a_window_forgets_however_rarely_it_is_looked_at():
     window = SlidingWindow(0)
     assert [window.earlier(time, count) for time, count in ((0.0, 1), (WINDOW, 2), (3 * WINDOW, 3))] == [
@@ -71,11 +66,6 @@ def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
     silent = Finding(Level.ERROR, 'silence', 'no frames')
     verdict = standing.keep(verdict_on([hotter, silent, loss(2)], 'well', {}))
     assert (verdict.level, verdict.sentence) == (Level.ERROR, '150 degC')
-
-
-def test_a_verdict_without_findings_passes():
-    verdict = Verdict(Level.ERROR, 'as it is')
-    assert ActiveFindings().keep(verdict) is verdict
 
 
 def test_flags_are_what_a_node_has_published_as_true():

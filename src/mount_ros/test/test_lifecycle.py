@@ -13,7 +13,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_testing import LIMIT, wait_until
 
-from mount_ros.data_path import DataPath
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode, run_in_thread
 from mount_ros.qos import publisher_qos
@@ -191,20 +190,6 @@ def test_an_exception_beside_a_transition_waits_for_its_end(context):
     executor.shutdown()
 
 
-def test_what_long_work_raises_concerns_who_asked_for_it(context):
-    executor = SingleThreadedExecutor(context=context)
-    with pytest.raises(ZeroDivisionError):
-        run_in_thread(executor, lambda: 1 / 0, 'transition')
-    assert run_in_thread(executor, lambda: 7, 'transition') == 7
-    executor.shutdown()
-
-
-def test_a_whole_number_given_for_a_float_is_taken_as_one(context):
-    node = SafeLifecycleNode('subject', context=context, parameter_overrides=[Parameter('level', value=9)])
-    assert repr(node.declare_parameter('level', 8.0).value) == '9.0'
-    node.destroy_node()
-
-
 def test_a_misspelt_parameter_is_named_and_the_node_is_not_configured(context, capfd):
     node = SafeLifecycleNode('subject', context=context, parameter_overrides=[Parameter('levle', value=9.0)])
     node.declare_parameter('level', 8.0)
@@ -213,22 +198,11 @@ def test_a_misspelt_parameter_is_named_and_the_node_is_not_configured(context, c
     node.destroy_node()
 
 
-def test_a_second_activation_is_refused_and_the_node_stays_active(probe, operator):
-    operator.change(CONFIGURE)
-    operator.change(ACTIVATE)
-    assert not operator.change(ACTIVATE)
-    assert operator.state == ACTIVE
-    assert probe.active
-    assert probe.steps == ['configure', 'activate']
-
-
 @pytest.mark.parametrize(
     ('error', 'sentence'),
     [
         (ValueError('gap (1 mm) is too wide; shim it'), 'gap (1 mm) is too wide; shim it'),
-        (OSError('bus can0 is down; bring it up'), 'bus can0 is down; bring it up'),
         (RuntimeError('nobody foresaw this'), 'RuntimeError: nobody foresaw this'),
-        (KeyError('gap'), "KeyError: 'gap'"),
     ],
 )
 @pytest.mark.parametrize('step', ['configure', 'activate'])
@@ -253,18 +227,15 @@ def test_a_refused_step_says_why_and_can_be_tried_again(probe, operator, capfd, 
     wait_until(lambda: operator.heard(Level.OK, 'at work'), 'good diagnostics')
 
 
-def test_a_failed_activation_is_followed_by_deactivate(probe, operator):
-    operator.change(CONFIGURE)
-    probe.faults['activate'] = ValueError('no')
-    operator.change(ACTIVATE)
-    assert probe.steps == ['configure', 'activate', 'deactivate']
-
-
-def test_a_failed_configuration_is_followed_by_cleanup_and_leaves_no_data_path(probe, operator):
+def test_a_failed_step_is_followed_by_the_way_back(probe, operator):
     probe.faults['configure'] = ValueError('no')
     operator.change(CONFIGURE)
-    assert probe.steps == ['configure', 'cleanup']
-    assert probe.data_path is None
+    assert (probe.steps, probe.data_path) == (['configure', 'cleanup'], None)
+    probe.faults = {'activate': ValueError('no')}
+    probe.steps.clear()
+    operator.change(CONFIGURE)
+    operator.change(ACTIVATE)
+    assert probe.steps == ['configure', 'activate', 'deactivate']
 
 
 def test_a_deactivation_that_raises_leaves_the_active_state_all_the_same(probe, operator, capfd):
@@ -275,13 +246,6 @@ def test_a_deactivation_that_raises_leaves_the_active_state_all_the_same(probe, 
     assert operator.state == INACTIVE
     assert not probe.active
     assert 'deactivate failed: ValueError: stuck' in capfd.readouterr().err
-
-
-def test_cleaning_up_ends_the_data_path(probe, operator):
-    operator.change(CONFIGURE)
-    assert isinstance(probe.data_path, DataPath)
-    operator.change(CLEANUP)
-    assert probe.data_path is None
 
 
 @pytest.mark.parametrize(
@@ -335,15 +299,6 @@ def test_a_change_of_the_verdict_is_told_at_once_and_no_change_once_a_second(pro
     once, before = told(), probe.judged
     wait_until(lambda: told() >= once + 2, 'the same sentence again')
     assert probe.judged - before >= 10
-
-
-def test_lockstep_is_a_parameter_of_every_node(context):
-    one = Probe(context=context)
-    assert not one.lockstep
-    other = Probe(context=context, parameter_overrides=[Parameter('lockstep', value=True)])
-    assert other.lockstep
-    for node in (one, other):
-        node.destroy_node()
 
 
 @pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')

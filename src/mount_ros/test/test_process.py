@@ -112,15 +112,6 @@ def start():
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_deactivates_the_node_and_the_exit_code_is_0(start, number):
-    process = start(1)
-    process.wait_for('one served')
-    code, errors = process.end(number)
-    assert (code, errors) == (0, '')
-    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
-
-
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_nodes_of_one_process_are_closed_in_reverse_order(start, number):
     process = start(2)
     process.wait_for('one served', 'two served')
@@ -155,14 +146,6 @@ def test_a_program_of_others_is_not_run_for_a_starter_that_has_ended(monkeypatch
         monkeypatch.setattr(os, 'getpid', lambda: other.pid)
         ended = subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=False)
     assert (ended.returncode, ended.stdout) == (1, b'')
-
-
-def test_a_burst_of_signals_ends_the_process_as_one_does(start):
-    process = start(1)
-    process.wait_for('one served')
-    code, errors = process.end(signal.SIGINT, times=300)
-    assert (code, errors) == (0, '')
-    assert process.lines[-3:] == ['one deactivate', 'one cleanup', 'over']
 
 
 def test_signals_until_the_process_has_ended_change_nothing(start):
@@ -212,27 +195,6 @@ def test_the_end_of_the_data_thread_ends_the_process_with_the_reason_and_code_1(
     assert '[FATAL] [two]: the data thread has ended: SystemExit: out of order' in errors
     said = [line for line in process.lines if 'served' not in line]
     assert said == ['two deactivate', 'two cleanup', 'one deactivate', 'one cleanup']
-
-
-SLEEPER = """
-import signal, threading
-from mount_ros.nodes.process import _Ending
-from mount_ros.nodes.real_time import RealTime
-over = _Ending()
-over.add_signals(signal.SIGTERM)
-
-def take_the_signal():  # the main thread is asleep and is not interrupted
-    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
-
-threading.Timer(0.2, take_the_signal).start()
-over.wait(RealTime(0), print)
-print('awake')
-"""
-
-
-def test_a_signal_that_another_thread_takes_wakes_the_sleeping_main_thread():
-    ended = subprocess.run([sys.executable, '-c', SLEEPER], capture_output=True, text=True, timeout=LIMIT)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'awake\n', '')
 
 
 def test_an_executor_that_sleeps_can_be_woken(context):

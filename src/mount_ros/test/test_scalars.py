@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from mount_ros.messages import scalars
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, ScalarsReader, stamp_of
-from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, TOPICS, control_trace
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, control_trace
 
 STAMP = 1_763_680_000_123_456_789
 stamps = st.integers(0, 2**31 * 1_000_000_000 - 1)
@@ -69,13 +69,6 @@ def test_a_reader_takes_names_from_messages_of_any_and_remembers_their_layout(mo
     assert math.isnan(magnitude)
 
 
-def test_a_reader_reads_messages_with_a_frame_in_their_header():
-    message = JointState(name=['current'], position=[2.5])
-    message.header.frame_id = 'somewhere'
-    message.header.stamp.sec = 7
-    assert ScalarsReader(('current',)).read(serialize_message(message)) == (7_000_000_000, [2.5])
-
-
 def test_missing_velocities_are_unknown_and_not_zero():
     message = JointState(name=['coil_current', 'flux_density'], position=[1.0, math.nan])
     _, _, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
@@ -96,12 +89,6 @@ def test_one_number_layouts_change_stamp_and_number_only(stamp, number):
     assert (message.wrench.force.x, message.wrench.torque.z) == (0.0, 0.0)
 
 
-def test_topic_names_are_unique_and_relative_but_for_diagnostics():
-    names = [topic.name for topic in TOPICS]
-    assert len(set(names)) == len(names)
-    assert [name for name in names if name.startswith('/')] == ['/diagnostics']
-
-
 @given(entries=st.lists(st.tuples(stamps, st.tuples(floats, floats), st.tuples(floats, floats)), max_size=4))
 def test_many_messages_packed_at_once_are_those_packed_one_by_one(entries):
     layout = ScalarsLayout(COIL_RIPPLE)
@@ -109,14 +96,6 @@ def test_many_messages_packed_at_once_are_those_packed_one_by_one(entries):
     positions = np.array([numbers for _, numbers, _ in entries]).reshape(-1, 2)
     velocities = np.array([slopes for _, _, slopes in entries]).reshape(-1, 2)
     rows = layout.pack_rows(moments, positions, velocities)
-    assert [row.tobytes() for row in rows] == [layout.pack(*entry) for entry in entries]
-
-
-@given(entries=st.lists(st.tuples(stamps, floats), max_size=4))
-def test_many_messages_with_one_number_are_those_packed_one_by_one(entries):
-    layout = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
-    moments = np.array([stamp for stamp, _ in entries], np.int64)
-    rows = layout.pack_rows(moments, np.array([number for _, number in entries]))
     assert [row.tobytes() for row in rows] == [layout.pack(*entry) for entry in entries]
 
 

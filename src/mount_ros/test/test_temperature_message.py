@@ -1,7 +1,6 @@
 """The coil's temperature on its way through a message."""
 
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import Temperature
+from rclpy.serialization import deserialize_message
 
 from mount_ros.messages.cdr import message_class, serialised
 from mount_ros.messages.sensors import temperature_layout, temperature_of
@@ -21,10 +20,3 @@ def test_a_temperature_is_told_in_degrees_celsius_of_the_registered_type():
 
 def test_what_was_packed_comes_back():
     assert temperature_of(temperature_layout().pack(STAMP, -12.3)) == (STAMP, -12.3)
-
-
-def test_a_message_with_a_frame_is_read_too():
-    message = Temperature(temperature=80.0, variance=0.25)
-    message.header.frame_id = 'coil'
-    message.header.stamp.sec = 7
-    assert temperature_of(serialize_message(message)) == (7_000_000_000, 80.0)

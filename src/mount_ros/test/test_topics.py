@@ -5,7 +5,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 from mount_ros.messages.cdr import message_class
 from mount_ros.qos import CONTROL_DEPTH, control_qos, publisher_qos, recording_qos
-from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, RACK_TOPICS, TOPICS, Delivery, topic
+from mount_ros.topics import DISPLACEMENT, JOINT_STATE, RACK_TOPICS, TOPICS, Delivery, topic
 
 each_topic = pytest.mark.parametrize('entry', TOPICS + RACK_TOPICS, ids=lambda entry: entry.name)
 each_topic_of_the_graph = pytest.mark.parametrize('entry', TOPICS, ids=lambda entry: entry.name)
@@ -37,16 +37,6 @@ def test_scalars_belong_to_joint_states_and_are_distinct(entry):
     assert bool(entry.scalars) == (entry.type == JOINT_STATE)
     assert len(set(entry.names)) == len(entry.names)
     assert all(scalar.unit for scalar in entry.scalars)
-
-
-@each_topic
-def test_streams_have_a_rate_and_others_have_none(entry):
-    assert (entry.rate > 0.0) == (entry.delivery is Delivery.STREAM)
-
-
-def test_derivatives_are_declared_by_their_unit():
-    assert COIL_RIPPLE.has_derivatives
-    assert not DISPLACEMENT.has_derivatives
 
 
 @each_topic

@@ -200,29 +200,6 @@ def until_ending(ending: threading.Event, discharged: Callable[[], bool]) -> Ite
         yield
 
 
-class OwnWork:
-    """How long the simulator's own work on a sample takes, which waits until the graph has answered.
-
-    Electronics have a processor of their own; with two of them the simulator would take one from the graph.
-    """
-
-    def __init__(self, longest: float):
-        """`longest` in s: what is to be expected at first."""
-        self._longest = longest
-        self._begin = 0.0
-
-    def latest_begin(self, end: float) -> float:
-        """Return when it must begin so that it is done at `end` (s)."""
-        return end - _RESERVE * self._longest
-
-    def __enter__(self) -> None:
-        self._begin = time.monotonic()
-
-    def __exit__(self, *_: object) -> None:
-        taken = time.monotonic() - self._begin
-        self._longest = max(taken, (1.0 - _FORGOTTEN) * self._longest)
-
-
 class CarLoop:
     """Takes each sample of all mounts, one after the other, before it takes the next of the first."""
 
@@ -239,17 +216,19 @@ class CarLoop:
         did, the control would rightly report it.
         """
         period = 1.0 / self._sample_rate / (1.0 + self._clock_drift)
-        own = OwnWork(period)
-        begin = time.monotonic()
+        # The simulator's own work on a sample waits until the graph has answered: electronics have a
+        # processor of their own; with two of them the simulator would take one from the graph.
+        longest, begin = period, time.monotonic()
         for number, _ in enumerate(until_ending(ending, self._discharged), 1):
             for _, loop in self._loops:
                 loop.send_sample()
             for _, loop in self._loops:
-                loop.wait_for_answer(own.latest_begin(begin + number * period))
-            with own:
-                for _, loop in self._loops:
-                    loop.go_on()
+                loop.wait_for_answer(begin + number * period - _RESERVE * longest)
+            answered = time.monotonic()
+            for _, loop in self._loops:
+                loop.go_on()
             now = time.monotonic()
+            longest = max(now - answered, (1.0 - _FORGOTTEN) * longest)
             remaining = begin + number * period - now
             for _, loop in self._loops:
                 loop.figures.wall_time = now - begin

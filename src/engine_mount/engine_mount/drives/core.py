@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engine_mount.drives.inputs.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from engine_mount.drives.inputs.parameter_changes import changed
 from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp, initialisation
-from mount_bringup.chosen import Parameters, chosen_control
+from engine_mount.settings.chosen import Parameters, chosen_control
 from mount_control.control_loop import ControlLoop, SampleCounts
 from mount_control.settings import ControlSettings
 from mount_init.errors import InitialisationError

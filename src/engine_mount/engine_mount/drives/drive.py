@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from rclpy.client import Client
+from std_srvs.srv import Trigger
+
 from engine_mount.drives.brought import FOLDER, Brought, provenance, written
 from engine_mount.drives.happenings import Happenings, line
 from engine_mount.drives.keyboard import MARK_KEYS, Keyboard
@@ -14,11 +17,11 @@ from engine_mount.drives.loop.recording import record_car, record_core
 from engine_mount.drives.preflight import preflight
 from engine_mount.drives.progress import DriveProgress
 from engine_mount.recordings.screen import Screen
+from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.excitation import with_array
-from mount_bringup.chosen import Parameters
-from mount_bringup.graph.domain import can_port, domain_locks
+from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
     CONTROL,
     RECORDER,
@@ -106,7 +109,7 @@ def _drive_graph(
     supervisor.recovery.report = screen.note
     happenings = Happenings(supervisor.nodes, screen.say)
     supervisor.reports.observer = happenings
-    with domain_locks(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
+    with domain_lock(order.domain, order.namespace, order.mounts), ending_signals(supervisor.interrupt):
         try:
             happenings.begin()
             with screen.line(happenings.states) as show:
@@ -151,16 +154,30 @@ def _watch_drive(
     with keyboard as keys, screen.bar(f'driving ({order.scenario})') as show:
         if order.mode == 'real time':
             _tell_where_to_look(order, screen, marks=keys is not None and keys.present)
+        mark = supervisor.client(Trigger, f'{RECORDER.name}/mark')  # found by the time it is wanted
         progress = DriveProgress(supervisor.figures(SIM), real_time=order.mode == 'real time')
 
         def finished() -> bool:
             show(progress.share(supervisor.figures(SIM)), detail=happenings.present)
             for key in keys.wait(0.0) if keys is not None else ():
                 if key in MARK_KEYS:
-                    supervisor.set_mark(screen.say)
+                    _set_mark(mark, screen)
             return supervisor.finished
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
+
+
+def _set_mark(client: Client, screen: Screen) -> None:
+    """Request a mark of the recorder."""
+
+    def answered(call: Any) -> None:
+        answer = call.result()
+        screen.say('marked' if answer.success else f'no mark was set: {answer.message}')
+
+    if client.service_is_ready():
+        client.call_async(Trigger.Request()).add_done_callback(answered)
+    else:
+        screen.say('no mark was set: the recorder is not there yet')
 
 
 def _tell_where_to_look(order: DriveOrder, screen: Screen, *, marks: bool) -> None:

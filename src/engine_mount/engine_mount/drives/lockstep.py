@@ -22,7 +22,7 @@ from rclpy.parameter import Parameter
 from engine_mount.drives.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed, activation_before
 from engine_mount.drives.inputs.input import Column, ControlRun, ReplayError, ReplayInput, Times
 from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros import topics

@@ -2,9 +2,9 @@
 
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.recorder_options import checked_recorder
+from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
-from mount_bringup.chosen import Parameters
 from mount_bringup.settings import check_sample_rate
 from mount_control.settings import check_effect
 from mount_driver.parameters import DriverParameters

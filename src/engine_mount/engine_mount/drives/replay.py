@@ -20,16 +20,16 @@ from engine_mount.recordings.session import (
     session_content,
     session_parameters,
 )
-from engine_mount.settings.options import owned
-from engine_mount.settings.run_folder import RunFolder, make_run_folder
-from engine_mount.signals.importing.provenance import SCENARIO
-from mount_bringup.chosen import (
+from engine_mount.settings.chosen import (
     Parameters,
     check_policy,
     chosen_control,
     chosen_specimen,
     control_parameters,
 )
+from engine_mount.settings.options import owned
+from engine_mount.settings.run_folder import RunFolder, make_run_folder
+from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT

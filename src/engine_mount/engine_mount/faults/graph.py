@@ -120,7 +120,7 @@ class GraphUnderTest:
             node.name: each
             for each in _family(self.process.pid)
             for node in SIMULATED
-            if f'from {node.package}.node' in _command(each)
+            if f'from {node.name}.node' in _command(each)
         }
 
     def damping(self) -> bool:

@@ -82,13 +82,16 @@ def open_piece(path: Path) -> StoredFile:
     if path.suffix not in COMPRESSED_SUFFIXES:
         return SqliteFile(path) if path.suffix == '.db3' else McapFile(path)
     with tempfile.TemporaryDirectory(prefix='engine_mount_') as folder:
+        copy = Path(folder, path.stem)
         try:
-            unpack(path, Path(folder, path.stem))
+            unpack(path, copy)
+            file = open_piece(copy)  # it stays open
+        except StorageError as error:
+            raise StorageError(str(error).replace(str(copy), str(path))) from None
         except OSError as error:
             raise StorageError(
                 f'{path} cannot be unpacked: {error.strerror}; make room in {tempfile.gettempdir()}'
             ) from None
-        file = open_piece(Path(folder, path.stem))  # it stays open
     file.path = path
     return file
 

@@ -12,7 +12,7 @@ from engine_mount.reports.drive.undamped import UndampedError, undamped_of
 from engine_mount.reports.sections.charts import Levels
 from engine_mount.reports.sections.subject import RunFacts, Tracking, WithoutDamping
 from engine_mount.reports.signals import Signals
-from mount_bringup.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
+from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy.contract import Policy
 from mount_models.quantity import with_flattened
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH

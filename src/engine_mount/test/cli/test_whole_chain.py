@@ -21,7 +21,7 @@ from engine_mount.drives.loop.recording import record_core
 from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
-from mount_bringup.chosen import chosen_control, policy_of
+from engine_mount.settings.chosen import chosen_control, policy_of
 from mount_models.actuator.law import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient

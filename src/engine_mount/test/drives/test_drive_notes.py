@@ -25,6 +25,9 @@ class Graph:
     def start(self, session, status):
         pass
 
+    def client(self, kind, service):
+        pass
+
     def interrupt(self):
         pass
 

@@ -5,7 +5,6 @@ import os
 import socket
 import zlib
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 HIGHEST_DOMAIN = 101  # above, the ports of Fast DDS run into those of other programs on Linux
 
@@ -16,7 +15,6 @@ _FIRST_PORT, _PORTS_OF_DOMAIN = 7530, 250  # behind 59 participants
 _PLACES = 119  # namespaces told apart by their ports
 
 _PLACE = '\0engine_mount_port'  # the zero: a name of its own, no file
-_SOCKETS = Path('/proc/net/unix')
 
 
 class DomainError(ValueError):
@@ -42,36 +40,23 @@ def can_port(domain: int, namespace: str) -> int:
 
 
 @contextlib.contextmanager
-def domain_lock(domain: int, namespace: str) -> Iterator[None]:
-    """Hold the place of the one graph of this machine in a domain and namespace, or raise `DomainError`.
+def domain_lock(domain: int, namespace: str, mounts: Sequence[str] = ()) -> Iterator[None]:
+    """Hold the places of the one graph of this machine in a domain and namespace, and of its mounts in it.
 
     By a name among the sockets of Linux that stands in no file system: nothing is left behind, whatever ends
-    the process.
+    the process. Raises `DomainError` where another graph holds one of them.
     """
-    port, name = can_port(domain, namespace), f'/{namespace.strip("/")}'
-    with socket.socket(socket.AF_UNIX) as place, socket.socket(socket.AF_UNIX) as holder:
-        try:
-            place.bind(f'{_PLACE}_{port}')
-        except OSError:
-            raise DomainError(_occupied(domain, name, port)) from None
-        holder.bind(f'{_PLACE}_{port} {os.getpid()} {name}')
-        yield
-
-
-@contextlib.contextmanager
-def domain_locks(domain: int, namespace: str, mounts: Sequence[str]) -> Iterator[None]:
-    """Hold the places of a graph and of each of its mounts, whose namespaces are within its own."""
     with contextlib.ExitStack() as held:
         for mount in ('', *mounts):
-            held.enter_context(domain_lock(domain, f'{namespace}/{mount}'))
+            name = f'/{namespace}/{mount}'.replace('//', '/').rstrip('/') or '/'
+            port = can_port(domain, name)
+            place = held.enter_context(socket.socket(socket.AF_UNIX))
+            try:
+                place.bind(f'{_PLACE}_{port}')
+            except OSError:
+                raise DomainError(
+                    f'a graph already runs in ROS domain {domain}, namespace {name}, or in one whose CAN bus '
+                    f'would have port {port} too; end it, or choose another domain with --domain or '
+                    'ROS_DOMAIN_ID'
+                ) from None
         yield
-
-
-def _occupied(domain: int, name: str, port: int) -> str:
-    begin = f'@{_PLACE[1:]}_{port} '  # so Linux lists such names
-    names = (line.partition(begin)[2] for line in _SOCKETS.read_text().splitlines() if begin in line)
-    process, _, other = next(names, 'unknown unknown').partition(' ')  # it has just ended
-    running = f'a graph already runs in ROS domain {domain}, namespace {other} (process {process})'
-    if other == name:
-        return f'{running}; end it, or choose another domain with --domain or ROS_DOMAIN_ID'
-    return f'{running}, whose CAN bus would have port {port} as that of {name}; choose another namespace'

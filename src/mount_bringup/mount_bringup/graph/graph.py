@@ -7,18 +7,16 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
-from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Float64MultiArray, String
-from std_srvs.srv import Trigger
+from std_msgs.msg import String
 
 from mount_bringup.graph.nodes import DRIVER, RECORDER, GraphError, GraphNode, GraphSettings, name_in
 from mount_bringup.graph.reports import NodeReports
@@ -28,18 +26,18 @@ from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.shutdown import Deadline, leave_middleware
 from mount_ros.publishers import present_nodes
 from mount_ros.qos import publisher_qos, recording_qos
-from mount_ros.topics import CURRENT_FORCE_TABLE, DIAGNOSTICS, EVENT, SESSION
+from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 
 FRESH_DIAGNOSTICS = 1.5
 """Seconds (chosen): every node reports once a second."""
-DEACTIVATE, ACTIVATE, CONFIGURE = (
-    Transition.TRANSITION_DEACTIVATE,
-    Transition.TRANSITION_ACTIVATE,
-    Transition.TRANSITION_CONFIGURE,
-)
-_LABELS = {CONFIGURE: 'configure', ACTIVATE: 'activate', DEACTIVATE: 'deactivate'}
-_START_LIMIT = 60.0  # s, chosen: a first start may compile the laws
-_TRANSITION_LIMIT = 60.0  # s, chosen: activation of mount_init includes its current ramp
+CONFIGURE, ACTIVATE, DEACTIVATE = 'configure', 'activate', 'deactivate'
+_TRANSITIONS = {
+    CONFIGURE: Transition.TRANSITION_CONFIGURE,
+    ACTIVATE: Transition.TRANSITION_ACTIVATE,
+    DEACTIVATE: Transition.TRANSITION_DEACTIVATE,
+}
+ANSWER_LIMIT = 60.0
+"""Seconds (chosen) until a node answers: a first start may compile the laws, an activation has its ramp."""
 _DEACTIVATION_LIMIT = 2.0  # s, chosen: then a signal has the same effect
 _MATCH_LIMIT = 20.0  # s, chosen
 _DISCOVERY = 0.5  # s, chosen: discovery of a running graph takes less with the shipped profile
@@ -55,16 +53,15 @@ class Graph:
         self.nodes = tuple(nodes)
         self.settings = settings
         self.mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
-        self.reports = NodeReports(nodes, settings.namespace)
-        self.parameters: dict[str, dict[str, object]] = {}
-        """All parameters of all nodes as they were at the start, {node: {parameter: value}}."""
+        self.reports = NodeReports(self.nodes, settings.namespace)
+        self.figures = self.reports.figures
         self.notes: list[str] = []
         """Sentences for the user about what was not as it should be."""
+        self.repeats: dict[str, list[str]] = {}
+        """The reasons why a node was activated again."""
         self.deadline = Deadline(code=1)
         self._interrupted = False  # no lock: a second signal may come during the first
         self._context = Context()
-        self._executor: SingleThreadedExecutor | None = None
-        self._sessions: dict[str, Publisher] = {}
         self._clients: dict[str, Client] = {}
 
     def open(self) -> None:
@@ -78,17 +75,19 @@ class Graph:
             )
         except RuntimeError as error:
             raise GraphError(f'the middleware does not start: {error}') from None
-        namespace = self.settings.namespace
-        self.node = Node('engine_mount_supervisor', namespace=namespace, context=self._context)
+        name, namespace = 'engine_mount_supervisor', self.settings.namespace
+        self.node = Node(name, namespace=namespace, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._subscribe(DiagnosticArray, DIAGNOSTICS, self.reports.take)
+        subscribe = self.node.create_subscription
+        subscribe(DiagnosticArray, DIAGNOSTICS.name, self.reports.take, recording_qos(DIAGNOSTICS))
         for mount in dict.fromkeys(['', *self.mounts]):  # the recorder of several mounts marks for all
-            self._subscribe(String, EVENT, partial(self._take_event, mount), mount)
-        for mount in self.mounts:
-            name = name_in(mount, SESSION.name)
-            self._sessions[mount] = self.node.create_publisher(String, name, publisher_qos(SESSION))
-        self.client(Trigger, f'{RECORDER.name}/mark')
+            take = partial(self._take_event, mount)
+            subscribe(String, name_in(mount, EVENT.name), take, recording_qos(EVENT))
+        self._sessions = {
+            mount: self.node.create_publisher(String, name_in(mount, SESSION.name), publisher_qos(SESSION))
+            for mount in self.mounts
+        }
 
     def close(self) -> None:
         """Leave the middleware."""
@@ -125,12 +124,7 @@ class Graph:
 
     def serve_once(self) -> None:
         """Take the messages of a moment, without a check."""
-        assert self._executor is not None
         self._executor.spin_once(_PERIOD)
-
-    def figures(self, node: GraphNode) -> dict[str, str]:
-        """Return the last report of a node: its figures, `level` and `sentence`; empty if there is none."""
-        return self.reports.figures(node)
 
     def fresh_figures(self, node: GraphNode) -> dict[str, str]:
         """Return the next report of a node."""
@@ -147,55 +141,48 @@ class Graph:
             self._clients[service] = self.node.create_client(kind, service)
         return self._clients[service]
 
-    def call(self, kind: Any, service: str, request: Any) -> Any:
-        """Return the answer of a service."""
+    def call(self, kind: Any, service: str, **fields: Any) -> Any:
+        """Return the answer of a service to a request with these fields."""
         client = self.client(kind, service)
-        self.wait_until(client.service_is_ready, _START_LIMIT, f'service {service}')
-        answer = client.call_async(request)
-        self.wait_until(answer.done, _TRANSITION_LIMIT, f'answer of {service}')
+        self.wait_until(client.service_is_ready, ANSWER_LIMIT, f'service {service}')
+        answer = client.call_async(kind.Request(**fields))
+        self.wait_until(answer.done, ANSWER_LIMIT, f'answer of {service}')
         return answer.result()
 
     def parameters_of(self, node: GraphNode) -> dict[str, object]:
         """Return {name: value} of a running node."""
-        name = node.full_name
-        names = self.call(ListParameters, f'{name}/list_parameters', ListParameters.Request()).result.names
-        request = GetParameters.Request(names=sorted(names))
-        values = map(
-            parameter_value_to_python, self.call(GetParameters, f'{name}/get_parameters', request).values
-        )
-        return dict(zip(request.names, values, strict=True))
+        names = sorted(self.call(ListParameters, f'{node.full_name}/list_parameters').result.names)
+        values = self.call(GetParameters, f'{node.full_name}/get_parameters', names=names).values
+        return dict(zip(names, map(parameter_value_to_python, values), strict=True))
 
-    def wait_for_services(self, nodes: Sequence[GraphNode]) -> None:
-        """Wait until the nodes can be configured."""
+    def change_states(self, nodes: Sequence[GraphNode], transition: str) -> dict[GraphNode, str]:
+        """Take nodes through a transition side by side; return {node: reason} of those that refuse."""
         for node in nodes:
             ready = self.client(ChangeState, f'{node.full_name}/change_state').service_is_ready
-            self.wait_until(ready, _START_LIMIT, f'start of {node.full_name}')
-
-    def change_states(self, nodes: Sequence[GraphNode], transition: int) -> dict[GraphNode, str]:
-        """Take nodes through a transition side by side; return {node: reason} of those that refuse."""
-        self.wait_for_services(nodes)
-        label, names = _LABELS[transition], ', '.join(node.full_name for node in nodes)
+            self.wait_until(ready, ANSWER_LIMIT, f'start of {node.full_name}')
         answers = {node: self._request(node, transition) for node in nodes}
-        self.wait_until(
-            lambda: all(answer.done() for answer in answers.values()),
-            _TRANSITION_LIMIT,
-            f'{label} of {names}',
-        )
+        what = f'{transition} of {", ".join(node.full_name for node in nodes)}'
+        self.wait_until(lambda: all(answer.done() for answer in answers.values()), ANSWER_LIMIT, what)
         refused = [node for node, answer in answers.items() if not answer.result().success]
-        return {node: f'{node.full_name} refused to {label}: {self._reason(node)}' for node in refused}
+        return {node: f'{node.full_name} refused to {transition}: {self._reason(node)}' for node in refused}
 
-    def transition(self, nodes: Sequence[GraphNode], transition: int) -> None:
+    def transition(self, nodes: Sequence[GraphNode], transition: str) -> None:
         """Take nodes through a transition, or raise `GraphError` with the reason of the first refusal."""
         for refusal in self.change_states(nodes, transition).values():
             raise GraphError(refusal)
         for node in nodes if transition == CONFIGURE else ():
             self.reports.observer.on_state(node, 'configured')
 
+    def deactivate(self, node: GraphNode) -> None:
+        """Deactivate a node if it is active."""
+        state = self.call(GetState, f'{node.full_name}/get_state').current_state
+        if state.id == State.PRIMARY_STATE_ACTIVE:
+            self.transition([node], DEACTIVATE)
+
     def try_to_deactivate(self, node: GraphNode) -> bool:
         """Return whether the node is not active any more, without a wait for a node that hangs."""
         if self.figures(node).get('state') != 'active':
             return True
-        assert self._executor is not None
         if not self.client(ChangeState, f'{node.full_name}/change_state').service_is_ready():
             return False
         answer = self._request(node, DEACTIVATE)
@@ -226,29 +213,25 @@ class Graph:
         """Publish the session of a mount."""
         self._sessions[mount].publish(String(data=text))
 
-    def wait_for_table(self, given_up: Callable[[], bool]) -> bool:
-        """Return whether a current-force table arrives before `given_up`."""
-        tables: list[Float64MultiArray] = []
-        subscription = self._subscribe(Float64MultiArray, CURRENT_FORCE_TABLE, tables.append)
-        self.wait_until(lambda: bool(tables) or given_up(), float('inf'), 'the force table')
-        self.node.destroy_subscription(subscription)
-        return bool(tables)
+    def missing_topics(self, node: GraphNode) -> list[str]:
+        """Return the topics that a node needs and that have no other side yet, by its own figures."""
+        figures = self.figures(node)
+        if 'unmatched' not in figures:
+            return ['its first diagnostics']
+        needed = {name_in(node.mount, name) for name in node.needs}
+        if node.is_a(RECORDER):
+            needed = {name_in(other.mount, name) for other in self.nodes for name in other.needs}
+            needed |= {name_in(mount, SESSION.name) for mount in self.mounts}
+        space = f'/{self.settings.namespace}'.replace('//', '/').rstrip('/')
+        return sorted({f'{space}/{name}' for name in needed} & {*figures['unmatched'].split(', ')})
 
-    def set_mark(self, report: Callable[[str], None]) -> None:
-        """Request a mark of the recorder; `report` takes the result."""
-        client = self.client(Trigger, f'{RECORDER.name}/mark')
+    def _waiting(self) -> list[str]:
+        """Return in words which nodes wait for which topics."""
+        lacking = {node.full_name: self.missing_topics(node) for node in self.nodes}
+        return [f'{name} waits for {", ".join(topics)}' for name, topics in lacking.items() if topics]
 
-        def answered(call: Any) -> None:
-            answer = call.result()
-            report('marked' if answer.success else f'no mark was set: {answer.message}')
-
-        if client.service_is_ready():
-            client.call_async(Trigger.Request()).add_done_callback(answered)
-        else:
-            report('no mark was set: the recorder is not there yet')
-
-    def _request(self, node: GraphNode, transition: int) -> Any:
-        request = ChangeState.Request(transition=Transition(id=transition))
+    def _request(self, node: GraphNode, transition: str) -> Any:
+        request = ChangeState.Request(transition=Transition(id=_TRANSITIONS[transition]))
         return self.client(ChangeState, f'{node.full_name}/change_state').call_async(request)
 
     def _reason(self, node: GraphNode) -> str:
@@ -258,32 +241,10 @@ class Graph:
             self.serve_once()
         return self.figures(node).get('sentence', '(no report)')
 
-    def _waiting(self) -> list[str]:
-        """Return in words which nodes wait for which topics, by their own figures."""
-        lacking = {node.full_name: self.missing_topics(node) for node in self.nodes}
-        return [f'{name} waits for {", ".join(topics)}' for name, topics in lacking.items() if topics]
-
-    def missing_topics(self, node: GraphNode) -> list[str]:
-        """Return the topics that a node needs and that have no other side yet, by its own figures."""
-        figures = self.figures(node)
-        if 'unmatched' not in figures:
-            return ['its first diagnostics']
-        prefix = '/'.join(['', *filter(None, [self.settings.namespace.strip('/'), node.mount]), ''])
-        names = {name.removeprefix(prefix) for name in figures['unmatched'].split(', ') if name}
-        needed = set(node.needs)
-        if node.is_a(RECORDER):
-            needed = {name_in(other.mount, name) for other in self.nodes for name in other.needs}
-            needed |= {name_in(mount, SESSION.name) for mount in self.mounts}
-        return sorted(names & needed)
-
-    def _subscribe(self, kind: Any, topic: Any, take: Callable[[Any], None], mount: str = '') -> Any:
-        return self.node.create_subscription(kind, name_in(mount, topic.name), take, recording_qos(topic))
-
     def _take_event(self, mount: str, message: String) -> None:
         self.reports.observer.on_mark(mount, read_mark(message.data, 0))
 
     def _take_down(self) -> None:
-        if self._executor is not None:
-            self._executor.shutdown()
-            self.node.destroy_node()
+        self._executor.shutdown()
+        self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)

@@ -14,12 +14,11 @@ from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, LogInfo, OpaqueFunction
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
-from launch.logging import get_logger
 
-from mount_bringup.graph.launch_arguments import texts_of
+from mount_bringup.graph.launch_arguments import arguments_of, texts_of
+from mount_bringup.graph.order import launch_order
 from mount_bringup.graph.processes import QUIET_START
-from mount_bringup.graph.run import GRAPHS, SUPERVISOR
-from mount_models.arithmetic.compiled import compilation_told
+from mount_bringup.graph.run import SUPERVISOR
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.process import environment_of_children
 from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
@@ -27,34 +26,28 @@ from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 _PATIENCE = '86400'  # s, chosen: the supervisor has limits of its own, and a recorder may write for long
 
 
-def launch_description(graph: str, config: str = '') -> LaunchDescription:
-    """Return the launch file of a graph; `config` is the name of a shipped parameter file, the default."""
+def launch_description(graph: str) -> LaunchDescription:
+    """Return the launch file of a graph; its shipped parameter file is the default of `config`."""
     prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
-    defaults = {}
-    if config:
-        folder = Path(get_package_share_directory('mount_bringup')) / 'config'
-        defaults['config'] = str(folder / config)
-    arguments, _ = GRAPHS[graph]()
+    config = Path(get_package_share_directory('mount_bringup')) / 'config' / f'{graph}.yaml'
     declared = [
         DeclareLaunchArgument(
             argument.name,
-            default_value=defaults.get(argument.name, argument.default),
+            default_value=str(config) if argument.name == 'config' else argument.default,
             description=argument.description,
-            choices=list(argument.choices) or None,
+            choices=argument.choices.split() or None,
         )
-        for argument in arguments
+        for argument in arguments_of(graph)
     ]
     return LaunchDescription([*declared, OpaqueFunction(function=partial(_supervisor, graph))])
 
 
 def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    arguments, order_of = GRAPHS[graph]()
-    given = {argument.name: context.launch_configurations[argument.name] for argument in arguments}
-    with compilation_told(get_logger('mount_bringup').info):  # the checks compute with the laws
-        # Where another launch file includes ours, an argument may be for that one.
-        if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
-            texts_of([word for word in sys.argv if ':=' in word], arguments)
-        order_of(given)
+    given = {argument.name: context.launch_configurations[argument.name] for argument in arguments_of(graph)}
+    # Where another launch file includes ours, an argument may be for that one.
+    if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
+        texts_of([word for word in sys.argv if ':=' in word], graph)
+    launch_order(graph, given)
     inherited = drop_real_time()
     if inherited and given['priority'] == '0':
         given['priority'] = str(inherited)

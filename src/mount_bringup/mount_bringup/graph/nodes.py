@@ -20,7 +20,7 @@ Figures = Mapping[str, str]
 
 @dataclass(frozen=True)
 class GraphNode:
-    """A lifecycle node: its name, its class in `package.node`, and the topics it cannot do without.
+    """A lifecycle node of the package of its name, and the topics that it cannot do without.
 
     `mount` is the namespace of its mount within that of the graph, empty where there is one mount alone, or
     for what all mounts share. An activation is tried `activations` times; attempts at which the machine was
@@ -28,11 +28,14 @@ class GraphNode:
     """
 
     name: str
-    package: str
-    class_name: str
-    needs: tuple[str, ...]
+    needs: tuple[str, ...] = ()
     activations: int = 1
     mount: str = ''
+
+    @property
+    def class_name(self) -> str:
+        """Its class in `node.py` of its package."""
+        return self.name.title().replace('_', '')
 
     @property
     def full_name(self) -> str:
@@ -44,36 +47,21 @@ class GraphNode:
         return self.name in {other.name for other in others}
 
 
-RECORDER = GraphNode('mount_recorder', 'mount_recorder', 'MountRecorder', ())
-DRIVER = GraphNode(
-    'mount_driver',
-    'mount_driver',
-    'MountDriver',
-    ('current_setpoint', 'displacement', 'coil_ripple', 'coil_temperature'),
-)
-SIM = GraphNode('mount_sim', 'mount_sim', 'MountSim', ())
+RECORDER = GraphNode('mount_recorder')
+DRIVER = GraphNode('mount_driver', ('current_setpoint', 'displacement', 'coil_ripple', 'coil_temperature'))
+SIM = GraphNode('mount_sim')
 INIT = GraphNode(
     'mount_init',
-    'mount_init',
-    'MountInit',
     ('coil_ripple', 'coil_temperature', 'current_setpoint'),
     activations=2,  # chosen
 )
-CONTROL = GraphNode(
-    'mount_control',
-    'mount_control',
-    'MountControl',
-    ('displacement', 'current_setpoint', 'air_gap', 'current_force_table'),
-)
+CONTROL = GraphNode('mount_control', ('displacement', 'current_setpoint', 'air_gap', 'current_force_table'))
 
 SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)
 """Start order: a subscriber before its publisher, and the coil's table before the node that uses it."""
 
 VEHICLE: tuple[GraphNode, ...] = (RECORDER, DRIVER, INIT, CONTROL)
 """The same in the car, where the electronics are real."""
-
-REPLAYED: tuple[GraphNode, ...] = (RECORDER, CONTROL)
-"""The nodes to which a recording is played."""
 
 
 def of_mounts(nodes: Sequence[GraphNode], mounts: Sequence[str]) -> tuple[GraphNode, ...]:
@@ -106,15 +94,12 @@ class Grouping(Enum):
 
 def groups(nodes: Sequence[GraphNode], grouping: Grouping) -> list[list[GraphNode]]:
     """Return the nodes of each process, in start order."""
-    if grouping is Grouping.TOGETHER:
-        return [list(nodes)]
-    if grouping is Grouping.APART:
-        return [[node] for node in nodes]
-
-    def beside(driver: GraphNode) -> list[GraphNode]:
-        return [node for node in nodes if node.is_a(DRIVER, INIT, CONTROL) and node.mount == driver.mount]
-
-    return [beside(node) if node.is_a(DRIVER) else [node] for node in nodes if not node.is_a(INIT, CONTROL)]
+    shared: dict[object, list[GraphNode]] = {}
+    for node in nodes:
+        composed = grouping is Grouping.COMPOSED and node.is_a(DRIVER, INIT, CONTROL)
+        place = grouping if grouping is Grouping.TOGETHER else node.mount if composed else node
+        shared.setdefault(place, []).append(node)
+    return list(shared.values())
 
 
 RESTART_LIMIT = 3

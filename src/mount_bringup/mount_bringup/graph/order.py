@@ -1,19 +1,18 @@
 """The graph that the arguments of a launch file order; `ros2 launch` is not needed here."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mount_bringup.chosen import chosen_control, control_parameters
 from mount_bringup.graph.domain import can_port, chosen_domain
-from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, VEHICLE_ARGUMENTS, LaunchArgument
+from mount_bringup.graph.launch_arguments import POLICY_OF_DAMPER, arguments_of
 from mount_bringup.graph.nodes import (
     CONTROL,
     DRIVER,
-    INIT,
     RECORDER,
     SIM,
+    SIMULATED,
     VEHICLE,
     GraphNode,
     GraphSettings,
@@ -23,18 +22,14 @@ from mount_bringup.graph.nodes import (
 )
 from mount_bringup.parameter_file import settings_of_file
 from mount_bringup.settings import (
-    NODES,
     SettingError,
     check_sample_rate,
     checked_settings,
     defaults_of_nodes,
     settings_of_mount,
 )
+from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
-from mount_init.parameters import InitParameters
-from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_models.quantity import with_flattened
-from mount_recorder.parameters import RecorderParameters
 from mount_ros.nodes.real_time import HIGHEST
 from mount_ros.topics import TOPICS
 
@@ -47,52 +42,52 @@ Settings = dict[str, dict[str, Any]]
 
 
 class LaunchOrder(NamedTuple):
-    """A graph as ordered by the arguments of a launch file; `duration` is in s, inf: until it is ended.
-
-    In a replay `bag` is played to it, `rate` times as fast as it was recorded.
-    """
+    """A graph as ordered by the arguments of a launch file; `duration` is in s, inf: until it is ended."""
 
     nodes: tuple[GraphNode, ...]
     settings: GraphSettings
-    scenario: str
     duration: float = float('inf')
-    bag: Path | None = None
-    rate: float = 1.0
 
 
-def vehicle_order(given: Texts) -> LaunchOrder:
-    """Return the graph in the car; a `ValueError` says what cannot be."""
-    order = launch_order(VEHICLE, VEHICLE_ARGUMENTS, given, 'car')
-    duration = given['duration']
-    return order._replace(duration=number_of('duration', duration, 1e9)) if duration else order
+def launch_order(graph: str, given: Texts) -> LaunchOrder:
+    """Return the graph of a launch file; a `ValueError` says what cannot be.
 
-
-def launch_order(
-    nodes: Sequence[GraphNode],
-    arguments: Sequence[LaunchArgument],
-    given: Texts,
-    scenario: str,
-    checked_mount: Callable[[Settings], Settings] = lambda settings: settings,
-) -> LaunchOrder:
-    """Return the graph of `nodes`; `checked_mount` checks and completes the settings of each mount."""
-    records = is_recorded(given)
-    mounts = _mount_names(given['mounts'])
+    Names, types and what must fit together are checked here; the range of a value is checked by its node.
+    """
+    nodes, records = SIMULATED if graph == 'sim' else VEHICLE, _is_recorded(given)
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
-    known = known_parameters(nodes)
+    mounts, known = _mount_names(given['mounts']), _known_parameters(nodes)
+    if SIM in nodes:  # not in the car
+        from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
+        from mount_sim.plant.places import mount_names
+
+        mount_names(given['mounts'])
     settings: Settings = {}
     for node in of_mounts(nodes, mounts):
         space = name_in(namespace, node.mount)
-        layers = of_file_and_arguments(arguments, given, known, space)
-        settings[node.full_name] = {**_bus(node, can_port(domain, space), known), **layers.get(node.name, {})}
+        own = settings_of_file(Path(given['config']), space, known) if given['config'] else {}
+        bus: dict[str, Any] = {'port': can_port(domain, space)} if node.is_a(DRIVER, SIM) else {}
+        if node.is_a(DRIVER) and SIM not in nodes:
+            bus |= _CAN_OF_VEHICLE
+        settings[node.full_name] = bus | own.get(node.name, {}) | _of_arguments(graph, given, node, known)
     if mounts:
-        _tell_buses_apart(mounts, settings, given)
+        _separate_buses(mounts, settings, given)
     settings = checked_settings(settings, known)
     for mount in mounts or ('',):
-        own = checked_mount(settings_of_mount(settings, mount))
-        settings[name_in(mount, CONTROL.name)] = own[CONTROL.name]
-        check_damper(given['damper'], own)
-        _check(own, known)
+        of_mount = settings_of_mount(settings, mount)
+        if SIM in nodes:
+            of_mount = with_control_of_mount(of_mount)
+            check_control_of_mount(of_mount)
+            settings[name_in(mount, CONTROL.name)] = of_mount.get(CONTROL.name, {})
+        check_sample_rate(of_mount, known)
+        policy = of_mount.get(CONTROL.name, {}).get('policy', DEFAULT)
+        if given['damper'] and policy != POLICY_OF_DAMPER:
+            raise SettingError(
+                f'damper:={given["damper"]} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
+                f'add policy:={POLICY_OF_DAMPER}'
+            )
     chosen = of_mounts([node for node in nodes if records or node is not RECORDER], mounts)
+    duration = given['duration'] if SIM not in nodes else ''  # the simulator ends its drive itself
     return LaunchOrder(
         nodes=chosen,
         settings=GraphSettings(
@@ -100,23 +95,16 @@ def launch_order(
             domain=domain,
             parameters={node.full_name: settings[node.full_name] for node in chosen},
             grouping=Grouping.COMPOSED if given['composed'] == 'true' else Grouping.APART,
-            restart_limit=number_of('restarts', given['restarts'], 1000, int),
-            **process_settings(given),
+            restart_limit=_number('restarts', given['restarts'], 1000, int),
+            priority=_number('priority', given['priority'], HIGHEST, int),
+            log_level=given['log_level'],
+            log_to_screen=True,
         ),
-        scenario=scenario,
+        duration=_number('duration', duration, 1e9) if duration else float('inf'),
     )
 
 
-def process_settings(given: Texts) -> dict[str, Any]:
-    """Return priority and log of the processes of a graph."""
-    return {
-        'priority': number_of('priority', given['priority'], HIGHEST, int),
-        'log_level': given['log_level'],
-        'log_to_screen': True,
-    }
-
-
-def is_recorded(given: Texts) -> bool:
+def _is_recorded(given: Texts) -> bool:
     """Return whether the graph records; refuse a recording without a folder or into one that exists."""
     recording = given['recording']
     if given['record'] != 'true':
@@ -131,57 +119,6 @@ def is_recorded(given: Texts) -> bool:
     return True
 
 
-def known_parameters(nodes: Sequence[GraphNode]) -> Settings:
-    """Return {node: {parameter: default}} of all that a parameter file can set."""
-    known, driver = defaults_of_nodes([node.name for node in nodes]), DriverParameters()
-    bus = {'interface': 'udp_multicast', 'channel': driver.channel, 'port': driver.port}
-    added = {SIM.name: bus, RECORDER.name: {'uri': '', 'mounts': '', 'topics': [t.name for t in TOPICS]}}
-    return {name: values | added.get(name, {}) for name, values in known.items()}
-
-
-def of_file_and_arguments(
-    arguments: Sequence[LaunchArgument], given: Texts, known: Settings, space: str
-) -> Settings:
-    """Return the settings that the parameter file gives the nodes in `space`, and the arguments above it."""
-    settings = settings_of_file(Path(given['config']), space, known) if given['config'] else {}
-    for argument in arguments:
-        text = given[argument.name]
-        for target in argument.sets if text else ():
-            node, _, name = target.partition('.')
-            if node in known:
-                value = _value(argument.name, text, known[node][name])
-                settings.setdefault(node, {})[name] = value
-    return settings
-
-
-def check_damper(damper: str, settings: Mapping[str, Mapping[str, Any]]) -> None:
-    """Raise `SettingError` where the policy takes no damper."""
-    policy = control_parameters(settings).policy
-    if damper and policy != POLICY_OF_DAMPER:
-        raise SettingError(
-            f'damper:={damper} is for policy {POLICY_OF_DAMPER}; instead received {policy}: '
-            f'add policy:={POLICY_OF_DAMPER}'
-        )
-
-
-def number_of(name: str, text: str, highest: float, kind: type = float) -> Any:
-    """Return the number in the text of an argument, within 0 .. `highest`."""
-    try:
-        number = kind(text)
-    except ValueError:
-        number = -1
-    if not 0 <= number <= highest:
-        raise SettingError(f'{name}:={text} must be a number within 0 .. {highest:g}')
-    return number
-
-
-def _bus(node: GraphNode, port: int, known: Settings) -> dict[str, Any]:
-    """Return the CAN bus of a node where neither file nor argument names one."""
-    if node.is_a(DRIVER):
-        return {'port': port} | ({} if SIM.name in known else _CAN_OF_VEHICLE)
-    return {'port': port} if node.is_a(SIM) else {}
-
-
 def _mount_names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(',')] if text else []
     if len(set(names)) < len(names) or not all(re.fullmatch('[a-z][a-z0-9_]*', name) for name in names):
@@ -189,7 +126,38 @@ def _mount_names(text: str) -> list[str]:
     return names
 
 
-def _tell_buses_apart(mounts: Sequence[str], settings: Settings, given: Texts) -> None:
+def _known_parameters(nodes: Sequence[GraphNode]) -> Settings:
+    """Return {node: {parameter: default}} of all that a parameter file can set."""
+    known, driver = defaults_of_nodes([node.name for node in nodes]), DriverParameters()
+    known[RECORDER.name] |= {'uri': '', 'mounts': '', 'topics': [topic.name for topic in TOPICS]}
+    if SIM in nodes:
+        known[SIM.name] |= {'interface': '', 'channel': driver.channel, 'port': driver.port}
+    return known
+
+
+def _of_arguments(graph: str, given: Texts, node: GraphNode, known: Settings) -> dict[str, Any]:
+    """Return the parameters of a node that arguments set."""
+    values = {}
+    for argument in arguments_of(graph):
+        text = given[argument.name]
+        for target in argument.sets.split() if text else ():
+            owner, _, name = target.partition('.')
+            if owner == node.name:
+                values[name] = _value(text, known[owner][name])
+    return values
+
+
+def _value(text: str, default: Any) -> Any:
+    """Return a text in the type of the default, or as it stands where it cannot be of that type."""
+    if isinstance(default, tuple):
+        return [part.strip() for part in text.split(',')]
+    try:
+        return type(default)(text)
+    except ValueError:
+        return text
+
+
+def _separate_buses(mounts: Sequence[str], settings: Settings, given: Texts) -> None:
     """Give each mount its bus, and name the mounts to the nodes that all share."""
     if given['port']:
         raise SettingError(f'port:={given["port"]} is for one mount; each of several has a port of its own')
@@ -218,21 +186,12 @@ def _tell_buses_apart(mounts: Sequence[str], settings: Settings, given: Texts) -
             )
 
 
-def _value(name: str, text: str, default: Any) -> Any:
-    if isinstance(default, str):
-        return text
-    if isinstance(default, tuple):
-        return [part.strip() for part in text.split(',')]
+def _number(name: str, text: str, highest: float, kind: type = float) -> Any:
+    """Return the number in the text of an argument, within 0 .. `highest`."""
     try:
-        return plain_yaml(text)
-    except YamlError as error:
-        raise SettingError(f'{name}:={text} {error}') from None
-
-
-def _check(settings: Settings, known: Settings) -> None:
-    """Raise the `ValueError` of the first parameter of a mount outside its range, before a node has it."""
-    sets = ((DRIVER, DriverParameters()), (RECORDER, RecorderParameters()), (INIT, InitParameters()))
-    for node, defaults in sets:
-        with_flattened(defaults, settings.get(node.name, {}))
-    check_sample_rate(settings, [name for name in NODES if name in known])
-    chosen_control(settings)
+        number = kind(text)
+    except ValueError:
+        number = -1
+    if not 0 <= number <= highest:
+        raise SettingError(f'{name}:={text} must be a number within 0 .. {highest:g}')
+    return number

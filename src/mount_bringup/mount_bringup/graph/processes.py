@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, groups, name_in
+from mount_bringup.graph.nodes import RECORDER, GraphNode, GraphSettings, name_in
 from mount_ros.nodes.process import environment_of_children
 
 QUIET_START = 'import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); '
@@ -25,19 +25,17 @@ _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for 
 class NodeProcess:
     """One process of the graph with the nodes that live in it.
 
-    It loads what it needs at once, and makes its nodes after `begin`.
+    It loads what it needs at once, and makes its nodes after `begin`. `reported`: the user knows of its end.
     """
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
         self.name = ' + '.join(node.full_name for node in nodes)
-        self.reported = False
-        """Whether the user knows of its end."""
-        stem = '_'.join(node.full_name.replace('/', '_') for node in nodes)
+        stem = self.name.replace('/', '_').replace(' + ', '_')
         self.log_file = folder / f'{stem}.log'
         self._settings = settings
         parameter_file = folder / f'{stem}.yaml'
-        parameter_file.write_text(parameter_text(nodes, settings))
+        parameter_file.write_text(_parameter_text(nodes, settings))
         self._command = [
             *(sys.executable, '-c', _program(nodes, settings.namespace), '--ros-args'),
             *('--params-file', str(parameter_file), '--log-level', settings.log_level),
@@ -45,6 +43,7 @@ class NodeProcess:
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
+        self.begun = self.reported = False
         with contextlib.ExitStack() as files:
             log = None if self._settings.log_to_screen else files.enter_context(self.log_file.open('ab'))
             return subprocess.Popen(
@@ -60,18 +59,19 @@ class NodeProcess:
         """Let it make its nodes."""
         assert self._process.stdin is not None
         self._process.stdin.close()
-
-    @property
-    def begun(self) -> bool:
-        """Whether it makes or has made its nodes."""
-        return self._process.stdin is None or self._process.stdin.closed
+        self.begun = True
 
     def start_again(self) -> None:
         """Kill what is left of the process and start it with the same parameters; its log goes on."""
         self._process.kill()
         self._process.wait()
-        self._process, self.reported = self._start(), False
+        self._process = self._start()
         self.begin()
+
+    @property
+    def pid(self) -> int:
+        """The number of the process that runs now."""
+        return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -79,12 +79,12 @@ class NodeProcess:
         return self._process.poll()
 
     def last_words(self) -> str:
-        """Return the last error line of the log, or its last line."""
+        """Return the last error line of the log, or its last line, and where the log is."""
         if self._settings.log_to_screen:
-            return '(see its log above)'
+            return 'see its log above'
         lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
         errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
-        return (errors or lines or ['(its log is empty)'])[-1]
+        return f'{(errors or lines or ["(its log is empty)"])[-1]} (log: {self.log_file})'
 
     def interrupt(self) -> None:
         """Send SIGINT: a node goes to 0 A and ends with code 0."""
@@ -112,57 +112,26 @@ class NodeProcess:
         return sum(file.stat().st_size for file in files)
 
 
-class NodeProcesses:
-    """All processes of a graph, in start order."""
+def end_processes(processes: Sequence[NodeProcess], *, at_once: bool) -> list[str]:
+    """End processes, last started first; return a sentence per unclean end.
 
-    def __init__(self) -> None:
-        self._processes: list[NodeProcess] = []
-
-    def start(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path) -> None:
-        """Start the processes of `nodes`; parameter files and logs are in `folder`."""
-        for group in groups(nodes, settings.grouping):
-            self._processes.append(NodeProcess(group, settings, folder))
-
-    def begin(self) -> None:
-        """Let them make their nodes."""
-        for process in self._processes:
-            process.begin()
-
-    def ended(self) -> NodeProcess | None:
-        """Return the first process that has ended, which counts as reported from now on."""
-        for process in self._processes:
-            if process.exit_code is not None:
-                process.reported = True
-                return process
-        return None
-
-    def start_again(self, nodes: Sequence[GraphNode]) -> None:
-        """End what is left of the processes of `nodes`, and start them again."""
-        for process in self._processes:
-            if {*process.nodes} & {*nodes}:
-                process.start_again()
-
-    def end(self, *, at_once: bool = False) -> list[str]:
-        """End all, last started first; return a sentence per unclean end.
-
-        One after the other, so that none drives the coil without those that watch it, or `at_once`.
-        """
-        processes = self._processes[::-1]
-        known = [process for process in processes if process.reported or not process.begun]
-        died = [process for process in processes if process.exit_code is not None]
-        complaints = []
-        for process in processes if at_once else ():
+    One after the other, so that none drives the coil without those that watch it, or `at_once`.
+    """
+    known = [process for process in processes if process.reported or not process.begun]
+    died = [process for process in processes if process.exit_code is not None]
+    complaints = []
+    for process in processes[::-1] if at_once else ():
+        process.interrupt()
+    for process in processes[::-1]:
+        if not at_once:
             process.interrupt()
-        for process in processes:
-            if not at_once:
-                process.interrupt()
-            begin = time.monotonic()
-            code = process.wait()
-            if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
-                after = f'after {time.monotonic() - begin:.1f} s'
-                when = 'before it was told to end' if process in died else after
-                complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
-        return complaints
+        begin = time.monotonic()
+        code = process.wait()
+        if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
+            after = f'after {time.monotonic() - begin:.1f} s'
+            when = 'before the end of the graph' if process in died else after
+            complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
+    return complaints
 
 
 def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[str, str]:
@@ -176,19 +145,19 @@ def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[st
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
     """Return a program of Python; each node has a namespace, which no remapping of ROS could tell apart."""
-    imports = ''.join(f'from {node.package}.node import {node.class_name}; ' for node in dict.fromkeys(nodes))
-    creates = []
+    imports, creates = 'import sys; from functools import partial; ', []
     for node in nodes:
         space = '/' + name_in(namespace.strip('/'), node.mount).rstrip('/')
+        imports += f'from {node.name}.node import {node.class_name}; '
         creates.append(f'partial({node.class_name}, namespace={space!r})')
-    run = 'from functools import partial; from mount_ros.nodes.process import run_nodes; import sys; '
-    return f'{QUIET_START}{imports}{run}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
+    imports += 'from mount_ros.nodes.process import run_nodes; '
+    return f'{QUIET_START}{imports}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
 
 
-def parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
+def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:
     """Return a parameter file of ROS for these nodes, whatever their namespace."""
     tables = {
         f'/**/{node.full_name}': {'ros__parameters': dict(settings.parameters.get(node.full_name, {}))}
         for node in nodes
     }
-    return yaml.safe_dump(tables, sort_keys=True)
+    return yaml.safe_dump(tables)

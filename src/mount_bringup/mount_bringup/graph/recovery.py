@@ -1,10 +1,9 @@
-"""Brings a running graph back to work after a failure of nodes, or initialises its mounts again on request.
-
-Only in real time: in lock-step a failed node ends the run.
-"""
+"""What follows the failure of nodes, how often, and its steps; only in real time."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -13,157 +12,237 @@ from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from mount_bringup.graph.activation import Activation
-from mount_bringup.graph.failures import (
-    FailureCount,
-    NodeFailure,
-    NodesFailedError,
-    RecoveryAction,
-    Restart,
-    recovery_action,
-    table_holds,
-)
-from mount_bringup.graph.graph import CONFIGURE, DEACTIVATE, Graph
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, GraphError, GraphNode
-from mount_bringup.graph.processes import NodeProcesses
+from mount_bringup.graph.graph import ANSWER_LIMIT, CONFIGURE, Graph
+from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, RECORDER, SIM, Figures, GraphError, GraphNode
+from mount_bringup.graph.processes import NodeProcess
+from mount_models.sampling import sample_time_ns
 from mount_recorder.folders import next_recording
 from mount_ros.messages.verdicts import flags_of
 
-_START_LIMIT = 60.0  # s, chosen
-_REQUEST_PERIOD = 0.5  # s, chosen: the middleware may still know the dead predecessor, and ask that one
+_WINDOW = 60.0  # s, chosen: within which the failures of a node are counted
+
+
+class RecoveryAction(Enum):
+    """How a graph comes back to work after a failure, in words; those that include others first."""
+
+    END = 'the graph ends'
+    INITIALISE = 'the mount is initialised anew'
+    DAMP_ON = 'it is started again and activated with the table that holds'
+    RECORD_ANEW = 'it is started again with a new recording'
+    STAND_BY = 'it is started again and left inactive, for its result still holds'
+
+
+ACTIONS: dict[str, RecoveryAction] = {
+    RECORDER.name: RecoveryAction.RECORD_ANEW,
+    # Nothing of the last initialisation is known to hold of electronics to which no driver was connected.
+    DRIVER.name: RecoveryAction.INITIALISE,
+    # Gaps and table stand as long as the electronics do; a ramp would only take the damping away.
+    INIT.name: RecoveryAction.STAND_BY,
+    CONTROL.name: RecoveryAction.DAMP_ON,
+    # The electronics themselves: there is nothing left to drive.
+    SIM.name: RecoveryAction.END,
+}
+"""The action after the failure of each node."""
+
+
+class NodesFailedError(GraphError):
+    """Nodes ended or hang, or none where the electronics lost their initialisation; the text is why."""
+
+    def __init__(self, nodes: Collection[GraphNode], reason: str):
+        super().__init__(reason)
+        self.nodes = nodes
+
+
+@dataclass(frozen=True)
+class Restart:
+    """A recovery: when the failure was seen (ns, system clock), why, and how long it took (s)."""
+
+    time: int
+    nodes: tuple[GraphNode, ...]
+    reason: str
+    action: RecoveryAction
+    took: float
+
+    @property
+    def sentence(self) -> str:
+        """The failure, the action and its duration, for people."""
+        return f'{self.reason}; {self.action.value}: back after {self.took:.1f} s'
+
+
+def recovery_action(nodes: Collection[GraphNode], *, table_holds: bool) -> RecoveryAction:
+    """Return the action after the failure of nodes, of the electronics where there are none.
+
+    A control without a valid table would only be refused, and electronics that were reset have forgotten all.
+    """
+    actions = {ACTIONS[node.name] for node in nodes} or {RecoveryAction.INITIALISE}
+    if RecoveryAction.DAMP_ON in actions and (RecoveryAction.STAND_BY in actions or not table_holds):
+        actions.add(RecoveryAction.INITIALISE)
+    return next(action for action in RecoveryAction if action in actions)
+
+
+def table_holds(driver: Figures, init: Figures) -> bool:
+    """Return whether the table of `mount_init` is of the measurements that come now, by the figures of both.
+
+    It is where the driver has taken samples without a break since before the table was made. A driver that
+    was activated since, or saw the electronics pause or restart, cannot say so.
+    """
+    try:
+        whole = int(driver['restarts']) == 0 == int(driver['gaps'])
+        period = sample_time_ns(float(driver['sample_rate']))
+        measured = (int(driver['samples']) + int(driver['lost'])) * period
+        since = int(driver['last_stamp']) - int(init['last_stamp'])
+    except (KeyError, ValueError):
+        return False
+    both_active = driver.get('state') == init.get('state') == 'active'
+    return both_active and whole and measured > since and not flags_of(driver).needs_initialisation
 
 
 class Recovery:
-    """Recovers from failures and keeps each one as a `Restart`; `limit` as in `FailureCount`."""
+    """Recovers from failures and keeps each as a `Restart`.
 
-    def __init__(self, graph: Graph, processes: NodeProcesses, activation: Activation, limit: int):
+    More failures of a node within a minute than `restart_limit` of the settings end the graph; 0: the first.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        processes: Sequence[NodeProcess],
+        activate: Callable[[Sequence[GraphNode]], None],
+    ):
         self.restarts: list[Restart] = []
         self.report: Callable[[str], None] = lambda sentence: None
         """Takes the sentence about each failure at once."""
-        self._graph, self._processes, self._activation = graph, processes, activation
-        self._count = FailureCount(limit)
+        self._graph, self._processes, self._activate = graph, processes, activate
+        self._times: dict[str, list[float]] = {}  # node -> of its failures, s on the steady clock
         self._celsius: dict[str, float] = {}  # driver -> coil temperature of its last report
 
-    def recover(self, failure: NodeFailure) -> None:
+    def recover(self, failure: NodesFailedError) -> None:
         """Return when the graph works again; raise `GraphError` where it is given up."""
-        begin, at = time.monotonic(), time.time_ns()
-        self._note(failure, failure)
-        active = {node for node in self._graph.nodes if self._graph.figures(node).get('state') == 'active'}
+        begin, at, figures = time.monotonic(), time.time_ns(), self._graph.figures
+        active = {node for node in self._graph.nodes if figures(node).get('state') == 'active'}
+        nodes: dict[GraphNode, None] = {}
+        reasons: list[str] = []
         while True:
+            self._count(failure)
+            nodes |= dict.fromkeys(failure.nodes)
+            reasons.append(str(failure))
+            for node in failure.nodes:
+                if node.is_a(DRIVER) and flags_of(figures(node)).coil_model_known:
+                    self._celsius[node.full_name] = float(figures(node)['coil_model_celsius'])
+            self.report(f'{failure}; {self._action(nodes).value}')
             try:
-                action = self._bring_back(failure, active)
+                action = self._bring_back(nodes, active)
                 break
-            except NodesFailedError as more:
-                failure = failure.with_more(more.failure)
-                self._note(more.failure, failure)
-        self.restarts.append(Restart(at, failure, action, time.monotonic() - begin))
+            except NodesFailedError as another:
+                failure = another
+        took = time.monotonic() - begin
+        self.restarts.append(Restart(at, tuple(nodes), '; then '.join(reasons), action, took))
 
-    def _note(self, failure: NodeFailure, whole: NodeFailure) -> None:
-        """Count and report a failure, the last part of a `whole`; one that ends the graph is in the error."""
-        self._count.note(failure, time.monotonic())
-        for node in failure.nodes:
-            figures = self._graph.figures(node)
-            if node.is_a(DRIVER) and flags_of(figures).coil_model_known:
-                self._celsius[node.full_name] = float(figures['coil_model_celsius'])
-        self.report(f'{failure.reason}; {self._action(whole).value}')
+    def initialise_again(self, mount: str) -> str:
+        """Return the gaps of a new initialisation: 0 A, a ramp, a table, and an activation of the control.
 
-    def _bring_back(self, failure: NodeFailure, active: set[GraphNode]) -> RecoveryAction:
-        graph, action = self._graph, self._action(failure)
-        for node in failure.nodes:
+        Of the mount of this name, of all if it is empty. Where it raises `GraphError` control is not active.
+        """
+        graph = self._graph
+        nodes = self._chain({mount} if mount else ())
+        for node in reversed(nodes):  # control first: damping off, 0 A
+            graph.deactivate(node)
+        graph.wait_for_matches()
+        for node in nodes:
+            self._activate([node])
+        inits = [node for node in nodes if node.is_a(INIT)]
+        return '; '.join(f'{node.full_name}: {graph.fresh_figures(node)["sentence"]}' for node in inits)
+
+    def _count(self, failure: NodesFailedError) -> None:
+        """Count a failure; raise `GraphError` where it ends the graph."""
+        limit = self._graph.settings.restart_limit
+        if limit == 0:
+            raise failure
+        if any(ACTIONS[node.name] is RecoveryAction.END for node in failure.nodes):
+            raise GraphError(f'{failure}; without it there is no coil to drive: the graph ends')
+        now = time.monotonic()
+        for name in [node.full_name for node in failure.nodes] or ['electronics']:
+            times = [at for at in self._times.get(name, ()) if now - at <= _WINDOW] + [now]
+            self._times[name] = times
+            if len(times) > limit:
+                raise GraphError(
+                    f'{failure}; {name} was lost {len(times)} times within {_WINDOW:g} s '
+                    f'(limit {limit}), so the graph is given up at 0 A: read the logs for the cause'
+                )
+
+    def _bring_back(self, failed: Collection[GraphNode], active: set[GraphNode]) -> RecoveryAction:
+        graph, action = self._graph, self._action(failed)
+        chain = self._chain_of(failed)
+        wanted = {node for node in failed if not node.is_a(INIT)} & active
+        for node in failed:
             graph.reports.forget(node)
-        # First: each wait for the others would find them failed once more.
-        self._processes.start_again(failure.nodes)
+        for process in self._processes:  # first: each wait for the others would find them failed once more
+            if {*process.nodes} & {*failed}:
+                process.start_again()
         if action is RecoveryAction.INITIALISE:
-            for node in self._of_mounts(failure, CONTROL, INIT, DRIVER):
-                if node not in failure.nodes:
-                    deactivate(graph, node)
-        for node in (node for node in graph.nodes if node in failure.nodes):
-            self._wait_for_start(node)
-            self._prepare(node, action)
-            graph.transition([node], CONFIGURE)
+            wanted |= {node for node in chain if node in active or not node.is_a(CONTROL)}
+            for node in reversed(chain):
+                if node not in failed:
+                    graph.deactivate(node)
+        for node in graph.nodes:
+            if node in failed:
+                self._wait_for_start(node)
+                self._prepare(node, action)
+                graph.transition([node], CONFIGURE)
         graph.wait_for_matches()
         if action is RecoveryAction.DAMP_ON:
-            for driver in self._of_mounts(failure, DRIVER):
-                graph.fresh_figures(driver)
-            if self._action(failure) is not action:  # a later break is seen by the control itself
-                return self._bring_back(failure, active)
-        wanted = {node for node in failure.nodes if not node.is_a(INIT)} & active
-        if action is RecoveryAction.INITIALISE:
-            wanted |= {*self._of_mounts(failure, DRIVER, INIT)}
-            wanted |= {*self._of_mounts(failure, CONTROL)} & active
+            for node in chain:
+                if node.is_a(DRIVER):
+                    graph.fresh_figures(node)
+            if self._action(failed) is not action:  # a later break is seen by the control itself
+                return self._bring_back(failed, active)
         for node in graph.nodes:
             if node in wanted:
-                self._activation.activate([node])
+                self._activate([node])
         return action
 
-    def _action(self, failure: NodeFailure) -> RecoveryAction:
-        figures = self._graph.figures
-        pairs = zip(self._of_mounts(failure, DRIVER), self._of_mounts(failure, INIT), strict=True)
-        holds = all(table_holds(figures(driver), figures(init)) for driver, init in pairs)
-        return recovery_action(failure, table_holds=holds)
+    def _action(self, failed: Collection[GraphNode]) -> RecoveryAction:
+        chain, figures = self._chain_of(failed), self._graph.figures
+        drivers, inits = ([figures(node) for node in chain if node.is_a(kind)] for kind in (DRIVER, INIT))
+        return recovery_action(failed, table_holds=all(map(table_holds, drivers, inits)))
 
-    def _of_mounts(self, failure: NodeFailure, *kinds: GraphNode) -> list[GraphNode]:
-        """Return the nodes of these kinds in the mounts of a failure; one of the electronics is of all."""
-        mounts = {node.mount for node in failure.nodes if node.is_a(DRIVER, INIT, CONTROL)}
-        return [
-            node
-            for kind in kinds
-            for node in self._graph.nodes
-            if node.is_a(kind) and (node.mount in mounts or not failure.nodes)
-        ]
+    def _chain_of(self, failed: Collection[GraphNode]) -> list[GraphNode]:
+        """Return the nodes of the mounts of a failure; one of the electronics is of all."""
+        mounts = {node.mount for node in failed if node.is_a(DRIVER, INIT, CONTROL)}
+        return self._chain(mounts) if mounts or not failed else []
+
+    def _chain(self, mounts: Collection[str]) -> list[GraphNode]:
+        """Return driver, initialisation and control of these mounts, of all if there are none."""
+        chain = [node for node in self._graph.nodes if node.is_a(DRIVER, INIT, CONTROL)]
+        return [node for node in chain if not mounts or node.mount in mounts]
 
     def _wait_for_start(self, node: GraphNode) -> None:
         """Wait until the new node answers: not yet configured."""
         client = self._graph.client(GetState, f'{node.full_name}/get_state')
         answers: list[Any] = []
-        requested = 0.0
 
         def started() -> bool:
-            nonlocal requested
-            if time.monotonic() - requested > _REQUEST_PERIOD and client.service_is_ready():
-                requested = time.monotonic()
+            # Again and again: the middleware may still know the dead predecessor, and ask that one.
+            if client.service_is_ready():
                 answers.append(client.call_async(GetState.Request()))
-            return any(
-                answer.done() and answer.result().current_state.id == State.PRIMARY_STATE_UNCONFIGURED
-                for answer in answers
-            )
+            states = [answer.result().current_state.id for answer in answers if answer.done()]
+            return State.PRIMARY_STATE_UNCONFIGURED in states
 
-        self._graph.wait_until(started, _START_LIMIT, f'start of {node.full_name} again')
+        self._graph.wait_until(started, ANSWER_LIMIT, f'start of {node.full_name} again')
 
     def _prepare(self, node: GraphNode, action: RecoveryAction) -> None:
+        """Set what a node that is started again needs besides the parameters of its start."""
         if node.is_a(RECORDER):
-            first = Path(str(self._graph.parameters[node.full_name]['uri']))
-            self._set(node, 'uri', str(next_recording(first)))
+            uri = self._graph.settings.parameters[node.full_name]['uri']
+            self._set(node, 'uri', str(next_recording(Path(str(uri)))))
         elif node.full_name in self._celsius:
             self._set(node, 'coil_celsius_before', self._celsius[node.full_name])
         elif node.is_a(CONTROL):
             self._set(node, 'measured_before', action is RecoveryAction.DAMP_ON)
 
     def _set(self, node: GraphNode, name: str, value: object) -> None:
-        request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        result = self._graph.call(SetParameters, f'{node.full_name}/set_parameters', request).results[0]
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        service = f'{node.full_name}/set_parameters'
+        [result] = self._graph.call(SetParameters, service, parameters=parameters).results
         if not result.successful:
             raise GraphError(f'{node.full_name} refused {name}: {result.reason}')
-
-
-def deactivate(graph: Graph, node: GraphNode) -> None:
-    """Deactivate a node if it is active."""
-    state = graph.call(GetState, f'{node.full_name}/get_state', GetState.Request()).current_state
-    if state.id == State.PRIMARY_STATE_ACTIVE:
-        graph.transition([node], DEACTIVATE)
-
-
-def initialise_again(graph: Graph, activation: Activation, mount: str) -> str:
-    """Return the gaps of a new initialisation: 0 A, a ramp, a table, and an activation of the control.
-
-    Of the mount of this name, of all if it is empty. Where it raises `GraphError` control is not active.
-    """
-    nodes = [node for node in graph.nodes if node.is_a(DRIVER, INIT, CONTROL)]
-    nodes = [node for node in nodes if not mount or node.mount == mount]
-    for node in reversed(nodes):  # control first: damping off, 0 A
-        deactivate(graph, node)
-    graph.wait_for_matches()
-    for node in nodes:
-        activation.activate([node])
-    inits = [node for node in nodes if node.is_a(INIT)]
-    return '; '.join(f'{node.full_name}: {graph.fresh_figures(node)["sentence"]}' for node in inits)

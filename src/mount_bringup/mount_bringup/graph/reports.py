@@ -1,11 +1,10 @@
 """The last report of each node on `/diagnostics`, and the nodes that are silent."""
 
 import time
-from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from mount_bringup.graph.nodes import CONTROL, DRIVER, Figures, GraphError, GraphNode
+from mount_bringup.graph.nodes import CONTROL, DRIVER, Figures, GraphError, GraphNode, name_in
 from mount_ros.messages.event import Mark
 from mount_ros.messages.verdicts import flags_of, verdicts_in
 from mount_ros.nodes.diagnostics import Level
@@ -13,7 +12,6 @@ from mount_ros.nodes.diagnostics import Level
 SILENCE_LIMIT = 4.0
 """Seconds (chosen) without diagnostics, which come once a second, until a node is treated as failed."""
 _LONGEST_PAUSE = 0.5  # s, chosen: ten times the period in which the supervisor checks
-_NANOSECONDS = 1_000_000_000
 _LATEST_ARRIVAL = 2.0  # s, chosen: until then a report that was sent before an activation has arrived
 
 
@@ -30,74 +28,36 @@ class GraphObserver:
         """Receive a mark on the topic `event` of a mount."""
 
 
-class Silence:
-    """Detects nodes without a report for `SILENCE_LIMIT`; times (s) on the steady clock.
-
-    Time in which `silent` is not called does not count: this process may have been stopped itself.
-    """
-
-    def __init__(self) -> None:
-        self._reported: dict[str, float] = {}
-        self._checked: float | None = None
-
-    def note(self, name: str, now: float) -> None:
-        """Note a report of a node: it is expected to go on."""
-        self._reported[name] = now
-
-    def forget(self, name: str) -> None:
-        """Expect nothing of a node until its next report."""
-        self._reported.pop(name, None)
-
-    def pause(self) -> None:
-        """Count from the next check on."""
-        self._reported = dict.fromkeys(self._reported, float('inf'))
-
-    def silent(self, now: float) -> list[str]:
-        """Return the names of the silent nodes."""
-        checked, self._checked = self._checked, now
-        stopped = max(0.0, now - checked - _LONGEST_PAUSE) if checked is not None else 0.0
-        self._reported = {name: min(last + stopped, now) for name, last in self._reported.items()}
-        return [name for name, last in self._reported.items() if now - last > SILENCE_LIMIT]
-
-
-def silence_sentence(names: Sequence[str]) -> str:
-    """Return the sentence about silent nodes: value, limit and remedy."""
-    return (
-        f'{", ".join(names)}: no diagnostics for {SILENCE_LIMIT:g} s (limit {SILENCE_LIMIT:g} s): treated as '
-        'failed; check its log and the CPU load'
-    )
-
-
 class NodeReports:
-    """The last report of each node in `namespace`."""
+    """The last report of each of `nodes` in `namespace`; times (s) on the steady clock."""
 
-    def __init__(self, nodes: Sequence[GraphNode], namespace: str):
-        self.silence = Silence()
+    def __init__(self, nodes: tuple[GraphNode, ...], namespace: str):
         self.observer = GraphObserver()
-        self._nodes = {node.full_name: node for node in nodes}
-        self._space = f'{namespace.strip("/")}/'.lstrip('/')
+        self._nodes = nodes
+        self._names = {name_in(namespace.strip('/'), node.full_name): node.full_name for node in nodes}
         self._figures: dict[str, dict[str, str]] = {}
-        self._activated: dict[str, tuple[int, float]] = {}  # time on the system clock (ns), steady clock (s)
+        self._reported: dict[str, float] = {}
+        self._checked = float('inf')
+        self._activated: dict[str, tuple[int, float]] = {}  # time on the system clock (ns), and on the steady
 
     def take(self, message: DiagnosticArray) -> None:
         """Take a message of `/diagnostics`, which all mounts of the car share."""
-        sent = message.header.stamp.sec * _NANOSECONDS + message.header.stamp.nanosec
+        now, stamp = time.monotonic(), message.header.stamp
         for report in verdicts_in(message):
-            name = report.node.removeprefix(self._space)
-            if name not in self._nodes or not report.node.startswith(self._space):
+            if report.node not in self._names:
                 continue
-            self.silence.note(name, time.monotonic())
+            name = self._names[report.node]
             figures = {**report.figures, 'level': str(report.level), 'sentence': report.sentence}
-            stamp, begin = self._activated.get(name, (0, 0.0))
-            if sent < stamp and time.monotonic() < begin + _LATEST_ARRIVAL:
-                figures['state'] = 'active'  # the report was sent before the activation
-            else:
+            since, at = self._activated.get(name, (0, 0.0))
+            if stamp.sec * 1_000_000_000 + stamp.nanosec >= since:
                 self._activated.pop(name, None)  # the system clock may step back, and all stamps with it
-            self._figures[name] = figures
+            elif now < at + _LATEST_ARRIVAL:
+                figures['state'] = 'active'  # the report was sent before the activation
+            self._reported[name], self._figures[name] = now, figures
             self.observer.on_report(name, figures)
 
     def figures(self, node: GraphNode) -> dict[str, str]:
-        """Return the last report of a node; empty if there is none."""
+        """Return the last report of a node: its figures, `level` and `sentence`; empty if there is none."""
         return self._figures.get(node.full_name, {})
 
     def note_active(self, node: GraphNode) -> None:
@@ -107,24 +67,37 @@ class NodeReports:
         self.observer.on_state(node, 'active')
 
     def forget(self, node: GraphNode) -> None:
-        """Forget the report of a node: it is no longer true."""
-        self._figures.pop(node.full_name, None)
-        self._activated.pop(node.full_name, None)
-        self.silence.forget(node.full_name)
+        """Forget the report of a node, which is no longer true, and expect none until the next."""
+        for known in (self._figures, self._activated, self._reported):
+            known.pop(node.full_name, None)
+
+    def pause_silence(self) -> None:
+        """Count silence from the next `silent` on."""
+        self._reported = dict.fromkeys(self._reported, float('inf'))
+
+    def silent(self) -> list[str]:
+        """Return the names of the nodes without a report for `SILENCE_LIMIT`.
+
+        Time in which this is not called does not count: this process may have been stopped itself.
+        """
+        now = time.monotonic()
+        stopped = max(0.0, now - self._checked - _LONGEST_PAUSE)
+        self._checked = now
+        self._reported = {name: min(last + stopped, now) for name, last in self._reported.items()}
+        return [name for name, last in self._reported.items() if now - last > SILENCE_LIMIT]
 
     def check_fatal(self) -> None:
         """Raise `GraphError` if the report of a node is fatal for the graph."""
-        for name, node in self._nodes.items():
+        for node in self._nodes:
             figures = self.figures(node)
             if flags_of(figures).fatal:
-                raise GraphError(f'{name}: {figures["sentence"]}{self._unanswered(figures)}')
+                raise GraphError(f'{node.full_name}: {figures["sentence"]}{self._unanswered(figures)}')
 
     def initialisation_request(self) -> str:
         """Return why a node requests a new initialisation, or an empty text."""
-        for name, node in self._nodes.items():
-            figures = self.figures(node)
-            if flags_of(figures).needs_initialisation:
-                return f'{name}: {figures["sentence"]}'
+        for node in self._nodes:
+            if flags_of(self.figures(node)).needs_initialisation:
+                return f'{node.full_name}: {self.figures(node)["sentence"]}'
         return ''
 
     def complaints(self) -> str:
@@ -139,8 +112,8 @@ class NodeReports:
     def _unanswered(self, figures: Figures) -> str:
         """Return the first node of the chain that has not handled the sample which waits for its answer."""
         waiting = figures.get('waiting_stamp', '')
-        for name, node in self._nodes.items() if waiting.isdigit() else ():
+        for node in self._nodes if waiting.isdigit() else ():
             handled = self.figures(node).get('last_stamp', '')
             if node.is_a(DRIVER, CONTROL) and (not handled.isdigit() or int(handled) < int(waiting)):
-                return f'; {name} does not answer'
+                return f'; {node.full_name} does not answer'
         return ''

@@ -7,16 +7,15 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from rclpy.logging import get_logger
 
-from mount_bringup.graph.domain import domain_locks
-from mount_bringup.graph.launch_arguments import VEHICLE_ARGUMENTS, LaunchArgument, texts_of
-from mount_bringup.graph.nodes import GraphError
-from mount_bringup.graph.order import LaunchOrder, Texts, vehicle_order
-from mount_bringup.graph.player import Player
+from mount_bringup.graph.domain import domain_lock
+from mount_bringup.graph.launch_arguments import GRAPHS, texts_of
+from mount_bringup.graph.nodes import SIM, GraphError
+from mount_bringup.graph.order import LaunchOrder, launch_order
 from mount_bringup.graph.shutdown import Interrupted, ending_signals
 from mount_bringup.graph.supervisor import Parameters, Supervisor
 from mount_bringup.settings import SettingError
@@ -25,29 +24,6 @@ from mount_ros.environment import prepare_environment
 from mount_ros.nodes.shutdown import end_process
 
 SUPERVISOR = 'mount_supervisor'
-
-LaunchFile = tuple[Sequence[LaunchArgument], Callable[[Texts], LaunchOrder]]
-"""The arguments of a launch file, and the function that makes an order of their texts."""
-
-
-def _vehicle() -> LaunchFile:
-    return VEHICLE_ARGUMENTS, vehicle_order
-
-
-def _sim() -> LaunchFile:
-    from mount_bringup.graph.simulation import SIM_ARGUMENTS, sim_order
-
-    return SIM_ARGUMENTS, sim_order
-
-
-def _replay() -> LaunchFile:
-    from mount_bringup.graph.replay import REPLAY_ARGUMENTS, replay_order
-
-    return REPLAY_ARGUMENTS, replay_order
-
-
-GRAPHS: dict[str, Callable[[], LaunchFile]] = {'vehicle': _vehicle, 'sim': _sim, 'replay': _replay}
-"""The graphs by the name of their launch file; each loads no more than it needs."""
 
 
 def main() -> None:
@@ -61,7 +37,6 @@ def main() -> None:
 
 def run(command: Sequence[str]) -> int:
     """Run the graph of a command line and return the exit code."""
-    logger = get_logger(SUPERVISOR)
     if '--help' in command:
         print(
             f'usage: {SUPERVISOR} {"|".join(GRAPHS)} [ARGUMENT:=TEXT ...]; arguments as of the launch files'
@@ -71,34 +46,32 @@ def run(command: Sequence[str]) -> int:
         order = ordered(command)
         mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
         with (
-            domain_locks(order.settings.domain, order.settings.namespace, mounts),
+            domain_lock(order.settings.domain, order.settings.namespace, mounts),
             tempfile.TemporaryDirectory(prefix=f'{SUPERVISOR}_') as folder,
         ):
             return _supervise(order, Path(folder))
     except ValueError as error:
-        logger.fatal(str(error))
+        get_logger(SUPERVISOR).fatal(str(error))
         return 1
 
 
 def ordered(command: Sequence[str]) -> LaunchOrder:
     """Return the order of a command line; a `ValueError` says what cannot be."""
-    name, *words = command or ['']
-    if name not in GRAPHS:
-        raise SettingError(f'{SUPERVISOR} {name}: the first word must be one of {", ".join(GRAPHS)}')
-    arguments, order_of = GRAPHS[name]()
-    return order_of(texts_of(words, arguments))
+    graph, *words = command or ['']
+    if graph not in GRAPHS:
+        raise SettingError(f'{SUPERVISOR} {graph}: the first word must be one of {", ".join(GRAPHS)}')
+    return launch_order(graph, texts_of(words, graph))
 
 
 def _supervise(order: LaunchOrder, folder: Path) -> int:
     logger = get_logger(SUPERVISOR)
 
     def session(parameters: Parameters) -> str:
-        return session_text(
-            new_session({'scenario': order.scenario, 'mode': 'real time', 'parameters': parameters})
-        )
+        scenario = parameters[SIM.name]['scenario'] if SIM.name in parameters else 'car'
+        content = {'scenario': scenario, 'mode': 'real time', 'parameters': parameters}
+        return session_text(new_session(content))
 
-    player = Player(order.bag, order.settings.namespace, order.rate) if order.bag else None
-    graph = Supervisor(order.nodes, order.settings, folder, player)
+    graph = Supervisor(order.nodes, order.settings, folder)
     graph.recovery.report = logger.error
     failed = False
     with ending_signals(graph.interrupt):
@@ -115,6 +88,7 @@ def _supervise(order: LaunchOrder, folder: Path) -> int:
             failed = True
         finally:
             complaints = graph.stop()
-        for sentence in [*graph.notes, *complaints, *(each.sentence for each in graph.recovery.restarts)]:
+        restarts = [restart.sentence for restart in graph.recovery.restarts]
+        for sentence in [*graph.notes, *complaints, *restarts]:
             logger.warning(sentence)
-    return 1 if failed or complaints or graph.recovery.restarts else 0
+    return 1 if failed or complaints or restarts else 0

@@ -1,31 +1,20 @@
 """The supervisor of a graph: processes up, transitions in order, watched, all down again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from itertools import groupby, zip_longest
 from pathlib import Path
-from time import monotonic
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph.activation import Activation
-from mount_bringup.graph.failures import NodeFailure, NodesFailedError
+from mount_bringup.graph.activation import activate
 from mount_bringup.graph.graph import CONFIGURE, LONGEST_HANG, Graph
-from mount_bringup.graph.nodes import (
-    CONTROL,
-    SIM,
-    GraphError,
-    GraphNode,
-    GraphSettings,
-    ending_order,
-    groups,
-    name_in,
-)
-from mount_bringup.graph.player import Player
-from mount_bringup.graph.processes import NodeProcesses
-from mount_bringup.graph.recovery import Recovery, initialise_again
-from mount_bringup.graph.reports import silence_sentence
+from mount_bringup.graph.nodes import SIM, GraphError, GraphNode, GraphSettings, ending_order, groups, name_in
+from mount_bringup.graph.processes import NodeProcess, end_processes
+from mount_bringup.graph.recovery import NodesFailedError, Recovery
+from mount_bringup.graph.reports import SILENCE_LIMIT
 from mount_bringup.settings import settings_of_mount
 from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.process import Starter
@@ -38,24 +27,16 @@ Parameters = dict[str, dict[str, object]]
 class Supervisor(Graph):
     """The graph with its processes; `stop` always leaves the coil at 0 A.
 
-    Parameter files and logs are in `folder`. With a `player` the inputs are those of a recording, which it
-    plays as soon as the control can be activated. In real time, once all nodes are active, nodes that fail
-    are started again as `recovery.py` says.
+    Parameter files and logs are in `folder`. In real time, once all nodes are active, nodes that fail are
+    started again as `recovery.py` says.
     """
 
-    def __init__(
-        self,
-        nodes: tuple[GraphNode, ...],
-        settings: GraphSettings,
-        folder: Path,
-        player: Player | None = None,
-    ):
+    def __init__(self, nodes: tuple[GraphNode, ...], settings: GraphSettings, folder: Path):
         super().__init__(nodes, settings)
-        self._folder, self._player = folder, player
+        self._folder = folder
         self._starter = Starter()
-        self._processes = NodeProcesses()
-        self._activation = Activation(self)
-        self.recovery = Recovery(self, self._processes, self._activation, settings.restart_limit)
+        self.processes: list[NodeProcess] = []
+        self.recovery = Recovery(self, self.processes, partial(activate, self))
         self._recovers = False
 
     def open(self) -> None:
@@ -78,28 +59,27 @@ class Supervisor(Graph):
         report('starting the nodes')
         if inherited := drop_real_time():
             self.notes.append(started_in_real_time(inherited))
-        self._processes.start(self.nodes, self.settings, self._folder)
+        of_processes = groups(self.nodes, self.settings.grouping)
+        for group in of_processes:
+            self.processes.append(NodeProcess(group, self.settings, self._folder))
         self.refuse_other_graph()  # while the processes load
-        self._processes.begin()
-        self.wait_for_services(self.nodes)
+        for process in self.processes:
+            process.begin()
         # Those of one process in their order: its data thread serves those first that came last.
-        for side_by_side in zip_longest(*groups(self.nodes, self.settings.grouping)):
+        for side_by_side in zip_longest(*of_processes):
             self.transition([node for node in side_by_side if node is not None], CONFIGURE)
-        self.parameters = {node.full_name: self.parameters_of(node) for node in self.nodes}
+        parameters = {node.full_name: self.parameters_of(node) for node in self.nodes}
         for mount in self.mounts:
-            self.publish_session(mount, session(settings_of_mount(self.parameters, mount)))
+            self.publish_session(mount, session(settings_of_mount(parameters, mount)))
         self.wait_for_matches()
         for _, of_mounts in groupby(self.nodes, lambda node: node.name):
-            self._activate(list(of_mounts), report)
-        lockstep = any(values.get('lockstep') for values in self.parameters.values())
-        self._recovers = not lockstep
-        self.reports.silence.pause()
+            activate(self, list(of_mounts), report)
+        self._recovers = not any(values.get('lockstep') for values in parameters.values())
+        self.reports.pause_silence()
 
     @property
     def finished(self) -> bool:
-        """Whether the simulated drive or the played recording is over."""
-        if self._player is not None:
-            return self._player.finished
+        """Whether the simulated drive is over."""
         if SIM not in self.nodes:
             return False
         from mount_sim.diagnosis import FINISHED  # not in the car
@@ -111,69 +91,62 @@ class Supervisor(Graph):
         super().check()
         try:
             self._check_nodes()
-        except NodesFailedError as failed:
+        except NodesFailedError as failure:
             if not self._recovers:
                 raise
-            self._recover(failed.failure)
+            with self._recovery_paused():
+                try:
+                    self.recovery.recover(failure)
+                except GraphError as error:
+                    if not self.finished:
+                        raise
+                    self.notes.append(f'{error}, at the end of the drive')
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
         self.deadline.set(LONGEST_HANG)
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
         self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
-        if self._player is not None:
-            self._player.end()
-        complaints = self._processes.end(at_once=all(resting))
+        complaints = end_processes(self.processes, at_once=all(resting))
+        for reasons in self.repeats.values():
+            times = f', the last of {len(reasons)} times' if len(reasons) > 1 else ''
+            self.notes.append(f'{reasons[-1]}; it was activated again{times}')
         self.close()
         remove_abandoned()
         return complaints
-
-    def _activate(self, nodes: list[GraphNode], report: Callable[[str], None]) -> None:
-        if self._player is not None and any(node.is_a(CONTROL) for node in nodes):
-            report('playing the recording up to its force table')
-            self._player.begin()
-            if not self.wait_for_table(lambda: self.finished):
-                raise GraphError('the recording has ended without a current_force_table')
-        self._activation.activate(nodes, report)
 
     def _check_nodes(self) -> None:
         """Raise `GraphError` if the graph must end, as `NodesFailedError` if it can recover."""
         if self._starter.ended:
             raise GraphError(f'{self._starter.name} has ended')
-        if process := self._processes.ended():
-            words = process.last_words().split(']: ', 1)[-1]
-            raise NodesFailedError(
-                NodeFailure(
-                    process.nodes,
-                    f'{process.name} ended with code {process.exit_code}; last words: {words} '
-                    f'(log: {process.log_file})',
-                )
-            )
+        for process in self.processes:
+            if process.exit_code is not None:
+                process.reported = True
+                words = process.last_words().split(']: ', 1)[-1]
+                reason = f'{process.name} ended with code {process.exit_code}; last words: {words}'
+                raise NodesFailedError(process.nodes, reason)
         self.reports.check_fatal()
         if not self._recovers:
             return
-        if silent := self.reports.silence.silent(monotonic()):
-            hanging = [
-                node
-                for group in groups(self.nodes, self.settings.grouping)
-                for node in group
-                if {member.full_name for member in group} & {*silent}
-            ]
-            raise NodesFailedError(NodeFailure(tuple(hanging), silence_sentence(silent)))
+        if silent := self.reports.silent():
+            hanging = [process.nodes for process in self.processes]
+            hanging = [nodes for nodes in hanging if {node.full_name for node in nodes} & {*silent}]
+            raise NodesFailedError(
+                sum(hanging, ()),
+                f'{", ".join(silent)}: no diagnostics for {SILENCE_LIMIT:g} s (limit {SILENCE_LIMIT:g} s): '
+                'treated as failed; check its log and the CPU load',
+            )
         if reason := self.reports.initialisation_request():
-            raise NodesFailedError(NodeFailure((), reason))
+            raise NodesFailedError((), reason)
 
-    def _recover(self, failure: NodeFailure) -> None:
+    @contextmanager
+    def _recovery_paused(self) -> Iterator[None]:
         self._recovers = False
         try:
-            self.recovery.recover(failure)
-        except GraphError as error:
-            if not self.finished:
-                raise
-            self.notes.append(f'{error}, at the end of the drive')
+            yield
         finally:
             self._recovers = True
-            self.reports.silence.pause()
+            self.reports.pause_silence()
 
     def _initialise_again(self, mount: str, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
         if not self._recovers:
@@ -182,13 +155,10 @@ class Supervisor(Graph):
                 'are active'
             )
             return answer
-        self._recovers = False
-        try:
-            answer.message = f'initialised anew; {initialise_again(self, self._activation, mount)}'
-            answer.success = True
-        except GraphError as error:
-            answer.message = f'not initialised, the coil stays at 0 A: {error}'
-        finally:
-            self._recovers = True
-            self.reports.silence.pause()
+        with self._recovery_paused():
+            try:
+                answer.message = f'initialised anew; {self.recovery.initialise_again(mount)}'
+                answer.success = True
+            except GraphError as error:
+                answer.message = f'not initialised, the coil stays at 0 A: {error}'
         return answer

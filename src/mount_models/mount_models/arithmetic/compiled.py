@@ -24,8 +24,10 @@ from numba.core import event as numba_event
 
 F = TypeVar('F', bound=Callable[..., Any])
 
+_DESK = 'engine_mount'
+"""The one package of which each room counts as a package here: it changes more often than its laws do."""
 _MODELS = Path(__file__).resolve().parents[1]
-_OURS = re.compile(r'^\s*(?:from|import)\s+(mount_\w+)', re.MULTILINE)
+_OURS = re.compile(r'^\s*(?:from|import)\s+(mount_\w+|engine_mount\.\w+)', re.MULTILINE)
 
 
 def compiled(function: F) -> F:
@@ -87,7 +89,7 @@ def _file_of(function: Callable[..., Any]) -> Path:
 
 def _package_folder(file: Path) -> Path:
     folder = file.parent
-    while (folder.parent / '__init__.py').exists():
+    while (folder.parent / '__init__.py').exists() and folder.parent.name != _DESK:
         folder = folder.parent
     return folder
 

@@ -31,15 +31,18 @@ MOUNTS = {
 """Names of all mounts, and what they are."""
 
 
+_SEATED = {
+    'friction_off': SeatedMount(driver_opens=True),
+    'hydro': SeatedMount(int(Contents.FLUID)),
+    'elastomer': SeatedMount(int(Contents.NOTHING)),
+}
+
+
 def seated_mount(name: str) -> SeatedMount:
     """Return the mount of a name in `MOUNTS`, or raise `ParameterError` with the known ones."""
     if name not in MOUNTS:
         raise ParameterError(f'mount {name!r} is unknown; known are {", ".join(MOUNTS)}')
-    if name == 'hydro':
-        return SeatedMount(int(Contents.FLUID))
-    if name == 'elastomer':
-        return SeatedMount(int(Contents.NOTHING))
-    return SeatedMount(driver_opens=name == 'friction_off')
+    return _SEATED.get(name, SeatedMount())
 
 
 def without_friction(name: str) -> str:

@@ -29,6 +29,7 @@ SAWTOOTH_NORMAL_FORCES = (40.0, 60.0, 80.0, 100.0, 120.0)
 SUBSTEPS = 5
 """Steps of the simulation in each sample (chosen)."""
 _REST = 0.3  # s before the ramp
+_RAMP_TIME, _RAMP_HEIGHT = 0.2, 6e-6  # s, m
 _DISPLACEMENT_NOISE = 0.5e-6  # m
 _DRAWN = (
     'b_offset', 'b_1', 'b_2', 'a_p1', 'a_p2', 'a_p3', 'a_n1', 'a_n2', 'a_n3',
@@ -71,7 +72,6 @@ def move(
     normal_force: float,
     *,
     machine_stiffness: float = np.inf,
-    rate: float = SAMPLE_RATE,
     substeps: int = SUBSTEPS,
 ) -> RackRecording:
     """Return what is there to measure while the desired displacement (m) goes straight from corner to corner.
@@ -81,7 +81,7 @@ def move(
     (exact).
     """
     times = np.asarray(corner_times, float)
-    fine = np.arange(round(times[-1] * rate * substeps)) / (rate * substeps)
+    fine = np.arange(round(times[-1] * SAMPLE_RATE * substeps)) / (SAMPLE_RATE * substeps)
     desired = np.interp(fine, times, np.asarray(corner_positions, float))
     stiffness = 1.0 / (1.0 / contact.contact_stiffness + 1.0 / machine_stiffness)
     series = contact._replace(contact_stiffness=stiffness)
@@ -121,24 +121,11 @@ def ramp_and_hold(
     contact: FrictionContact = _CONTACT,
     coefs: FrictionCoefficients = _COEFFICIENTS,
     noise: RackNoise = _NOISE,
-    *,
-    normal_force: float = 100.0,
-    height: float = 6e-6,
-    ramp_time: float = 0.2,
     duration: float = 6.0,
-    machine_stiffness: float = MACHINE_STIFFNESS,
-    rate: float = SAMPLE_RATE,
 ) -> RackRecording:
-    """Return a ramp of the desired displacement to `height` (m), held; nothing slides at this height."""
-    rack = move(
-        contact,
-        coefs,
-        [0.0, _REST, _REST + ramp_time, duration],
-        [0.0, 0.0, height, height],
-        normal_force,
-        machine_stiffness=machine_stiffness,
-        rate=rate,
-    )
+    """Return a ramp of the desired displacement at 100 N, held to `duration` (s); nothing slides so far."""
+    times, positions = [0.0, _REST, _REST + _RAMP_TIME, duration], [0.0, 0.0, _RAMP_HEIGHT, _RAMP_HEIGHT]
+    rack = move(contact, coefs, times, positions, 100.0, machine_stiffness=MACHINE_STIFFNESS)
     random = np.random.default_rng(noise.seed)
     return RackRecording(
         rack.time,
@@ -157,10 +144,9 @@ def sawtooth(
     normal_force: float = 100.0,
     speeds: tuple[float, ...] = SAWTOOTH_SPEEDS,
     stroke: float = STROKE,
-    rate: float = SAMPLE_RATE,
 ) -> RackRecording:
     """Return strokes between -+ `stroke` (m), two at each of `speeds` (m/s), after a first half stroke."""
-    rack = move(contact, coefs, *sawtooth_corners(stroke, speeds), normal_force, rate=rate)
+    rack = move(contact, coefs, *sawtooth_corners(stroke, speeds), normal_force)
     random = np.random.default_rng(noise.seed)
     return RackRecording(
         rack.time,

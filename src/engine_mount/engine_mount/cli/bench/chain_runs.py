@@ -90,7 +90,7 @@ def run_graph(
             start = time.monotonic() - begin
             _serve(supervisor, _SETTLING)
             before = {name: int(supervisor.figures(DRIVER).get(name, 0)) for name in ('samples', 'setpoints')}
-            modules = [f'from {node.package}.node' for node in (DRIVER, INIT, CONTROL)]
+            modules = [f'from {node.name}.node' for node in (DRIVER, INIT, CONTROL)]
             with _watched(children(modules)) as found:
                 _serve(supervisor, seconds)
             after, bus = supervisor.figures(DRIVER), supervisor.figures(SIM)

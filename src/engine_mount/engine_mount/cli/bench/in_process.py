@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from engine_mount.cli.bench.comparison import Comparison, in_turn
 from engine_mount.drives.loop.run import run_core
 from engine_mount.drives.replay import ReplayOrder, replay_without_output
-from mount_bringup.chosen import chosen_control
+from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw, Controller
 from mount_control.force_maker import resample
 from mount_driver.can_library import cantools

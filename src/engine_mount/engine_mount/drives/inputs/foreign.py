@@ -9,6 +9,7 @@ import numpy as np
 from engine_mount.drives.inputs.input import ControlRun, Messages, ReplayError, ReplayInput, dated
 from engine_mount.drives.inputs.ramps import MeasuredGap, measured_gaps
 from engine_mount.recordings.place import open_run
+from engine_mount.settings.chosen import Parameters, chosen_specimen, control_parameters
 from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import Stated
@@ -25,7 +26,6 @@ from engine_mount.signals.signal import SECOND
 from engine_mount.signals.units.columns import place, read_chosen
 from engine_mount.signals.units.mapping import MEAN, Mapping, checked_scale, mapping_in_file, with_options
 from engine_mount.signals.units.signals import ChosenSignal, chosen_signals
-from mount_bringup.chosen import Parameters, chosen_specimen, control_parameters
 from mount_init.parameters import InitParameters
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current

@@ -27,8 +27,8 @@ from engine_mount.recordings.session import (
     session_content,
     session_parameters,
 )
+from engine_mount.settings.chosen import control_parameters, with_recorded_policy
 from engine_mount.signals.importing.provenance import SCENARIO
-from mount_bringup.chosen import control_parameters, with_recorded_policy
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.recording import Recording
-from mount_bringup.chosen import chosen_specimen
+from engine_mount.settings.chosen import chosen_specimen
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters

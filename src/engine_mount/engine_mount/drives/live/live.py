@@ -21,7 +21,7 @@ from engine_mount.recordings.place import open_mount
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.recordings.series import Payloads
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
 from mount_recorder.topic_groups import registered_topic

@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 
 from engine_mount.drives.inputs.input import ReplayError
 from engine_mount.drives.inputs.ramps import MeasuredGap
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
 from mount_ros import topics
 from mount_ros.data_path import DataPath

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import BLOCK, CoreOutcome, Sink, coil_temperature, stamp_of, take_one
+from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
-from mount_bringup.chosen import Parameters
 from mount_init.initialisation import OFF
 from mount_sim.electronics.electronics import status_every
 from mount_sim.excitation.excitation import Excitation

@@ -4,7 +4,7 @@ The same cores as in the nodes, in the same order: the initialisation answers un
 controller from the next sample on.
 """
 
-from mount_bringup.chosen import Parameters, chosen_control, chosen_specimen
+from engine_mount.settings.chosen import Parameters, chosen_control, chosen_specimen
 from mount_control.control_loop import OFF, ControlLoop
 from mount_control.policy.contract import Policy
 from mount_init.estimate import TemperatureReadings

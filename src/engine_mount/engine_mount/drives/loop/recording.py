@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from engine_mount.drives.loop.car import run_car_into
 from engine_mount.drives.loop.messages import Columns, CoreMessages
 from engine_mount.drives.loop.run import CoreOutcome, coil_temperature, run_core
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_recorder.bag_writer import WHOLE, BagWriter, SplitRule
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_message

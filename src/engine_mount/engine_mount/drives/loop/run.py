@@ -10,8 +10,8 @@ import numpy as np
 from engine_mount.drives.loop import compiled_loop as loop
 from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns
+from engine_mount.settings.chosen import Parameters
 from engine_mount.signals.excitation import build_excitation
-from mount_bringup.chosen import Parameters
 from mount_bringup.settings import check_sample_rate
 from mount_driver.quantisation import quantised_coil_temperature, quantised_setpoint_current
 from mount_init.initialisation import OFF, InitialisationResult

@@ -16,7 +16,7 @@ from engine_mount.recordings.switching import Switching
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
-from mount_bringup.chosen import policy_of
+from engine_mount.settings.chosen import policy_of
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.mount_choice import seat_of

@@ -12,7 +12,7 @@ from engine_mount.drives.loop.run import run_core_into
 from engine_mount.experiments.sweep.evaluation import peak_and_rms
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.reports.sections.periodic import harmonics, whole_periods
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_init.initialisation import InitialisationResult
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.plant.plant import TRUTH

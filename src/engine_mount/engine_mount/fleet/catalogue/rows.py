@@ -21,7 +21,7 @@ from engine_mount.recordings.session import (
     versions_told,
 )
 from engine_mount.settings.changes import changed_parameters
-from mount_bringup.chosen import Parameters
+from engine_mount.settings.chosen import Parameters
 from mount_sim.mount_choice import seat_of, simulated_mounts
 from mount_sim.plant.mounts import without_friction
 

@@ -16,8 +16,8 @@ from engine_mount.recordings.screen import Screen, Table
 from engine_mount.recordings.switching import switching_times
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
-from mount_bringup.chosen import Parameters, policy_of
-from mount_bringup.graph.failures import Restart
+from engine_mount.settings.chosen import Parameters, policy_of
+from mount_bringup.graph.recovery import Restart
 from mount_recorder.parameters import RecorderParameters
 from mount_sim.mount_choice import seat_of
 from mount_sim.plant.mounts import without_friction
@@ -121,11 +121,10 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
 
 
 def _restart(restart: Restart, zero: int) -> dict[str, Any]:
-    failure = restart.failure
     return {
         'time_s': (restart.time - zero) / 1e9,
-        'nodes': [node.name for node in failure.nodes],
-        'reason': failure.reason,
+        'nodes': [node.name for node in restart.nodes],
+        'reason': restart.reason,
         'remedy': restart.action.value,
         'took_s': restart.took,
     }

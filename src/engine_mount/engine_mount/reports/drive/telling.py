@@ -21,9 +21,9 @@ from engine_mount.reports.drive.summary import (
 )
 from engine_mount.reports.drive.undamped import Undamped, UndampedError, undamped_of
 from engine_mount.reports.json_file import write_json
+from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.settings.run_folder import RunFolder
-from mount_bringup.chosen import Parameters, policy_of
 from mount_recorder.folders import recordings_of, saved_snapshots
 from mount_recorder.parameters import RecorderParameters
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_bringup.chosen import Parameters, chosen_control
+from engine_mount.settings.chosen import Parameters, chosen_control
 from mount_control.controller import ControlLaw, Controller
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import with_flattened

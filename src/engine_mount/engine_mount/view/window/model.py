@@ -11,6 +11,7 @@ import numpy as np
 
 from engine_mount.recordings.layout import LayoutError
 from engine_mount.reports.drive.evaluation import levels_of
+from engine_mount.settings.chosen import policy_of
 from engine_mount.view.beside.alternatives import Beside
 from engine_mount.view.feed.feed import Feed, Message
 from engine_mount.view.window.state import GraphState
@@ -22,7 +23,6 @@ from engine_mount.view.window.traces import (
     extent,
     extents,
 )
-from mount_bringup.chosen import policy_of
 from mount_models.quantity import ParameterError
 from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
 from mount_ros.topics import CURRENT_FORCE_TABLE, DISPLACEMENT, SIM_CHASSIS_ACCELERATION
