@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from engine_mount.recordings.run.amounts import duration_in_nanoseconds, split_rule
+from engine_mount.settings.amounts import duration_in_nanoseconds, split_rule
 from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.automatic_marks import mark_kinds
 from mount_recorder.diagnosis import OnFull

@@ -27,7 +27,7 @@ from engine_mount.experiments.harness.fixed_gaps import (
     measure_actuator,
 )
 from engine_mount.experiments.registry import NAMES
-from engine_mount.recordings.bag.recording import Recording, open_recording
+from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.reports.drive.signals import FloatArray
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import (

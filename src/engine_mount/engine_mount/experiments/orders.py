@@ -10,9 +10,9 @@ from engine_mount.experiments.harness.contract import (
     Progress,
     Values,
 )
-from engine_mount.recordings.run.folder import RunFolderError, new_place
-from engine_mount.recordings.run.screen import Bar, Screen
+from engine_mount.recordings.screen import Bar, Screen
 from engine_mount.settings.options import settings_of_options
+from engine_mount.settings.run_folder import RunFolderError, new_place
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.quantity import with_flattened
 

@@ -21,7 +21,7 @@ from engine_mount.experiments.harness.contract import Experiment, Holds, Order, 
 from engine_mount.experiments.registry import NAMES, experiment_named
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
-from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit import audit
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 

@@ -14,7 +14,7 @@ from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
 from engine_mount.experiments.harness.measures import sweep_parameters
 from engine_mount.experiments.registry import NAMES, experiment_named
 from engine_mount.experiments.sweep import defined_peak
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_models.damper import damper_curve
 from mount_models.quantity import ParameterError
 

@@ -21,8 +21,8 @@ from engine_mount.experiments.recorded_drive import (
     rms_in_bands_within,
 )
 from engine_mount.experiments.registry import experiments_named
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.excitation import acceleration_at, recorded_signal
+from engine_mount.signals.signal import SignalError
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario
 

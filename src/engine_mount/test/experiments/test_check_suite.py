@@ -45,7 +45,7 @@ from engine_mount.experiments.check.suite import (
     suite_in_file,
     suite_of,
 )
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import Truth
 from mount_bringup.graph.nodes import GraphError
 from mount_bringup.graph.shutdown import Interrupted

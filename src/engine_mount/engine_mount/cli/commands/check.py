@@ -56,9 +56,9 @@ def check(
     )
     from engine_mount.experiments.check.run import CORE, MODES, CheckOrder, run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, shipped_suite, suite_in_file
-    from engine_mount.recordings.run.folder import make_run_folder, new_place
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.options import settings_of_options
+    from engine_mount.settings.run_folder import make_run_folder, new_place
     from mount_bringup.graph.domain import chosen_domain
 
     console = terminal()

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.settings.chosen import chosen_specimen
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation

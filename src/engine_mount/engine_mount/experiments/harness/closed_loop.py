@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from engine_mount.drives.drive import DriveOrder, record_drive
 from engine_mount.experiments.harness.contract import ExperimentError, Order, Settings, Values
-from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import defaults_of_nodes

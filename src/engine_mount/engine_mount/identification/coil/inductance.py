@@ -12,7 +12,7 @@ from engine_mount.identification.coil.gap_point import GapPoint, RippleRecording
 from engine_mount.identification.coil.temperature_fit import measured_compensation, stated_compensation
 from engine_mount.identification.coil.temperature_left import COEFFICIENT_ERROR, measured, predicted
 from engine_mount.identification.coil.unique_region import UniqueRegion, unique_region, warnings
-from engine_mount.recordings.run.screen import Table
+from engine_mount.recordings.screen import Table
 from mount_models.actuator.law import ForceLaw
 from mount_models.coil.temperature import TemperatureCompensation
 from mount_models.quantity import LawRefusedError, OutsideLawError

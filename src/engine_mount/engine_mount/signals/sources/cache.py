@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.run.amounts import size_in_bytes
+from engine_mount.settings.amounts import size_in_bytes
 from engine_mount.signals.sources.source import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'

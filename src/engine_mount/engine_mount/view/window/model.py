@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.recordings.messages.layout import LayoutError
+from engine_mount.recordings.layout import LayoutError
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import policy_of
 from engine_mount.view.beside.alternatives import Beside
