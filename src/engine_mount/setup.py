@@ -8,7 +8,7 @@ setup(
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={
         'engine_mount.cli': ['completion/names.json'],
-        'engine_mount.experiments': ['check/suite.yaml'],
+        'engine_mount.experiments': ['*.csv', '*.yaml', 'check/*.yaml'],
         'engine_mount.faults': ['faults.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],
         'engine_mount.view': ['page/*'],

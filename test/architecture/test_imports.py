@@ -65,18 +65,6 @@ def test_no_module_needs_itself_by_way_of_others():
     tuple(TopologicalSorter(needs).static_order())  # raises CycleError, which names the circle
 
 
-def test_rooms_of_recordings_stand_one_upon_another():
-    begin = 'engine_mount.recordings.'
-    files = {name: file for name, file in module_files().items() if name.startswith(begin)}
-    rooms: dict[str, set[str]] = {}
-    for module, file in files.items():
-        room = module.rpartition('.')[0]
-        others = {name.rpartition('.')[0] for name in modules_of(file) if name in files}
-        rooms.setdefault(room, set()).update(others - {room})
-    assert 'engine_mount.recordings.container' in rooms['engine_mount.recordings.bag']
-    tuple(TopologicalSorter(rooms).static_order())  # raises CycleError, which names the circle
-
-
 def test_every_package_is_covered():
     rooms = {file.parent.name for file in (SOURCES / 'engine_mount' / 'engine_mount').glob('*/__init__.py')}
     assert {*ROS_PACKAGES, *(f'engine_mount.{room}' for room in rooms)} == set(MAY_IMPORT)

@@ -9,7 +9,7 @@ from command import done
 
 import engine_mount
 from engine_mount import fleet
-from engine_mount.recordings.run.session import recorded_session, session_content
+from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.testing import MAKERS
 
 TIMES = np.arange(400) / 200.0  # s: 200 Hz, as vehicles record

@@ -18,7 +18,8 @@ from pathlib import Path
 import psutil
 
 import engine_mount
-from mount_bringup.graph.domain import DomainError, domain_lock
+from mount_bringup.graph.domain import domain_lock
+from mount_models.quantity import ParameterError
 from mount_recorder.folders import recordings_of
 
 EARLIEST, LATEST = 0.5, 15.0  # s, chosen: when the signal comes; Python itself needs a while to start
@@ -108,7 +109,7 @@ def remains(processes: set[psutil.Process], shared: set[Path], domain: int, befo
     try:
         with domain_lock(domain, ''):
             pass
-    except DomainError as error:
+    except ParameterError as error:
         left.append(str(error))
     return left
 

@@ -7,10 +7,10 @@ import pytest
 
 import engine_mount
 from engine_mount.drives.replay import ReplayOrder, replay_without_output
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.node_reports import node_reports
-from engine_mount.recordings.run.session import recorded_sample_rate
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.node_reports import node_reports
+from engine_mount.recordings.session import recorded_sample_rate
 
 DATA_TOPICS = (
     'displacement',

@@ -7,7 +7,7 @@ import pytest
 
 import engine_mount
 from engine_mount.cli.command import main
-from engine_mount.recordings.run.session import recorded_session
+from engine_mount.recordings.session import recorded_session
 
 pytestmark = pytest.mark.slow
 

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import engine_mount
 from engine_mount.cli.command import app
-from engine_mount.recordings.events.recorded_events import read_marks
+from engine_mount.recordings.events import read_marks
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT

@@ -9,8 +9,8 @@ import pytest
 from ros_testing import wait_until
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.losses import losses
 from mount_ros.environment import prepare_environment
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long

@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 import engine_mount
 from engine_mount.cli.command import app
-from engine_mount.recordings.compare.reference import differences_from_reference
+from engine_mount.recordings.reference import differences_from_reference
 
 DRIVE = (
     'drive',

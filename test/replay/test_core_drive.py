@@ -16,8 +16,8 @@ from engine_mount.drives.loop import chain as core_chain
 from engine_mount.drives.loop import run as core_run
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreOutcome, run_core
-from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.messages.series import Series
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.series import Series
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
 from engine_mount.settings.chosen import policy_of

@@ -5,7 +5,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.unit import UnitError
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised

@@ -11,9 +11,9 @@ import engine_mount
 from engine_mount.drives.drive import DriveOrder, record_drive
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.run.screen import Screen
-from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.screen import Screen
+from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.reports.run_facts import run_facts

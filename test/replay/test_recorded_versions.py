@@ -7,7 +7,7 @@ import pytest
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
 from engine_mount.drives.summary import print_replay, replay_figures
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 import engine_mount
 from engine_mount.cli.command import app
-from engine_mount.recordings.events.recorded_events import event_time, recorded_events
+from engine_mount.recordings.events import event_time, recorded_events
 from engine_mount.reports import report
 from engine_mount.reports.pages import default_pictures
 from engine_mount.reports.sections import overview as overview_section

@@ -18,7 +18,7 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
 import engine_mount
-from engine_mount.recordings.compare.compare import compare
+from engine_mount.recordings.compare import compare
 from mount_recorder.versions import versions
 from mount_ros.topics import EVENT, SESSION, TOPICS
 

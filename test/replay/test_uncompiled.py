@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from engine_mount.recordings.compare.reference import differences_from_reference
+from engine_mount.recordings.reference import differences_from_reference
 
 pytestmark = pytest.mark.slow
 

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.run.session import recorded_session, session_content, session_parameters
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.undamped import UndampedError, undamped_of
 
 SHORT = ('--duration', '3', '--set', 'mount_sim.timeline.start=2.8', '--set', 'mount_sim.motorway.gap_time=1')

@@ -6,7 +6,7 @@ import engine_mount
 from engine_mount.drives.inputs.ramps import measured_gaps
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
-from engine_mount.recordings.compare.reference import accept
+from engine_mount.recordings.reference import accept
 from mount_recorder.session import session_text
 
 SIM = {

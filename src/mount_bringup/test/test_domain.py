@@ -7,7 +7,8 @@ import sys
 import pytest
 
 from mount_bringup.graph import domain
-from mount_bringup.graph.domain import DomainError, can_port, domain_lock
+from mount_bringup.graph.domain import can_port, domain_lock
+from mount_models.quantity import ParameterError
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +31,7 @@ def test_a_second_graph_in_a_namespace_is_refused_until_the_first_has_ended():
         domain_lock(3, 'left'),
         domain_lock(3, 'right'),
         domain_lock(4, 'left'),
-        pytest.raises(DomainError, match='already runs in ROS domain 3, namespace /left'),
+        pytest.raises(ParameterError, match='already runs in ROS domain 3, namespace /left'),
     ):
         domain_lock(3, '/left').__enter__()
     with domain_lock(3, 'left'):
@@ -47,7 +48,7 @@ def test_a_graph_that_was_killed_holds_its_place_no_more_and_leaves_no_file(tmp_
         [sys.executable, '-c', hold], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as holder:
         assert holder.stdout.readline() == b'held\n'
-        with pytest.raises(DomainError, match='namespace /left'):
+        with pytest.raises(ParameterError, match='namespace /left'):
             domain_lock(5, 'left').__enter__()
         holder.kill()
         holder.wait()
@@ -59,6 +60,6 @@ def test_namespaces_that_would_share_a_can_bus_do_not_run_at_the_same_time(monke
     monkeypatch.setattr(domain, '_PLACES', 1)
     with (
         domain_lock(3, 'left'),
-        pytest.raises(DomainError, match='namespace /right, or in one whose CAN bus would have port 8281'),
+        pytest.raises(ParameterError, match='namespace /right, or in one whose CAN bus would have port 8281'),
     ):
         domain_lock(3, 'right').__enter__()

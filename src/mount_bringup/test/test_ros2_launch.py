@@ -12,7 +12,7 @@ import pytest
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from ros_testing import wait_until
 
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_bringup.graph.launch_arguments import GRAPHS, arguments_of
 
 LIMIT = 240.0  # s: only a hang takes so long

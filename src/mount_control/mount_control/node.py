@@ -27,13 +27,14 @@ from mount_control.settings import (
     without_effect,
 )
 from mount_models.arithmetic.compiled import log_compilation
-from mount_models.damper import DamperError, damper_text
+from mount_models.damper import damper_text
+from mount_models.quantity import ParameterError
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import change_text, dated
-from mount_ros.messages.force_table import ForceTableMessageError, from_bytes
-from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.force_table import from_bytes
+from mount_ros.messages.scalars import MessageError, ScalarsLayout
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import Change, SpecimenValues, declare
@@ -181,7 +182,7 @@ class MountControl(SafeLifecycleNode):
         begin = time.monotonic()
         try:
             stamp, (displacement,), _ = self._displacement.unpack(raw)
-        except ScalarsError as error:
+        except MessageError as error:
             self._note_unread(error)
             return
         with self._order:
@@ -214,7 +215,7 @@ class MountControl(SafeLifecycleNode):
             return None
         try:
             return unpack(raw)
-        except (ScalarsError, ForceTableMessageError) as error:
+        except MessageError as error:
             self._note_unread(error)
             return None
 
@@ -243,7 +244,7 @@ def _spelled_out(parameters: list[Parameter]) -> list[Parameter]:
     spelled = []
     for parameter in parameters:
         if parameter.name == 'damper' and isinstance(parameter.value, str):
-            with contextlib.suppress(DamperError):
+            with contextlib.suppress(ParameterError):
                 parameter = Parameter('damper', value=damper_text(parameter.value))
         spelled.append(parameter)
     return spelled

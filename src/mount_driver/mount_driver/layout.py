@@ -13,14 +13,11 @@ import bitstruct.c
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
 
 from mount_driver.can_library import Message, Signal
+from mount_models.quantity import ParameterError
 
 # Steps from the DBC's units to SI; other units are kept and appear in the name of the field.
 _SI_FACTORS = {'mm': Decimal('0.001')}
 _E2E_ATTRIBUTES = 'E2EDataId', 'E2EMaxDeltaCounter', 'E2ESyncFrames'
-
-
-class OutOfRangeError(ValueError):
-    """A value lies outside the limits that the DBC gives for its signal."""
 
 
 class FrameError(ValueError):
@@ -40,11 +37,11 @@ class Scaling:
         self.low, self.high = self.to_si(self.raw_low), self.to_si(self.raw_high)
 
     def to_raw(self, value: float) -> int:
-        """Return the nearest raw number; raises `OutOfRangeError`, also for infinity; NaN is not allowed."""
+        """Return the nearest raw number; raises `ParameterError`, also for infinity; NaN is not allowed."""
         scaled = value * self.steps
         if self.raw_low <= scaled <= self.raw_high:
             return round(scaled)
-        raise OutOfRangeError(
+        raise ParameterError(
             f'{self.name} ({value:g} {self.unit}) must lie within {self.low:g} .. {self.high:g} {self.unit}; '
             f'send a reading outside as not valid (NaN)'
         )
@@ -76,12 +73,12 @@ class MessageLayout:
         """Between the raw numbers, the last one first, and the reversed bytes of a message."""
 
     def pack(self, raw: Sequence[int]) -> bytearray:
-        """Return the message with these raw numbers and its CRC; raises `OutOfRangeError`."""
+        """Return the message with these raw numbers and its CRC; raises `ParameterError`."""
         try:
             data = bytearray(self.pack_bits(*raw[::-1]))
         except OverflowError:
             numbers = ', '.join(f'{name} {number}' for name, number in zip(self.names, raw, strict=True))
-            raise OutOfRangeError(f'{self.name}: a number does not fit its bits: {numbers}') from None
+            raise ParameterError(f'{self.name}: a number does not fit its bits: {numbers}') from None
         data.reverse()
         e2e_p05_protect(data, self.data_id, increment_counter=False)
         return data

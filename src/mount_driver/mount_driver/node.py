@@ -14,7 +14,7 @@ from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
-from mount_ros.messages.scalars import ScalarsError, ScalarsLayout
+from mount_ros.messages.scalars import MessageError, ScalarsLayout
 from mount_ros.messages.sensors import temperature_layout
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -161,7 +161,7 @@ class MountDriver(SafeLifecycleNode):
             return
         try:
             stamp, (current,), _ = self._setpoint_layout.unpack(raw)
-        except ScalarsError:
+        except MessageError:
             exchange.link.refuse(Refusal.MALFORMED)
             return
         exchange.send_setpoint(stamp, current)

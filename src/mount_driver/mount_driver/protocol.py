@@ -13,7 +13,8 @@ from typing import Generic, NamedTuple, TypeVar
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
 
 from mount_driver.can_library import Database
-from mount_driver.layout import MessageLayout, OutOfRangeError, Scaling
+from mount_driver.layout import MessageLayout, Scaling
+from mount_models.quantity import ParameterError
 
 M = TypeVar('M')
 
@@ -96,7 +97,7 @@ class MountCodec:
         self.supply_voltage, self.coil_temperature = scalings['SupplyVoltage'], scalings['CoilTemperature']
 
     def encode_measurement(self, measurement: Measurement, alive_counter: int) -> bytearray:
-        """Return the 24 bytes of a sample; NaN is sent as not valid. Raises `OutOfRangeError`.
+        """Return the 24 bytes of a sample; NaN is sent as not valid. Raises `ParameterError`.
 
         The two slopes share one validity: if one of them is NaN, both arrive as NaN.
         """
@@ -166,11 +167,11 @@ class MountCodec:
         )
 
     def encode_setpoint(self, setpoint: Setpoint, alive_counter: int) -> bytearray:
-        """Return the 8 bytes of a setpoint, limited to 0..3 A; NaN is refused with `OutOfRangeError`."""
+        """Return the 8 bytes of a setpoint, limited to 0..3 A; NaN is refused with `ParameterError`."""
         current, answered_counter, enable = setpoint
         limits = self.current
         if current != current:
-            raise OutOfRangeError(
+            raise ParameterError(
                 f'current setpoint (NaN) must lie within {limits.low:g} .. {limits.high:g} A; '
                 f'send 0 A with enable off where no setpoint is known'
             )
@@ -198,7 +199,7 @@ class MountCodec:
         return Setpoint(current / limits.steps, answered_counter, enable == 1)
 
     def encode_status(self, status: Status, alive_counter: int) -> bytearray:
-        """Return the 8 bytes of a status; NaN is sent as not available. Raises `OutOfRangeError`."""
+        """Return the 8 bytes of a status; NaN is sent as not available. Raises `ParameterError`."""
         voltage, temperature, *faults = status
         raw_voltage = _VOLTAGE_NOT_AVAILABLE if math.isnan(voltage) else self.supply_voltage.to_raw(voltage)
         raw_temperature = (

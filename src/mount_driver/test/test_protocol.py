@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_driver.can_library import cantools
-from mount_driver.layout import FrameError, OutOfRangeError
+from mount_driver.layout import FrameError
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import DATABASE_FILE, Measurement, MountCodec, Setpoint, Status
+from mount_models.quantity import ParameterError
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
 
 CODEC = MountCodec()
@@ -123,7 +124,7 @@ def test_one_missing_slope_makes_both_unknown(slope):
 
 @pytest.mark.parametrize('value', [0.0500001, -0.0500001, math.inf, -math.inf, 1e300])
 def test_a_displacement_outside_its_range_is_refused_with_value_and_limit(value):
-    with pytest.raises(OutOfRangeError, match=r'Displacement \(.* m\) must lie within -0\.05 \.\. 0\.05 m'):
+    with pytest.raises(ParameterError, match=r'Displacement \(.* m\) must lie within -0\.05 \.\. 0\.05 m'):
         CODEC.encode_measurement(SAMPLE._replace(displacement=value), 0)
 
 
@@ -131,7 +132,7 @@ def test_a_displacement_outside_its_range_is_refused_with_value_and_limit(value)
     'change', [{'sample_counter': 65536}, {'sample_counter': -1}, {'microseconds': 2**32}]
 )
 def test_a_counter_that_does_not_fit_is_refused(change):
-    with pytest.raises(OutOfRangeError, match='does not fit its bits'):
+    with pytest.raises(ParameterError, match='does not fit its bits'):
         CODEC.encode_measurement(SAMPLE._replace(**change), 0)
 
 
@@ -147,7 +148,7 @@ def test_a_setpoint_is_limited_to_0_to_3_ampere(wanted, sent):
 
 
 def test_a_setpoint_that_is_nan_is_refused():
-    with pytest.raises(OutOfRangeError, match=r'NaN.*0 \.\. 3 A'):
+    with pytest.raises(ParameterError, match=r'NaN.*0 \.\. 3 A'):
         CODEC.encode_setpoint(Setpoint(math.nan, 1), 0)
 
 

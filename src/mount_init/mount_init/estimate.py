@@ -18,16 +18,16 @@ from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray
 from mount_init.supply import crossing_at_curves, inductance_at_curves
-from mount_models.actuator.law import OutsideLawError, checked_force
+from mount_models.actuator.law import checked_force
 from mount_models.arithmetic.averages import mean, standard_deviation
 from mount_models.coil.gap import (
-    OutsideCurveError,
     gap_from_crossing_current,
     gap_per_crossing_current,
     gap_per_inductance,
     rest_gap_from_inductance,
 )
 from mount_models.force_table import zero_current_rest_gap
+from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 
 _LONGEST_AGE = 5_000_000_000  # ns, chosen: at 3 A the coil warms by a few kelvin in it, worth some um
@@ -154,7 +154,7 @@ def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsi
         gap = zero_current_rest_gap(
             specimen.force_law, specimen.spring_stiffness, at_rest, specimen.rest_current
         )
-    except (OutsideCurveError, OutsideLawError) as error:
+    except OutsideLawError as error:
         raise InitialisationError(
             f'rest gap not estimated (are the halves mounted as calibrated?): {error}'
         ) from error
@@ -178,7 +178,7 @@ def contact_gap(
         gap = float(gap_from_crossing_current(specimen.gap_curves, at_curves))
         gap_slope = float(gap_per_crossing_current(specimen.gap_curves, at_curves))
         force = float(checked_force(specimen.force_law, current, gap))
-    except (OutsideCurveError, OutsideLawError) as error:
+    except OutsideLawError as error:
         raise InitialisationError(
             f'contact gap not estimated (pads worn out, or no rod?): {error}'
         ) from error

@@ -16,7 +16,7 @@ from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
 from mount_models.coil.crossing import Crossing, find_crossing
 from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
-from mount_models.coil.gap import OutsideCurveError, ScaledPolynomial, evaluate
+from mount_models.coil.gap import ScaledPolynomial, evaluate
 from mount_models.coil.resistance import (
     CoilResistance,
     DriftingResistance,
@@ -25,6 +25,7 @@ from mount_models.coil.resistance import (
     resistance_beside_drift,
 )
 from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
+from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 
 _BLOCK = 0.02  # s, chosen: of so many readings the median is taken; 1 % of noise leaves 0.3 %
@@ -113,13 +114,13 @@ def inductance_at_supply_of_curves(
 
     for dwell in (ramp.dwell_before, ramp.dwell_after):
         found = float(np.nanmedian(inductance[dwell]))
-        with contextlib.suppress(OutsideCurveError):  # `rest_gap` tells
+        with contextlib.suppress(OutsideLawError):  # `rest_gap` tells
             found = inductance_at_curves(specimen, found, celsius)
         carry(dwell, _within(curves.gap_of_inductance, found))
     carry(moved, curves.crossing_current_of_gap.centre)
     for _ in range(2):
         found = inductance_crossing(specimen, parameters, current[ramp.up], result[ramp.up]).current
-        with contextlib.suppress(OutsideCurveError):
+        with contextlib.suppress(OutsideLawError):
             found = crossing_at_curves(specimen, found, celsius)
         carry(moved, _within(curves.gap_of_crossing_current, found))
     return result, supply._replace(carried=True)
@@ -135,7 +136,7 @@ def inductance_crossing(
 def inductance_at_curves(specimen: Specimen, inductance: float, celsius: float) -> float:
     """Return an inductance (H) at rest, carried from the coil temperature (degC) to that of the gap curves.
 
-    It stays where the temperature is unknown (NaN). Raises `OutsideCurveError`.
+    It stays where the temperature is unknown (NaN). Raises `OutsideLawError`.
     """
     if specimen.temperature is None or math.isnan(celsius):
         return inductance

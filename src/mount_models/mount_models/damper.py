@@ -21,7 +21,7 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.interpolation import each_interpolated
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
-from mount_models.quantity import Quantity, check_name, checked
+from mount_models.quantity import ParameterError, Quantity, check_name, checked
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -40,10 +40,6 @@ HIGHEST_FORCE = 1e4
 """N, chosen: far more than friction at the highest current."""
 MOST_POINTS = 10_000
 _VISCOUS = re.compile(r'viscous_(\d+(\.\d*)?([eE][+-]?\d+)?)')
-
-
-class DamperError(ValueError):
-    """A damper characteristic cannot be built; the text says why and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +150,7 @@ def damper_curve(choice: Any) -> DamperCurve:
     A text is a name in `DAMPERS`, `viscous_<N s/m>`, a mapping in YAML, or the path of a file of points.
     A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default; or
     {'velocity': [...], 'force': [...]} in m/s and N, joined by straight lines and constant behind the last.
-    Raises `DamperError` if it is unknown or unusable, `ParameterError` for a value outside its range.
+    Raises `ParameterError` if it is unknown or unusable, `ParameterError` for a value outside its range.
     """
     if isinstance(choice, str):
         return _curve_of_text(choice)
@@ -185,10 +181,10 @@ def _curve_of_text(text: str) -> DamperCurve:
     try:
         mapping = plain_yaml(text)
     except YamlError as error:
-        raise DamperError(f'damper {text!r:.60} {error}; known by name are {_KNOWN}') from None
+        raise ParameterError(f'damper {text!r:.60} {error}; known by name are {_KNOWN}') from None
     if isinstance(mapping, Mapping):
         return damper_curve(mapping)
-    raise DamperError(f'no damper curve is called {text!r:.60}; known are {_KNOWN}')
+    raise ParameterError(f'no damper curve is called {text!r:.60}; known are {_KNOWN}')
 
 
 def _is_file(text: str) -> bool:
@@ -200,7 +196,7 @@ def _curve_of_points(name: str, columns: Mapping[str, Any]) -> DamperCurve:
     grid = np.arange(math.floor(velocity[-1] / STEP_OF_POINTS * (1.0 + 1e-12)) + 1) * STEP_OF_POINTS
     table = each_interpolated(grid, velocity, force)
     if not table.max() > 0.0:
-        raise DamperError(f'the points of the damper {name} must reach beyond {STEP_OF_POINTS:g} m/s')
+        raise ParameterError(f'the points of the damper {name} must reach beyond {STEP_OF_POINTS:g} m/s')
     table.flags.writeable = False
     return DamperCurve(name, table, STEP_OF_POINTS)
 
@@ -209,7 +205,7 @@ def _law_of(values: Mapping[str, Any]) -> Any:
     given = dict(values)
     name = given.pop('law', None)
     if name not in DAMPER_LAWS:
-        raise DamperError(f'no damper law is called {name!r}; known are {", ".join(DAMPER_LAWS)}')
+        raise ParameterError(f'no damper law is called {name!r}; known are {", ".join(DAMPER_LAWS)}')
     law = DAMPER_LAWS[name]
     for each in given:
         check_name(f'the {name} damper', each, law._fields)
@@ -219,7 +215,7 @@ def _law_of(values: Mapping[str, Any]) -> Any:
 def _tabulated(name: str, law: Any) -> DamperCurve:
     law = checked(law)
     if 0.0 < law.dead_zone < SMALLEST_DEAD_ZONE:
-        raise DamperError(
+        raise ParameterError(
             f'dead_zone ({law.dead_zone:g} m/s) of the damper {name} must be 0 or at least '
             f'{SMALLEST_DEAD_ZONE:g} m/s; choose 0 for none'
         )
@@ -231,7 +227,7 @@ def _tabulated(name: str, law: Any) -> DamperCurve:
     within = int(np.searchsorted(force, law.force_limit * (1.0 + 1e-12), side='right'))
     table = force[:within].copy()
     if not table[-1] > 0.0:
-        raise DamperError(
+        raise ParameterError(
             f'force_limit ({law.force_limit:g} N) of the damper {name} must be reached more than one grid '
             f'step ({step:g} m/s) above the dead zone; raise the limit or lower damping_coefficient'
         )
@@ -247,44 +243,46 @@ def _velocity_step(dead_zone: float) -> float:
 
 
 def _points_in(path: Path) -> dict[str, list[float]]:
-    """Return {'velocity': m/s, 'force': N} of a file CSV or YAML with these columns; raises `DamperError`."""
+    """Return {'velocity': m/s, 'force': N} of a file CSV or YAML; raises `ParameterError`."""
     try:
         text = text_of_file(path)
         columns = _columns_of_csv(text) if path.suffix == '.csv' else plain_yaml(text)
         velocity, force = _checked_points(columns)
     except YamlError as error:
-        raise DamperError(f'damper file {path} {error}') from None
-    except (DamperError, csv.Error) as error:
-        raise DamperError(f'damper file {path}: {error}') from None
+        raise ParameterError(f'damper file {path} {error}') from None
+    except (ParameterError, csv.Error) as error:
+        raise ParameterError(f'damper file {path}: {error}') from None
     return {'velocity': velocity.tolist(), 'force': force.tolist()}
 
 
 def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
-    """Return velocities (m/s) and forces (N), (n,), of a mapping with both columns, or raise `DamperError`.
+    """Return velocities (m/s) and forces (N), (n,), of a mapping with both columns; raises `ParameterError`.
 
     The characteristic is odd, so both are magnitudes. It begins without force, else the pads would chatter.
     """
     if not isinstance(columns, Mapping) or sorted(map(str, columns)) != sorted(COLUMNS):
-        raise DamperError(f'the points of a damper must have the columns {" and ".join(COLUMNS)}, m/s and N')
+        raise ParameterError(
+            f'the points of a damper must have the columns {" and ".join(COLUMNS)}, m/s and N'
+        )
     velocity, force = (_numbers(name, columns[name]) for name in COLUMNS)
     if velocity.size != force.size:
-        raise DamperError(
+        raise ParameterError(
             f'velocity ({velocity.size} numbers) and force ({force.size} numbers) must be equally long'
         )
     if not 2 <= velocity.size <= MOST_POINTS:
-        raise DamperError(f'a damper needs 2 to {MOST_POINTS} points; instead received {velocity.size}')
+        raise ParameterError(f'a damper needs 2 to {MOST_POINTS} points; instead received {velocity.size}')
     if velocity[0] < 0.0 or velocity[-1] > HIGHEST_VELOCITY or not (np.diff(velocity) > 0.0).all():
-        raise DamperError(
+        raise ParameterError(
             f'velocity ({velocity[0]:g} .. {velocity[-1]:g} m/s) must rise strictly within '
             f'0 .. {HIGHEST_VELOCITY:g} m/s; give magnitudes, the characteristic is odd'
         )
     if force[0] != 0.0 or force.min() < 0.0 or force.max() > HIGHEST_FORCE:
-        raise DamperError(
+        raise ParameterError(
             f'force ({force[0]:g} N at first, {force.min():g} .. {force.max():g} N) must begin at 0 N and '
             f'lie within 0 .. {HIGHEST_FORCE:g} N; friction only opposes motion'
         )
     if not force.max() > 0.0:
-        raise DamperError('force must be greater than 0 N somewhere; else choose no damping by its levels')
+        raise ParameterError('force must be greater than 0 N somewhere; else choose no damping by its levels')
     return velocity, force
 
 
@@ -294,10 +292,10 @@ def _numbers(name: str, values: Any) -> FloatArray:
             raise TypeError
         numbers = np.array([float(value) for value in values])
     except (TypeError, ValueError):
-        raise DamperError(f'{name} must be a list of numbers; instead received {values!r:.60}') from None
+        raise ParameterError(f'{name} must be a list of numbers; instead received {values!r:.60}') from None
     if not np.isfinite(numbers).all():
         place = int(np.flatnonzero(~np.isfinite(numbers))[0])
-        raise DamperError(f'{name} must be finite; number {place + 1} is {numbers[place]:g}')
+        raise ParameterError(f'{name} must be finite; number {place + 1} is {numbers[place]:g}')
     return numbers
 
 
@@ -306,12 +304,14 @@ def _columns_of_csv(text: str) -> dict[str, list[float]]:
     rows = list(csv.reader(lines))
     header = [name.strip() for name in rows[0]] if rows else []
     if sorted(header) != sorted(COLUMNS):
-        raise DamperError(f'its first line must be {",".join(COLUMNS)}; instead it is {",".join(header)!r}')
+        raise ParameterError(
+            f'its first line must be {",".join(COLUMNS)}; instead it is {",".join(header)!r}'
+        )
     columns: dict[str, list[float]] = {name: [] for name in header}
     for row in rows[1:]:
         try:
             for name, value in zip(header, row, strict=True):
                 columns[name].append(float(value))
         except ValueError:
-            raise DamperError(f'{",".join(row)!r} is not a line of two numbers') from None
+            raise ParameterError(f'{",".join(row)!r} is not a line of two numbers') from None
     return columns

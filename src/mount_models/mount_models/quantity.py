@@ -19,6 +19,14 @@ class ParameterError(ValueError):
     """A parameter is missing, of the wrong kind or outside its range; the text says which and the remedy."""
 
 
+class LawRefusedError(ValueError):
+    """A law is not usable, or measurements lead to none; the text says why and the remedy."""
+
+
+class OutsideLawError(ValueError):
+    """A law was asked for something that it was never fitted to; the text says what and the remedy."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What a value means: unit, one sentence, allowed range (inclusive) and where it comes from.

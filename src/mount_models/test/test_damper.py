@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from mount_models.damper import (
     DAMPERS,
-    DamperError,
     DegressiveDamper,
     ProgressiveDamper,
     ViscousDamper,
@@ -128,7 +127,7 @@ def test_a_file_holds_the_same_points(tmp_path, name, text):
 def test_a_file_that_holds_no_points_is_refused_and_named(tmp_path, name, text, reason):
     file = tmp_path / name
     file.write_text(text)
-    with pytest.raises(DamperError, match=reason) as refused:
+    with pytest.raises(ParameterError, match=reason) as refused:
         damper_curve(str(file))
     assert f'damper file {file}' in str(refused.value)
 
@@ -141,49 +140,61 @@ def test_unknown_velocity_gives_unknown_force():
 @pytest.mark.parametrize(
     ('choice', 'error', 'sentence'),
     [
-        ('soft', DamperError, "no damper curve is called 'soft'; known are viscous_1000"),
-        ('viscous_5x', DamperError, 'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file'),
+        ('soft', ParameterError, "no damper curve is called 'soft'; known are viscous_1000"),
+        (
+            'viscous_5x',
+            ParameterError,
+            'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file',
+        ),
         (
             '{law: viscous',
-            DamperError,
+            ParameterError,
             "damper '{law: viscous' is not valid YAML in line 2: .*known .* viscous_1000",
         ),
-        ('{law: viscous, law: degressive}', DamperError, "line 1: the key 'law' stands there twice"),
+        ('{law: viscous, law: degressive}', ParameterError, "line 1: the key 'law' stands there twice"),
         ('viscous_0.5', ParameterError, r'damping_coefficient \(0.5 N s/m\) must lie within 1 \.\. 100000'),
-        ('{velocity: [0, 1]}', DamperError, 'must have the columns velocity and force, m/s and N'),
+        ('{velocity: [0, 1]}', ParameterError, 'must have the columns velocity and force, m/s and N'),
         (
             {'velocity': [0, 1], 'force': 3},
-            DamperError,
+            ParameterError,
             'force must be a list of numbers; instead received 3',
         ),
-        ({'velocity': [0, 1], 'force': [0, 'x']}, DamperError, 'force must be a list of numbers'),
-        ({'velocity': [0, 1, 2], 'force': [0, 1]}, DamperError, r'\(3 numbers\) and force \(2 numbers\)'),
-        ({'velocity': [0], 'force': [0]}, DamperError, 'needs 2 to 10000 points; instead received 1'),
-        ({'velocity': [0, np.nan], 'force': [0, 1]}, DamperError, 'velocity must be finite; number 2 is nan'),
+        ({'velocity': [0, 1], 'force': [0, 'x']}, ParameterError, 'force must be a list of numbers'),
+        ({'velocity': [0, 1, 2], 'force': [0, 1]}, ParameterError, r'\(3 numbers\) and force \(2 numbers\)'),
+        ({'velocity': [0], 'force': [0]}, ParameterError, 'needs 2 to 10000 points; instead received 1'),
+        (
+            {'velocity': [0, np.nan], 'force': [0, 1]},
+            ParameterError,
+            'velocity must be finite; number 2 is nan',
+        ),
         (
             {'velocity': [0, 0.1, 0.1], 'force': [0, 1, 2]},
-            DamperError,
+            ParameterError,
             'must rise strictly within 0 .. 1 m/s',
         ),
-        ({'velocity': [-0.1, 0.1], 'force': [0, 1]}, DamperError, 'give magnitudes'),
-        ({'velocity': [0, 2], 'force': [0, 1]}, DamperError, r'velocity \(0 \.\. 2 m/s\)'),
-        ({'velocity': [0, 1], 'force': [5, 9]}, DamperError, r'force \(5 N at first.* must begin at 0 N'),
-        ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, DamperError, 'friction only opposes motion'),
-        ({'velocity': [0, 1], 'force': [0, 1e5]}, DamperError, r'within 0 \.\. 10000 N'),
-        ({'velocity': [0, 1], 'force': [0, 0]}, DamperError, 'must be greater than 0 N somewhere'),
-        ('nowhere.csv', DamperError, r'damper file nowhere.csv cannot be read \(No such file or directory\)'),
-        ({'law': 'magic'}, DamperError, "no damper law is called 'magic'; known are viscous"),
-        ({'damping_coefficient': 5.0}, DamperError, 'no damper law is called None'),
+        ({'velocity': [-0.1, 0.1], 'force': [0, 1]}, ParameterError, 'give magnitudes'),
+        ({'velocity': [0, 2], 'force': [0, 1]}, ParameterError, r'velocity \(0 \.\. 2 m/s\)'),
+        ({'velocity': [0, 1], 'force': [5, 9]}, ParameterError, r'force \(5 N at first.* must begin at 0 N'),
+        ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, ParameterError, 'friction only opposes motion'),
+        ({'velocity': [0, 1], 'force': [0, 1e5]}, ParameterError, r'within 0 \.\. 10000 N'),
+        ({'velocity': [0, 1], 'force': [0, 0]}, ParameterError, 'must be greater than 0 N somewhere'),
+        (
+            'nowhere.csv',
+            ParameterError,
+            r'damper file nowhere.csv cannot be read \(No such file or directory\)',
+        ),
+        ({'law': 'magic'}, ParameterError, "no damper law is called 'magic'; known are viscous"),
+        ({'damping_coefficient': 5.0}, ParameterError, 'no damper law is called None'),
         ({'law': 'viscous', 'slope': 5.0}, ParameterError, "'slope' is no parameter of the viscous damper"),
         (ViscousDamper(-5.0), ParameterError, r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),
         (ViscousDamper(2000.0, dead_zone=-0.001), ParameterError, r'dead_zone \(-0.001 m/s\)'),
         (
             ViscousDamper(2000.0, dead_zone=1e-9),
-            DamperError,
+            ParameterError,
             r'dead_zone \(1e-09 m/s\) .* must be 0 or at least',
         ),
         (ViscousDamper(2000.0, force_limit=float('nan')), ParameterError, r'force_limit \(nan N\)'),
-        (ViscousDamper(90000.0, force_limit=2.0), DamperError, r'force_limit \(2 N\) of the damper'),
+        (ViscousDamper(90000.0, force_limit=2.0), ParameterError, r'force_limit \(2 N\) of the damper'),
     ],
 )
 def test_nonsense_is_refused_with_a_sentence(choice, error, sentence):

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterable
 from enum import Enum
 
+from mount_models.quantity import ParameterError
 from mount_ros.messages.event import Mark
 
 BURST = 10  # marks, chosen: so many of a kind in a row ...
@@ -22,10 +23,6 @@ class MarkKind(Enum):
     LOST_SAMPLE = 'lost_sample'
     UNANSWERED = 'unanswered'
     RECORDING_LOSS = 'recording_loss'
-
-
-class AutomaticMarksError(ValueError):
-    """A kind of mark is unknown; the text says which there are."""
 
 
 class AutomaticMarks:
@@ -72,14 +69,12 @@ class Ration:
 
 
 def mark_kinds(words: str) -> tuple[MarkKind, ...]:
-    """Return the kinds of a list of words such as `switch_on, fault`; raises `AutomaticMarksError`."""
+    """Return the kinds of a list of words such as `switch_on, fault`; raises `ParameterError`."""
     try:
         return tuple(MarkKind(word) for word in words.replace(',', ' ').split())
     except ValueError:
         known = ', '.join(kind.value for kind in MarkKind)
-        raise AutomaticMarksError(
-            f'automatic_marks must be some of {known}; instead received {words!r}'
-        ) from None
+        raise ParameterError(f'automatic_marks must be some of {known}; instead received {words!r}') from None
 
 
 def of_mount(mount: str) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from mount_models.quantity import ParameterError
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 from mount_recorder.mcap_writer import CHUNK_SIZE, McapWriter
 from mount_recorder.metadata import (
@@ -45,10 +46,6 @@ class RecordingError(ValueError):
     """A recording cannot be made or continued; the text says why and what stands on the disk."""
 
 
-class SplitError(ValueError):
-    """A size or a duration of files is not understood or out of range; the text says what is."""
-
-
 class SplitRule(NamedTuple):
     """The limits of a file: bytes of `size`, ns of log time in `duration`; 0 is no limit."""
 
@@ -61,11 +58,15 @@ WHOLE = SplitRule()
 
 
 def checked_rule(rule: SplitRule) -> SplitRule:
-    """Return `rule` if its limits are large enough to make sense; raises `SplitError`."""
+    """Return `rule` if its limits are large enough to make sense; raises `ParameterError`."""
     if rule.size and rule.size < LEAST_SIZE:
-        raise SplitError(f'split size ({rule.size} bytes) must be at least {LEAST_SIZE} bytes, or 0 for none')
+        raise ParameterError(
+            f'split size ({rule.size} bytes) must be at least {LEAST_SIZE} bytes, or 0 for none'
+        )
     if rule.duration and rule.duration < LEAST_DURATION:
-        raise SplitError(f'split duration ({rule.duration / 1e9:g} s) must be at least 1 s, or 0 for none')
+        raise ParameterError(
+            f'split duration ({rule.duration / 1e9:g} s) must be at least 1 s, or 0 for none'
+        )
     return rule
 
 

@@ -37,5 +37,5 @@ class RecorderParameters(NamedTuple):
 
 
 def split_of(parameters: RecorderParameters) -> SplitRule:
-    """Return the limits of a file; raises `SplitError`."""
+    """Return the limits of a file; raises `ParameterError`."""
     return checked_rule(SplitRule(parameters.split_size, round(1e9 * parameters.split_duration)))

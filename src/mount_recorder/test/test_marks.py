@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 from read_back import read_back
 from samples import PERIOD, START, sample
 
-from mount_recorder.automatic_marks import (
-    BURST,
-    REFILL,
-    AutomaticMarks,
-    AutomaticMarksError,
-    MarkKind,
-    mark_kinds,
-)
+from mount_models.quantity import ParameterError
+from mount_recorder.automatic_marks import BURST, REFILL, AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.recorder import Recorder
 from mount_recorder.watching import FaultWatch, SampleWatch
 from mount_ros.messages.cdr import serialised
@@ -163,7 +157,7 @@ def test_kinds_that_are_not_wanted_are_not_marked_and_unknown_ones_are_refused(s
     AutomaticMarks(sent.append, mark_kinds('fault, switch_on')).mark(MarkKind.LOST_SAMPLE, 0, '')
     assert sent == []
     assert mark_kinds('') == ()
-    with pytest.raises(AutomaticMarksError, match=r"some of switch_on, fault.*'fault earthquake'"):
+    with pytest.raises(ParameterError, match=r"some of switch_on, fault.*'fault earthquake'"):
         mark_kinds('fault earthquake')
 
 

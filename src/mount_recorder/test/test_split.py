@@ -12,14 +12,8 @@ from rosbags.highlevel import AnyReader
 from samples import PERIOD, START, sample
 from small_disk import small_disk
 
-from mount_recorder.bag_writer import (
-    PIECE_RECORD,
-    BagWriter,
-    RecordingError,
-    SplitError,
-    SplitRule,
-    checked_rule,
-)
+from mount_models.quantity import ParameterError
+from mount_recorder.bag_writer import PIECE_RECORD, BagWriter, RecordingError, SplitRule, checked_rule
 from mount_recorder.record_file import RecordFile
 from mount_ros.topics import DISPLACEMENT
 
@@ -164,7 +158,7 @@ def test_a_step_of_the_log_times_neither_loses_nor_doubles_a_message(tmp_path, s
 
 
 def test_rule_given_as_numbers_is_checked_too():
-    with pytest.raises(SplitError, match='at least'):
+    with pytest.raises(ParameterError, match='at least'):
         checked_rule(SplitRule(size=1))
 
 

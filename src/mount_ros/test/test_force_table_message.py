@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
-from mount_ros.messages.force_table import (
-    ForceTableMessageError,
-    from_bytes,
-    from_message,
-    to_message,
-)
+from mount_ros.messages.force_table import from_bytes, from_message, to_message
+from mount_ros.messages.scalars import MessageError
 
 STAMP = 1_700_000_000_123_456_789
 TABLE = np.array([[0.4725, 0.8, 1.6, 3.0], [0.0, 40.0, 200.0, 304.0]])
@@ -50,7 +46,7 @@ def test_layout_names_rows_sizes_strides_and_the_activation():
     ],
 )
 def test_what_is_no_table_is_neither_sent_nor_read(table, sentence):
-    with pytest.raises(ForceTableMessageError, match=sentence):
+    with pytest.raises(MessageError, match=sentence):
         to_message(STAMP, table)
     rows = np.asarray(table, float)
     if rows.ndim == 2 and rows.shape[0] == 2:
@@ -58,28 +54,28 @@ def test_what_is_no_table_is_neither_sent_nor_read(table, sentence):
         message.data = rows.ravel().tolist()
         message.layout.dim[0].stride = rows.size
         message.layout.dim[1].size = message.layout.dim[1].stride = rows.shape[1]
-        with pytest.raises(ForceTableMessageError, match=sentence):
+        with pytest.raises(MessageError, match=sentence):
             from_message(message)
 
 
 def test_a_message_of_other_dimensions_is_refused():
     message = to_message(STAMP, TABLE)
     message.layout.dim = message.layout.dim[:1]
-    with pytest.raises(ForceTableMessageError, match=r'2 x N numbers.*holds 8 with'):
+    with pytest.raises(MessageError, match=r'2 x N numbers.*holds 8 with'):
         from_message(message)
 
 
 def test_a_message_with_other_rows_is_refused():
     message = to_message(STAMP, TABLE)
     message.layout.dim[0].label = 'normal_force, current'
-    with pytest.raises(ForceTableMessageError, match='normal_force, current'):
+    with pytest.raises(MessageError, match='normal_force, current'):
         from_message(message)
 
 
 def test_a_truncated_message_is_refused():
     message = to_message(STAMP, TABLE)
     message.data = message.data[:-1]
-    with pytest.raises(ForceTableMessageError, match=r'2 x N numbers.*holds 7 with'):
+    with pytest.raises(MessageError, match=r'2 x N numbers.*holds 7 with'):
         from_message(message)
 
 
@@ -87,10 +83,10 @@ def test_a_truncated_message_is_refused():
 def test_a_table_that_does_not_name_its_activation_is_refused(label):
     message = to_message(STAMP, TABLE)
     message.layout.dim[1].label = label
-    with pytest.raises(ForceTableMessageError, match='must name its activation'):
+    with pytest.raises(MessageError, match='must name its activation'):
         from_message(message)
 
 
 def test_a_refusal_tells_the_remedy():
-    with pytest.raises(ForceTableMessageError, match='activate mount_init again'):
+    with pytest.raises(MessageError, match='activate mount_init again'):
         to_message(STAMP, np.zeros((2, 3)))

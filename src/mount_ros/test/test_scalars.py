@@ -11,7 +11,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from mount_ros.messages import scalars
-from mount_ros.messages.scalars import OneNumberLayout, ScalarsError, ScalarsLayout, ScalarsReader, stamp_of
+from mount_ros.messages.scalars import MessageError, OneNumberLayout, ScalarsLayout, ScalarsReader, stamp_of
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, control_trace
 
 STAMP = 1_763_680_000_123_456_789
@@ -77,7 +77,7 @@ def test_missing_velocities_are_unknown_and_not_zero():
 
 def test_a_message_without_the_declared_name_is_refused():
     message = JointState(name=['throttle'], position=[1.0])
-    with pytest.raises(ScalarsError, match=r"displacement: the message names \['throttle'\]"):
+    with pytest.raises(MessageError, match=r"displacement: the message names \['throttle'\]"):
         ScalarsLayout(DISPLACEMENT).unpack(serialize_message(message))
 
 
@@ -100,5 +100,5 @@ def test_many_messages_packed_at_once_are_those_packed_one_by_one(entries):
 
 
 def test_a_stamp_that_no_message_can_carry_is_refused():
-    with pytest.raises(ScalarsError, match='stamps must lie within'):
+    with pytest.raises(MessageError, match='stamps must lie within'):
         ScalarsLayout(DISPLACEMENT).pack_rows(np.array([0, 2**31 * 10**9]), np.zeros((2, 1)))

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from mount_models.quantity import ParameterError, quantities, with_values
 from mount_sim.plant.closing import (
-    ClosingError,
     ClosingMechanics,
     checked_closing,
     closed_state,
@@ -145,7 +144,7 @@ def test_unknown_arguments_lead_to_unknown_states(current, before):
 
 def test_pads_that_touch_at_rest_are_refused():
     with pytest.raises(
-        ClosingError, match=r'contact_gap \(520\.0 um\) must lie below rest_gap \(508\.0 um\)'
+        ParameterError, match=r'contact_gap \(520\.0 um\) must lie below rest_gap \(508\.0 um\)'
     ):
         checked_closing(MOUNT._replace(contact_gap=520e-6), MAGNET)
 
@@ -153,7 +152,7 @@ def test_pads_that_touch_at_rest_are_refused():
 def test_springs_that_the_magnet_never_overcomes_are_refused():
     stiff = MOUNT._replace(spring_stiffness=9e6)
     assert math.isnan(contact_current(stiff, MAGNET))
-    with pytest.raises(ClosingError, match=r'contact force \(1431\.0 N\) is beyond'):
+    with pytest.raises(ParameterError, match=r'contact force \(1431\.0 N\) is beyond'):
         checked_closing(stiff, MAGNET)
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mount_driver.layout import OutOfRangeError
 from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
+from mount_models.quantity import ParameterError
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim import quantisation
 
@@ -27,7 +27,7 @@ def over_can(name, value):
     """Return what comes out of the codec; NaN where it refuses."""
     try:
         data = CODEC.encode_measurement(SAMPLE._replace(**{name: value}), 0)
-    except OutOfRangeError:
+    except ParameterError:
         return math.nan
     return getattr(CODEC.decode_measurement(data)[1], name)
 
@@ -60,7 +60,7 @@ def test_a_reading_is_quantised_as_over_can(name):
 def test_a_setpoint_is_quantised_as_over_can(value):
     try:
         expected = CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
-    except OutOfRangeError:
+    except ParameterError:
         expected = math.nan
     assert same_bits(quantisation.quantised_setpoint_current(value), expected)
 
@@ -76,7 +76,7 @@ def test_a_coil_temperature_is_quantised_as_over_can(value):
         expected = CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0))[
             1
         ].coil_temperature_celsius
-    except OutOfRangeError:
+    except ParameterError:
         expected = math.nan
     assert same_bits(quantisation.quantised_coil_temperature(value), expected)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from mount_models.quantity import ParameterError
 from mount_sim.plant.reluctance import force
 from mount_sim.rack.coil import (
     GAPS,
     Rack,
-    RackError,
     drawn_rack,
     measure_force,
     record_ripple,
@@ -44,7 +44,7 @@ def test_ripple_leads_to_the_inductance_of_the_coil():
 
 def test_a_current_that_the_bridge_cannot_hold_is_refused():
     with pytest.raises(
-        RackError, match=r'the bridge cannot hold .* at 120 degC and 14 V; lower peak_current'
+        ParameterError, match=r'the bridge cannot hold .* at 120 degC and 14 V; lower peak_current'
     ):
         record_ripple(Rack(), 349e-6, 120.0, peak_current=4.5)
 

@@ -5,7 +5,6 @@ import pytest
 
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
-from mount_sim.plant.closing import ClosingError
 from mount_sim.plant.plant import TRUTH, Plant, PlantSimulation
 
 
@@ -136,7 +135,7 @@ def test_the_noise_is_no_part_of_the_truth(make_mount, drive):
 
 def test_an_impossible_plant_is_refused():
     crossed = Plant()._replace(mechanics=Plant().mechanics._replace(rest_gap=340e-6))
-    with pytest.raises(ClosingError):
+    with pytest.raises(ParameterError):
         PlantSimulation(crossed, Seat.BENCH, 5e-5)
     negative = Plant()._replace(friction=Plant().friction._replace(scale=-1.0))
     with pytest.raises(ParameterError, match='scale'):

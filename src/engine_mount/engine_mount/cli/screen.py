@@ -20,7 +20,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from engine_mount.cli.terminal import note
-from engine_mount.recordings.run.screen import Bar, Line, Screen, Table
+from engine_mount.recordings.screen import Bar, Line, Screen, Table
 
 _PLAIN_PERIOD = 10.0  # s, chosen
 

@@ -7,16 +7,15 @@ from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
 from engine_mount.drives.inputs.input import ReplayInput, Times
-from engine_mount.recordings.compare.compare import switching_sentence
-from engine_mount.recordings.compare.signals import (
+from engine_mount.recordings.difference import (
     Column,
     Quantity,
     SignalDifference,
     signal_difference,
     signal_sentences,
 )
-from engine_mount.recordings.compare.tolerances import EXACT
-from engine_mount.recordings.events.switching_changes import Switching, paired_switchings, switching_times
+from engine_mount.recordings.switching import Switching, paired_switchings, switching_times
+from engine_mount.recordings.tolerances import EXACT
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 
 # Where a recording begins in the middle of control: what the controller remembered is not in it. The
@@ -126,7 +125,7 @@ def switching_changes(recorded: Switching, replayed: Switching, sample_time: flo
     """Return the switchings that appeared, vanished or moved, in words; `sample_time` in s."""
     a, b = ((np.array(times.on), np.array(times.off)) for times in (recorded, replayed))
     changes = paired_switchings(a, b, sample_time)
-    return [switching_sentence(change, *_NAMES) for change in changes if change.alone or change.moved]
+    return [change.sentence(*_NAMES) for change in changes if change.alone or change.moved]
 
 
 def _intermediates(

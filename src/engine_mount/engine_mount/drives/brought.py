@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.place import recording_hash
 from mount_bringup.graph.nodes import SIM
 
 FOLDER = 'given'

@@ -16,10 +16,10 @@ from engine_mount.drives.keyboard import MARK_KEYS, Keyboard
 from engine_mount.drives.loop.recording import record_car, record_core
 from engine_mount.drives.preflight import preflight
 from engine_mount.drives.progress import DriveProgress
-from engine_mount.recordings.run.folder import RunFolder, make_run_folder
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.excitation import with_array
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (

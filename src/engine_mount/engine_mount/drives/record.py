@@ -14,7 +14,7 @@ from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
 from engine_mount.drives.keyboard import MARK_KEYS, Keyboard
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
 from mount_recorder.diagnosis import OnFull

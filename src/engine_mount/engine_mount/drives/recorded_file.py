@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.drives.brought import Brought
-from engine_mount.recordings.signals.even_grid import evenly_spaced
-from engine_mount.recordings.signals.signal import Signal
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.importing.provenance import told_columns, told_mapping, told_source
 from engine_mount.signals.importing.topics import recorded_as
+from engine_mount.signals.signal import Signal
 from engine_mount.signals.units.columns import read_chosen, stated_with
 from engine_mount.signals.units.mapping import (
     ColumnChoice,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from engine_mount.recordings.run.amounts import duration_in_nanoseconds, split_rule
+from engine_mount.settings.amounts import duration_in_nanoseconds, split_rule
 from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.automatic_marks import mark_kinds
 from mount_recorder.diagnosis import OnFull
@@ -11,7 +11,7 @@ from mount_recorder.parameters import RecorderParameters, split_of
 
 
 def recorder_options(split: Sequence[str], snapshot: str, snapshot_after: str = '') -> dict[str, Any]:
-    """Return {parameter: value} of texts such as `500MB`, `60s`; raises `SplitError`."""
+    """Return {parameter: value} of texts such as `500MB`, `60s`; raises `ParameterError`."""
     options: dict[str, Any] = {}
     if split:
         rule = split_rule(split)

@@ -13,10 +13,9 @@ from engine_mount.drives.inputs.input import ReplayError, ReplayInput, replay_in
 from engine_mount.drives.inputs.parameter_changes import without
 from engine_mount.drives.other_policy import check_effect
 from engine_mount.drives.output import write_replay
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.folder import RunFolder, make_run_folder
-from engine_mount.recordings.run.place import open_mount
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.place import open_mount
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import (
     SessionError,
     recorded_session,
     session_content,
@@ -30,6 +29,7 @@ from engine_mount.settings.chosen import (
     control_parameters,
 )
 from engine_mount.settings.options import owned
+from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law

@@ -16,10 +16,10 @@ from engine_mount.drives.agreement import (
 from engine_mount.drives.core import Replayed
 from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.drives.replay import LOCKSTEP, ReplayOutcome
-from engine_mount.recordings.compare.signals import Moment
-from engine_mount.recordings.events.switching_changes import Switching
-from engine_mount.recordings.run.screen import Screen, Table
-from engine_mount.recordings.run.session import version_differences, versions_sentence
+from engine_mount.recordings.difference import Moment
+from engine_mount.recordings.screen import Screen, Table
+from engine_mount.recordings.session import version_differences, versions_sentence
+from engine_mount.recordings.switching import Switching
 from mount_recorder.versions import versions
 
 _SHOWN = 8  # switchings in the printed summary

@@ -1,12 +1,18 @@
 """From names and options to orders, all checked before the first experiment runs; then one by one."""
 
 from pathlib import Path
-from typing import Any
 
-from engine_mount.experiments.harness.contract import Experiment, ExperimentError, Order, Outcome, Progress
-from engine_mount.recordings.run.folder import RunFolderError, new_place
-from engine_mount.recordings.run.screen import Bar, Screen
+from engine_mount.experiments.harness.contract import (
+    Experiment,
+    ExperimentError,
+    Order,
+    Outcome,
+    Progress,
+    Values,
+)
+from engine_mount.recordings.screen import Bar, Screen
 from engine_mount.settings.options import settings_of_options
+from engine_mount.settings.run_folder import RunFolderError, new_place
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.quantity import with_flattened
 
@@ -22,7 +28,7 @@ def orders(experiments: list[Experiment], options: list[str], out: Path | None, 
                     f'{experiment.name} has no graph to run through: neither controller nor CAN bus take '
                     'part in it; leave out --graph'
                 )
-    known: dict[str, dict[str, Any]] = {}
+    known: dict[str, Values] = {}
     for experiment in experiments:
         known |= experiment.known_settings() | (defaults_of_nodes() if experiment.closed_loop else {})
     settings = checked_settings(settings_of_options(options, known), known, 'owner of parameters here')

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from engine_mount.experiments.harness.contract import Experiment, Holds, Outcome
-from engine_mount.recordings.run.screen import Screen, Table
+from engine_mount.recordings.screen import Screen, Table
 
 _FIGURES = 'figures'
 _HEAD = """# The paper's experiments, repeated

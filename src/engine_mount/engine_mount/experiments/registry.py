@@ -1,4 +1,4 @@
-"""All experiments by name, in the order of the paper's figures; each is loaded when it is asked for."""
+"""All experiments by name, in the order of the paper's figures; each is loaded when it is wanted."""
 
 from importlib import import_module
 
@@ -6,34 +6,33 @@ from engine_mount.experiments.harness.contract import Experiment, ExperimentErro
 
 ALL = 'all'
 
-NAMES = (
-    'force_characteristic',
-    'field_penetration',
-    'inductance_map',
-    'ramp_and_hold',
-    'sawtooth',
-    'bench',
-    'sweep',
-    'motorway_gap',
-    'sensitivity',
-    'policy',
-    'recorded_drive',
-    'measured_road',
-)
-"""The names of the experiments, which are those of their folders."""
+NAMES = {
+    'force_characteristic': ('Force of the actuator over current and gap', 'Fig. 2'),
+    'field_penetration': ("How far the ripple's field enters the iron", 'Fig. 3'),
+    'inductance_map': ('Incremental inductance over current and gap', 'Fig. 4'),
+    'ramp_and_hold': ('Ramp and hold of the sticking contact', 'Fig. 7'),
+    'sawtooth': ('Friction contact alone on a saw tooth', 'Figs. 8 to 11'),
+    'bench': ('Friction mount and hydromount on a test rack', 'Fig. 13'),
+    'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
+    'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
+    'sensitivity': ('What the comparison with the hydromount depends on', 'Figs. 13, 14'),
+    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 6, 7'),
+    'recorded_drive': ('A recorded drive', 'Sec. 7'),
+    'measured_road': ('A measured road', 'Sec. 7'),
+}
+"""{name of the experiment and its file: (title, section or figure of the paper)}."""
 
 
 def listed() -> list[tuple[str, str, str]]:
     """Return name, reference in the paper and title of every experiment, without loading any."""
-    folders = {name: import_module(f'{__package__}.{name}') for name in NAMES}
-    return [(name, folder.REFERENCE, folder.TITLE) for name, folder in folders.items()]
+    return [(name, reference, title) for name, (title, reference) in NAMES.items()]
 
 
 def experiment_named(name: str) -> Experiment:
     """Return the experiment of this name; raises `ExperimentError` for an unknown one."""
     if name not in NAMES:
         raise ExperimentError(f'{name!r} is no experiment; known are {", ".join((*NAMES, ALL))}')
-    experiment: Experiment = import_module(f'{__package__}.{name}.experiment').EXPERIMENT
+    experiment: Experiment = import_module(f'{__package__}.{name}').EXPERIMENT
     return experiment
 
 

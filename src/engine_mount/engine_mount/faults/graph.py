@@ -15,8 +15,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from engine_mount.faults.observers import Observers, Told, since
-from mount_bringup.graph.domain import DomainError, can_port, domain_lock
+from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import CONTROL, SIM, SIMULATED
+from mount_models.quantity import ParameterError
 from mount_ros.nodes.process import tied
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
@@ -207,7 +208,7 @@ class GraphUnderTest:
         try:
             with domain_lock(self.domain, self.namespace):
                 pass
-        except DomainError as error:
+        except ParameterError as error:
             left.append(str(error))
         return left
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from engine_mount.faults.case import SAFE, FaultCase, Reaction
 from engine_mount.faults.judge import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
-from engine_mount.recordings.run.screen import Table
+from engine_mount.recordings.screen import Table
 
 Rows = Mapping[FaultCase, Outcome]
 

@@ -14,7 +14,7 @@ from engine_mount.drives.replay import ReplayOrder, ReplayOutcome, replay_withou
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from engine_mount.fleet.what_if.closed_loop import both_motions
 from engine_mount.fleet.what_if.compared import recorded_in
-from engine_mount.recordings.run.place import open_mount
+from engine_mount.recordings.place import open_mount
 from engine_mount.signals.sources.stores import local_copy
 
 Column = NDArray[np.float64]

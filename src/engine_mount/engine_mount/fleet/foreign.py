@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import Recording
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading
 from engine_mount.signals.formats.reading import headings, is_foreign

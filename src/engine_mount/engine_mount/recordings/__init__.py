@@ -1,7 +1,7 @@
 """Recordings read, audited, compared and edited."""
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording, open_recording
-from engine_mount.recordings.messages.series import Series, SeriesError
+from engine_mount.recordings.recording import ReadingError, Recording, open_recording
+from engine_mount.recordings.series import Series, SeriesError
 
 open = open_recording
 

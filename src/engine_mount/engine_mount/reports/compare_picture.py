@@ -10,9 +10,9 @@ matplotlib.use('Agg')
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.compare.compare import Comparison, matched_topics
-from engine_mount.recordings.compare.signals import Column, SignalDifference, by_importance
+from engine_mount.recordings.compare import Comparison, matched_topics
+from engine_mount.recordings.difference import Column, SignalDifference, by_importance
+from engine_mount.recordings.recording import Recording
 from engine_mount.reports.drawing.style import COLOURS, DIFFERENCE_COLOUR
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 

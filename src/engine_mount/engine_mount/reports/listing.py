@@ -7,10 +7,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.run.folder import RunFolder
-from engine_mount.recordings.run.place import open_run
-from engine_mount.recordings.run.session import duration_of, session_parameters, started_of, told_session
+from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.session import duration_of, session_parameters, started_of, told_session
+from engine_mount.settings.run_folder import RunFolder
 from engine_mount.signals.sources.local import local_path
 from engine_mount.signals.sources.source import SourceError
 from engine_mount.signals.sources.stores import is_local, outline

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.compare.alignment import ComparisonError
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.alignment import ComparisonError
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.report import ReportError, make_report, subjects_of
 from engine_mount.reports.run_facts import run_facts
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from engine_mount.recordings.audit.audit import TopicAudit, audit
-from engine_mount.recordings.audit.losses import Losses, losses
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.events.recorded_events import read_marks
-from engine_mount.recordings.run.screen import Table
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.audit import TopicAudit, audit
+from engine_mount.recordings.events import read_marks
+from engine_mount.recordings.losses import Losses, losses
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.screen import Table
+from engine_mount.recordings.session import (
     duration_of,
     session_parameters,
     started_of,

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.compare.alignment import ComparisonError, share_stamps
+from engine_mount.recordings.alignment import ComparisonError, share_stamps
+from engine_mount.recordings.recording import Recording
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.sections import overview, run_sections, signal_sections
 from engine_mount.reports.sections.section import Section

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.run.session import SessionError, session_content, session_parameters
+from engine_mount.recordings.session import SessionError, session_content, session_parameters
 from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import load_drive

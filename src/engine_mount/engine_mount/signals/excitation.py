@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
-from engine_mount.recordings.signals.loading import load_signal
-from engine_mount.recordings.signals.plausibility import check_size
-from engine_mount.recordings.signals.resampling import resampled
+from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.signals.loading import load_signal
+from engine_mount.signals.plausibility import check_size
+from engine_mount.signals.resampling import resampled
 from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.series import StreamedSeries
 from mount_models.quantity import flattened

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from engine_mount.cli.command import app
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.preflight import preflight
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from mount_ros.topics import TOPICS
 
 STREAMS = {f'/{topic.name}' for topic in TOPICS if topic.rate >= 1000.0}

@@ -9,17 +9,19 @@ from typer.testing import CliRunner
 
 import engine_mount
 from engine_mount.cli.command import app
-from engine_mount.experiments import page
-from engine_mount.experiments.field_penetration import experiment as field_penetration
-from engine_mount.experiments.force_characteristic import experiment as force_characteristic
+from engine_mount.experiments import (
+    field_penetration,
+    force_characteristic,
+    inductance_map,
+    page,
+    ramp_and_hold,
+    sawtooth,
+)
 from engine_mount.experiments.harness.contract import Experiment, Holds, Order, Outcome, Statement
-from engine_mount.experiments.inductance_map import experiment as inductance_map
-from engine_mount.experiments.ramp_and_hold import experiment as ramp_and_hold
 from engine_mount.experiments.registry import NAMES, experiment_named
-from engine_mount.experiments.sawtooth import experiment as sawtooth
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
-from engine_mount.recordings.audit.audit import audit
+from engine_mount.recordings.audit import audit
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 

@@ -8,17 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from engine_mount.experiments import page
-from engine_mount.experiments.bench import experiment as bench
+from engine_mount.experiments import bench, motorway_gap, page, sensitivity, sweep
 from engine_mount.experiments.harness.contract import Experiment, ExperimentError, Holds, Order, Outcome
-from engine_mount.experiments.motorway_gap import experiment as motorway_gap
+from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
+from engine_mount.experiments.harness.measures import sweep_parameters
 from engine_mount.experiments.registry import NAMES, experiment_named
-from engine_mount.experiments.sensitivity import experiment as sensitivity
-from engine_mount.experiments.sensitivity.grid import Job, run_all, run_job
-from engine_mount.experiments.sweep import experiment as sweep
-from engine_mount.experiments.sweep.evaluation import defined_peak
-from engine_mount.recordings.bag.recording import open_recording
-from mount_models.damper import DamperError, damper_curve
+from engine_mount.experiments.sweep import defined_peak
+from engine_mount.recordings.recording import open_recording
+from mount_models.damper import damper_curve
 from mount_models.quantity import ParameterError
 
 pytestmark = pytest.mark.slow
@@ -140,7 +137,7 @@ def test_plain_coulomb_has_the_harmonics_of_a_rectangle_and_no_even_ones(rack):
 
 def test_an_unknown_damper_is_refused_before_anything_is_made(tmp_path):
     for module in (bench, sweep, motorway_gap, sensitivity):
-        with pytest.raises(DamperError, match='no damper curve'):
+        with pytest.raises(ParameterError, match='no damper curve'):
             run(module, tmp_path / 'out', damper='stiff')
     assert not (tmp_path / 'out').exists()
 
@@ -307,8 +304,8 @@ def test_what_fails_in_a_process_ends_the_grid_with_its_reason():
 
 
 def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):
-    own = sweep._own(sweep.SweepParameters(last_frequency=14.5, idle_amplitude=0.0), 'hydro', 0.0)
-    _, found = run_job(Job(('hydro',), own))
+    sim = {**sweep_parameters(0.12, 14.5), 'mount': 'hydro'}
+    _, found = run_job(Job(('hydro',), {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}))
     assert found['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
 
 

@@ -16,9 +16,9 @@ from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.looks.force_zero import zeroed
 from engine_mount.identification.friction.recording import IdentificationError
 from engine_mount.identification.rack.given import described
-from engine_mount.recordings.run.place import recording_hash
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.recordings.place import recording_hash
 from engine_mount.settings.chosen import chosen_control
+from engine_mount.signals.signal import SignalError
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen, load_specimen

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 import engine_mount
 from engine_mount.cli.command import app
 from engine_mount.cli.commands.record import _told
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.report import sentences
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.audit_report import sentences
+from engine_mount.recordings.losses import losses
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
 from mount_ros.messages.scalars import ScalarsLayout

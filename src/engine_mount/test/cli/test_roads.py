@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from engine_mount.cli.command import main
-from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.run.place import recording_hash
-from engine_mount.recordings.run.session import recorded_session
+from engine_mount.recordings.place import recording_hash
+from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.session import recorded_session
 from mount_control.policy.registry import POLICIES
 from mount_sim.excitation.road import RandomRoad, random_road
 

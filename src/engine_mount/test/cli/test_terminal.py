@@ -10,7 +10,7 @@ import engine_mount.cli
 from engine_mount.cli.command import app, main
 from engine_mount.cli.screen import TerminalScreen
 from engine_mount.cli.terminal import refuse, terminal
-from engine_mount.recordings.run.screen import Table
+from engine_mount.recordings.screen import Table
 
 SOURCES = Path(engine_mount.cli.__file__).parents[3]
 TEXT = 'a [/g] of [red]Weg [mm][/red]: {"columns": ["time", "[/x]"]} :smile:'

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from engine_mount.cli.command import main
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.recordings.bag.recording import open_recording
+from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.settings.chosen import chosen_control, policy_of

@@ -7,8 +7,8 @@ import pytest
 
 from engine_mount.drives import drive
 from engine_mount.drives.drive import DriveOrder
-from engine_mount.recordings.run.folder import make_run_folder
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
+from engine_mount.settings.run_folder import make_run_folder
 from mount_bringup.graph.nodes import CONTROL, RECORDER
 from mount_sim.excitation.excitation import Excitation, Seat
 

@@ -3,7 +3,7 @@
 import pytest
 
 from engine_mount.drives import record
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.screen import Screen
 from mount_recorder.bag_writer import RecordingError
 from mount_recorder.parameters import RecorderParameters
 from mount_ros import environment

@@ -7,24 +7,50 @@ import math
 import re
 from dataclasses import fields
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from engine_mount.experiments.check import session, trial
-from engine_mount.experiments.check.judgement import Judged, all_verdicts, passed, verdicts_of, worst_first
-from engine_mount.experiments.check.measures import MEASURES
-from engine_mount.experiments.check.page import write_page
-from engine_mount.experiments.check.session import CheckError, CheckOrder, run_trials, trials_of
-from engine_mount.experiments.check.suite import SuiteError, chosen_of, shipped_suite, suite_in_file, suite_of
-from engine_mount.experiments.check.telling import Told, figures_of, table_of
-from engine_mount.experiments.check.trial import CORE, GRAPH, LOCKSTEP, Result, Shown, at_samples, broken_down
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.experiments.check import run
+from engine_mount.experiments.check.report import (
+    Judged,
+    Told,
+    all_verdicts,
+    figures_of,
+    passed,
+    table_of,
+    verdicts_of,
+    worst_first,
+    write_page,
+)
+from engine_mount.experiments.check.run import (
+    CORE,
+    GRAPH,
+    LOCKSTEP,
+    CheckError,
+    CheckOrder,
+    Result,
+    Shown,
+    at_samples,
+    broken_down,
+    run_trials,
+    trials_of,
+)
+from engine_mount.experiments.check.suite import (
+    MEASURES,
+    SuiteError,
+    chosen_of,
+    shipped_suite,
+    suite_in_file,
+    suite_of,
+)
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import Truth
-from mount_bringup.graph.domain import DomainError
 from mount_bringup.graph.nodes import GraphError
 from mount_bringup.graph.shutdown import Interrupted
 from mount_models.plain_yaml import plain_yaml
+from mount_models.quantity import ParameterError
 
 PAGE = Path(__file__).resolve().parents[4] / 'docs' / 'how-to' / 'check_a_change.md'
 LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
@@ -58,7 +84,7 @@ def test_the_shipped_suite_names_a_reason_and_a_source_for_every_limit_and_can_b
     assert {'gap_10mm', 'gap_20mm', 'gap_30mm', 'rough_road', 'sweep', 'idle', 'rack', 'tip_in'} <= {
         each.name for each in suite
     }
-    assert all(limit.reason and limit.source for each in suite for limit in (*each.limits, *each.common))
+    assert all(limit.reason and limit.source for each in suite for limit in each.limits)
     for through in (CORE, LOCKSTEP, GRAPH):
         assert len(trials_of(CheckOrder(suite, through), tmp_path)) == len(suite)
 
@@ -166,19 +192,15 @@ def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
         trials_of(CheckOrder(late), tmp_path)
 
 
-@pytest.mark.parametrize('error', [GraphError('no gap'), DomainError('a graph already runs')])
+@pytest.mark.parametrize('error', [GraphError('no gap'), ParameterError('a graph already runs')])
 def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
-    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(error))
+    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=error))
     made = trials(tmp_path, through=GRAPH)[0]
-    broken = trial.run_trial(made)
+    broken = run.run_trial(made)
     assert (broken.figures, broken.broke_down) == ({}, str(error))
-    monkeypatch.setattr(trial, 'record_drive', lambda *_: raise_(Interrupted()))
+    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=Interrupted()))
     with pytest.raises(Interrupted):
-        trial.run_trial(made)
-
-
-def raise_(error):
-    raise error
+        run.run_trial(made)
 
 
 class Seen(Screen):
@@ -196,28 +218,20 @@ class Seen(Screen):
         yield lambda share, what='', detail='': self.shares.append((round(share, 3), what, detail))
 
 
-def test_each_manoeuvre_is_told_when_it_is_done_and_the_bar_goes_on_within_it(tmp_path, monkeypatch):
+def test_each_manoeuvre_is_told_when_it_is_done_with_its_share_of_the_time(tmp_path, monkeypatch):
     given = content(set={**ROAD, 'mount_sim.timeline.duration': 17})  # 3 and 17 s, each behind a start
-
-    def drive(made, screen):
-        with screen.bar('driving') as show:
-            show(0.5, detail='no damping yet')
-        screen.say('of the drive alone')
-        return result(peak_over_undamped=0.9) if made.manoeuvre.name == 'first' else result()
-
-    monkeypatch.setattr(session, 'run_trial', drive)
+    first = result(peak_over_undamped=0.9)
+    monkeypatch.setattr(run, 'run_trial', lambda made: first if made.manoeuvre.name == 'first' else result())
     made = trials_of(CheckOrder(suite_of(given), GRAPH), tmp_path)
-    first = made[0].seconds / (made[0].seconds + made[1].seconds)
+    share = made[0].seconds / (made[0].seconds + made[1].seconds)
     screen, seen = Seen(), []
-    results = run_trials(made, 0, screen, lambda *told: seen.append((*told, list(screen.shares))))
+    results = run_trials(
+        made, 0, screen, lambda name, _, done: seen.append((name, done, list(screen.shares)))
+    )
     assert [*results] == ['first', 'second']
-    assert results['first'].figures['peak_over_undamped'] == 0.9
-    assert [(name, round(share, 3)) for name, _, share, _ in seen] == [
-        ('first', round(first, 3)), ('second', 1.0),
-    ]  # fmt: skip
-    assert seen[0][3] == [(0.0, 'first', ''), (round(first / 2, 3), 'first', 'no damping yet'),
-                          (round(first, 3), 'first', '')]  # fmt: skip
-    assert screen.shares[-2] == (round((first + 1.0) / 2, 3), 'second', 'no damping yet')
+    assert results['first'] is first
+    assert seen[0] == ('first', pytest.approx(share), [(round(share, 3), 'first', '')])
+    assert seen[1][:2] == ('second', pytest.approx(1.0))
     assert screen.texts == []
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from engine_mount.experiments.field_penetration.plate_field import equivalent_depth, flux_density_change
-from engine_mount.experiments.field_penetration.plate_finite_elements import PlateSurroundings, plate_field
+from engine_mount.experiments.field_penetration import equivalent_depth, flux_density_change
+from engine_mount.experiments.plate_finite_elements import PlateSurroundings, plate_field
 from mount_sim.plant.reluctance import ReluctanceActuator, core_field, differential_permeability
 from mount_sim.plant.ripple import (
     RippleCoil,

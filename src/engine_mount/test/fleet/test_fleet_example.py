@@ -17,8 +17,8 @@ from engine_mount.fleet.example.fleet import (
     whole_fleet,
 )
 from engine_mount.fleet.example.variations import VARIATIONS
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.bag.recording import ReadingError
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.recording import ReadingError
 
 
 def order_named(folder, name):

@@ -15,7 +15,7 @@ from engine_mount.fleet.catalogue.places import places
 from engine_mount.fleet.foreign import NOTHING_SAID, said_in
 from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 from engine_mount.fleet.worst import said_of, worst
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 
 REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
 CHANGES = parsed_changes({'highest_current': 0.7})
@@ -129,8 +129,8 @@ def test_tables_of_a_fleet_and_what_lies_in_a_run_are_no_files_of_others(drives,
 
 
 def test_a_recording_of_this_project_is_opened_once(drives, said, tmp_path, inside, monkeypatch):
-    opened, opens = [], Recording._open
-    monkeypatch.setattr(Recording, '_open', lambda self: (opened.append(self.path), opens(self))[1])
+    opened, opens = [], Recording.__init__
+    monkeypatch.setattr(Recording, '__init__', lambda self, path: (opened.append(path), opens(self, path))[1])
     indexed([drives / 'run'], tmp_path / 'catalogue', said)
     assert opened == [drives / 'run' / 'recording']
     opened.clear()

@@ -5,7 +5,7 @@ import pytest
 
 from engine_mount.fleet.catalogue.motion import Motion
 from engine_mount.fleet.catalogue.trace import Trace
-from engine_mount.recordings.bag.column_parts import ColumnPart
+from engine_mount.recordings.columns import ColumnPart
 
 START = 1_700_000_000_000_000_000
 PERIOD = 1_000_000

@@ -19,8 +19,8 @@ from engine_mount.fleet.what_if.asked import AskedError, recordings_asked
 from engine_mount.fleet.what_if.closed_loop import both_motions, compared_motion
 from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
 from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.place import open_run
 from engine_mount.settings.options import with_sample_rate
 from engine_mount.signals.sources.source import SourceError
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE

@@ -11,8 +11,6 @@ from scipy.optimize import brentq
 from engine_mount.identification.coil.gap_calibration import calibrate_gap_curves
 from engine_mount.identification.coil.gap_point import GapPoint
 from mount_models.coil.gap import (
-    GapCurvesRefusedError,
-    OutsideCurveError,
     check_gap_curves,
     crossing_current_from_gap,
     gap_from_crossing_current,
@@ -22,7 +20,7 @@ from mount_models.coil.gap import (
     measured_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.quantity import with_values
+from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, incremental_inductance
 
@@ -122,9 +120,9 @@ def test_8_per_cent_less_conductivity_misleads_both_gaps_as_published():
     ],
 )
 def test_beyond_the_calibration_each_function_refuses_in_a_sentence(function, value, sentence):
-    with pytest.raises(OutsideCurveError, match=sentence):
+    with pytest.raises(OutsideLawError, match=sentence):
         function(CURVES, value)
-    with pytest.raises(OutsideCurveError, match='calibrate over a wider range'):
+    with pytest.raises(OutsideLawError, match='calibrate over a wider range'):
         function(CURVES, np.array([value]))
 
 
@@ -137,18 +135,18 @@ def test_measured_inductance_normalises_by_turns_and_area():
 
 def test_an_ambiguous_curve_is_refused():
     at_0_8 = [incremental_inductance(COIL, MAGNET, 0.8, gap) for gap in GAPS]
-    with pytest.raises(GapCurvesRefusedError, match='must rise or fall steadily with the gap'):
+    with pytest.raises(LawRefusedError, match='must rise or fall steadily with the gap'):
         fitted(at_0_8)
 
 
 def test_curves_that_contradict_their_inverse_are_refused():
     shifted = CURVES.gap_of_inductance
     shifted = shifted._replace(coefficients=(shifted.coefficients[0] + 5e-6, *shifted.coefficients[1:]))
-    with pytest.raises(GapCurvesRefusedError, match=r'must agree within 2\.0 um; they differ by 5\.'):
+    with pytest.raises(LawRefusedError, match=r'must agree within 2\.0 um; they differ by 5\.'):
         check_gap_curves(CURVES._replace(gap_of_inductance=shifted))
 
 
 def test_curves_with_a_range_in_falling_order_are_refused():
     falling = CURVES.inductance_of_gap._replace(low=550e-6, high=250e-6)
-    with pytest.raises(GapCurvesRefusedError, match='rising order'):
+    with pytest.raises(LawRefusedError, match='rising order'):
         check_gap_curves(CURVES._replace(inductance_of_gap=falling))

@@ -15,15 +15,14 @@ from engine_mount.identification.coil.temperature_fit import (
 )
 from engine_mount.identification.coil.unique_region import unique_region, warnings
 from mount_models.coil.crossing import find_crossing
-from mount_models.coil.gap import GapCurvesRefusedError, OutsideCurveError, evaluate
+from mount_models.coil.gap import evaluate
 from mount_models.coil.temperature import (
-    CompensationError,
     check_compensation,
     crossing_at_calibration,
     inductance_at_calibration,
     temperature_share,
 )
-from mount_models.quantity import with_values
+from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, incremental_inductance
@@ -123,35 +122,35 @@ def test_the_stated_uncertainty_is_that_of_repeated_calibrations(calibration):
 
 def test_a_gap_that_contradicts_the_others_is_refused_and_named(points):
     wrong = [replace(p, gap=p.gap + 15e-6) if p.name == '390 um' else p for p in points]
-    with pytest.raises(GapCurvesRefusedError, match=r'390 um: the .* off the given 405\.0 um'):
+    with pytest.raises(LawRefusedError, match=r'390 um: the .* off the given 405\.0 um'):
         calibrate_gap_curves(wrong)
 
 
 def test_too_few_gaps_are_refused(points):
-    with pytest.raises(GapCurvesRefusedError, match=r'6 or more air gaps .* 5 given'):
+    with pytest.raises(LawRefusedError, match=r'6 or more air gaps .* 5 given'):
         calibrate_gap_curves(points[:5])
 
 
 def test_the_same_gap_twice_is_refused(points):
-    with pytest.raises(GapCurvesRefusedError, match='differ by 1 um'):
+    with pytest.raises(LawRefusedError, match='differ by 1 um'):
         calibrate_gap_curves([*points, points[3]])
 
 
 def test_a_recording_that_is_not_long_enough_is_refused(recordings):
     short = replace(recordings[0], current=CURRENTS[:2], inductance=recordings[0].inductance[:2])
-    with pytest.raises(GapCurvesRefusedError, match=r'270 um: 1 different currents, at least 5'):
+    with pytest.raises(LawRefusedError, match=r'270 um: 1 different currents, at least 5'):
         measured_point(short)
 
 
 def test_a_recording_without_the_rest_current_is_refused(recordings):
     late = replace(recordings[0], current=CURRENTS[1100:], inductance=recordings[0].inductance[1100:])
-    with pytest.raises(GapCurvesRefusedError, match=r'270 um: samples within 0\.02 A of the rest current'):
+    with pytest.raises(LawRefusedError, match=r'270 um: samples within 0\.02 A of the rest current'):
         measured_point(late)
 
 
 def test_a_recording_that_never_reaches_the_crossing_is_refused(recordings):
     low = replace(recordings[0], current=CURRENTS[:1300], inductance=recordings[0].inductance[:1300])
-    with pytest.raises(GapCurvesRefusedError, match='270 um: coil inductance must fall through'):
+    with pytest.raises(LawRefusedError, match='270 um: coil inductance must fall through'):
         measured_point(low)
 
 
@@ -207,7 +206,7 @@ def test_at_the_temperature_of_the_curves_nothing_changes(calibration, compensat
 
 def test_a_temperature_that_is_not_compensated_is_refused(calibration, compensation):
     with pytest.raises(
-        OutsideCurveError, match=r'coil temperature \(140\.0 degC\) must lie within -40\.0 \.\. 120'
+        OutsideLawError, match=r'coil temperature \(140\.0 degC\) must lie within -40\.0 \.\. 120'
     ):
         inductance_at_calibration(compensation, calibration.curves, 0.046, 140.0)
 
@@ -221,7 +220,7 @@ def test_a_temperature_that_is_not_compensated_is_refused(calibration, compensat
     ],
 )
 def test_a_compensation_of_nonsense_is_refused(calibration, compensation, change, sentence):
-    with pytest.raises(CompensationError, match=sentence):
+    with pytest.raises(LawRefusedError, match=sentence):
         check_compensation(compensation._replace(**change), calibration.curves)
 
 

@@ -9,11 +9,11 @@ from mcap.writer import Writer
 from recorded_drive import PERIOD, START, sample
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.edit.merge import merge
-from engine_mount.recordings.edit.recover import recover
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.merge import merge
+from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
 from mount_recorder.schemas import schema_text

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
-from rosbags.highlevel import AnyReader
 
 import engine_mount
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.bag.column_parts import column_parts
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.edit.merge import merge
-from engine_mount.recordings.edit.recover import recover
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.columns import column_parts
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.merge import merge
+from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.mcap_writer import MESSAGE
 from mount_recorder.topic_groups import OF_A_CAR, OF_OTHERS, topic_group
@@ -179,15 +178,6 @@ def test_a_file_cut_between_the_chunks_of_two_groups_gives_those_of_the_first(tm
     assert series['mount'].tolist() == list(range(len(series)))
 
 
-def test_independent_readers_give_all_messages_in_the_order_of_log_time(drive):
-    written = list(messages())
-    with (drive / 'drive_0.mcap').open('rb') as file:
-        read = make_reader(file, validate_crcs=True).iter_messages()
-        assert [(channel.topic, found.data, found.log_time) for _, channel, found in read] == written
-    with AnyReader([drive]) as reader:
-        assert [(connection.topic, raw, time) for connection, time, raw in reader.messages()] == written
-
-
 def test_the_arrangement_changes_nothing_that_is_read(drive, tmp_path, monkeypatch):
     monkeypatch.setattr('mount_recorder.bag_writer.topic_group', lambda name, type_name: 0)
     write_drive(tmp_path / 'plain').close()
@@ -200,32 +190,3 @@ def test_the_arrangement_changes_nothing_that_is_read(drive, tmp_path, monkeypat
         np.testing.assert_array_equal(first.publish_times, second.publish_times)
     assert audit(apart) == audit(together)
     assert compare(apart, together).equal
-
-
-@pytest.mark.parametrize('name', ['sim/truth', 'displacement'])
-def test_the_time_of_a_damaged_chunk_of_one_group_is_lost(drive, tmp_path, name):
-    path = drive / 'drive_0.mcap'
-    with path.open('rb') as file:
-        summary = make_reader(file).get_summary()
-    channel = next(n for n, channel in summary.channels.items() if channel.topic == f'/{name}')
-    indexes = sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
-    damaged = [index for index in indexes if channel in index.message_index_offsets][3]
-    content = bytearray(path.read_bytes())
-    content[damaged.chunk_start_offset + damaged.chunk_length // 2] ^= 1
-    path.write_bytes(content)
-    found = recover(drive, tmp_path / 'out')
-    span = (damaged.message_end_time - damaged.message_start_time) / 1e9
-    assert found.lost_seconds == pytest.approx(span, abs=2.1e-3)
-
-
-def test_the_time_of_a_last_chunk_that_was_cut_off_is_lost_although_another_group_is_there(drive, tmp_path):
-    path = drive / 'drive_0.mcap'
-    with path.open('rb') as file:
-        indexes = make_reader(file).get_summary().chunk_indexes
-    *_, before, last = sorted(indexes, key=lambda index: index.chunk_start_offset)
-    assert before.message_start_time < last.message_end_time  # of the same time
-    content = path.read_bytes()[: last.chunk_start_offset + last.chunk_length - 1]
-    (tmp_path / 'cut.mcap').write_bytes(content)
-    found = recover(tmp_path / 'cut.mcap', tmp_path / 'out')
-    span = (last.message_end_time - last.message_start_time) / 1e9
-    assert found.lost_seconds == pytest.approx(span, abs=1e-9)

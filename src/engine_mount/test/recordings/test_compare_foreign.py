@@ -10,9 +10,9 @@ from recorded_drive import START
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import engine_mount
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.compare.tolerances import Tolerances
-from engine_mount.recordings.events.recorded_events import recorded_events, recorded_marks
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.events import recorded_events, recorded_marks
+from engine_mount.recordings.tolerances import Tolerances
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 50
@@ -149,7 +149,7 @@ def test_a_topic_of_another_type_is_never_equal(tmp_path):
 @pytest.fixture
 def with_camera(tmp_path):
     """Return a recording with a camera beside the mount whose topics are called like ours."""
-    from engine_mount.recordings.edit.merge import merge
+    from engine_mount.recordings.merge import merge
 
     drive = write_answers(tmp_path / 'drive', answers(400), marks=((100, 'a bump'),))
     writer = BagWriter(tmp_path / 'camera')

@@ -7,12 +7,12 @@ import pytest
 from compared_drives import START, answers, text, write_answers
 
 import engine_mount
-from engine_mount.recordings.compare.alignment import ComparisonError
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.compare.signals import signal_table
-from engine_mount.recordings.compare.tolerances import ToleranceError, Tolerances
-from engine_mount.recordings.edit.merge import merge
-from engine_mount.recordings.events.recorded_events import recorded_events
+from engine_mount.recordings.alignment import ComparisonError
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.difference import signal_table
+from engine_mount.recordings.events import recorded_events
+from engine_mount.recordings.merge import merge
+from engine_mount.recordings.tolerances import ToleranceError, Tolerances
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 400

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import engine_mount
-from engine_mount.recordings.bag.origin import origin
-from engine_mount.recordings.compare.compare import compare
-from engine_mount.recordings.edit.cut import CutError, cut
-from engine_mount.recordings.edit.merge import MergeError, merge
-from engine_mount.recordings.events.recorded_events import (
+from engine_mount.recordings.compare import compare
+from engine_mount.recordings.cut import CutError, cut
+from engine_mount.recordings.events import (
     EventError,
     event_time,
     find_event,
     recorded_events,
 )
+from engine_mount.recordings.merge import MergeError, merge
+from engine_mount.recordings.metadata import origin
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 400

@@ -13,10 +13,10 @@ from recorded_drive import sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.report import as_json, as_table, sentences
-from engine_mount.recordings.edit.recover import RecoveryError, recover
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.audit_report import as_json, as_table, sentences
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.recover import RecoveryError, recover
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
@@ -128,6 +128,6 @@ def test_what_is_recovered_is_what_was_written_and_the_sentence_says_how_much(in
         assert found.complete == (messages == original) or (alone and change is cut), place
         assert found.complete <= (messages == original), place
         assert ('lost' in str(found)) != found.complete, place
-        if found.lost_is_counted:
+        if found.lost is not None:
             assert found.lost == original.total() - messages.total(), place
         shutil.rmtree(out)

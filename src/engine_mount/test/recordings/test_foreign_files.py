@@ -21,13 +21,12 @@ from test_other_storages import written
 
 import engine_mount
 from engine_mount.recordings import ReadingError
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.bag.metadata import MetadataError, read_metadata
-from engine_mount.recordings.container.mcap_reading.chunks import CRC_PLACE, RECORD
-from engine_mount.recordings.container.mcap_reading.mcap_file import McapFile
-from engine_mount.recordings.container.mcap_reading.summary import Proof
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.mcap_file import McapFile
+from engine_mount.recordings.mcap_records import CRC_PLACE, RECORD
+from engine_mount.recordings.metadata import MetadataError, read_metadata
+from engine_mount.recordings.series import SeriesError
 
 SEEDS = st.integers(0, 1 << 62)
 ONE_FILE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -88,7 +87,7 @@ def judged(path):
     recording = engine_mount.open(path)
     found = contents(recording)
     unproven = any(
-        file.data_proof() is Proof.ABSENT for file in recording.files if isinstance(file, McapFile)
+        file.data_proof() is None for file in recording.files if isinstance(file, McapFile)
     ) and any('a damaged number in them would go unseen' in warning for warning in recording.warnings)
     return found, losses(recording, audit(recording)).sound, unproven
 

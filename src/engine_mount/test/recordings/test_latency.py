@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine_mount.recordings.audit.answers import EDGES, on_one_clock, setpoint_latency
+from engine_mount.recordings.answers import on_one_clock, setpoint_latency
 
 SOON = st.lists(st.integers(-3_000, 30_000_000), min_size=2, max_size=60)
 ANY = st.lists(st.integers(-(10**13), 10**13) | st.integers(0, 3), min_size=2, max_size=60)
@@ -23,7 +23,6 @@ def test_latencies_are_those_of_all_ages_at_once():
         assert found.median == np.median(seconds)
         assert found.p99 == np.quantile(seconds, 0.99)
         assert found.worst == seconds.max()
-        assert found.counts == tuple(np.histogram(seconds, [-np.inf, *EDGES, np.inf])[0])
 
     check()
 

@@ -9,11 +9,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from recorded_drive import PERIOD, RECORDED, START, joint_state
 
 import engine_mount
-from engine_mount.recordings.audit.answers import Control, Setpoints, Silence, judge_answers
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.report import as_json, sentences
-from engine_mount.recordings.messages.times import NO_TIMES
+from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_answers
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.audit_report import as_json, sentences
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (
@@ -58,7 +58,6 @@ def test_a_control_that_stalls_leaves_samples_unanswered_and_the_coil_at_0_amper
     found = judged(np.delete(SAMPLES, slice(1000, 1398)))
     assert (found.asked, found.unanswered) == (3000, 398)
     assert found.silences == (Silence(SAMPLES[999], SAMPLES[1398]),)
-    assert found.silences[0].duration == pytest.approx(0.399)
 
 
 @pytest.mark.parametrize(('missing', 'silent'), [(19, 0), (20, 1)])

@@ -7,8 +7,8 @@ from compared_drives import START, answers, text, write_answers
 from recorded_drive import joint_state
 
 import engine_mount
-from engine_mount.recordings.compare import reference as reference_module
-from engine_mount.recordings.compare.reference import (
+from engine_mount.recordings import reference as reference_module
+from engine_mount.recordings.reference import (
     ACCEPTED_NAME,
     AcceptError,
     accept,

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from engine_mount.recordings import open_recording
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.session import (
     SessionError,
     recorded_session,
     session_content,

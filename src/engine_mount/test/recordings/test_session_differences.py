@@ -1,6 +1,6 @@
 """Two sessions in words."""
 
-from engine_mount.recordings.run.session import session_differences
+from engine_mount.recordings.session import session_differences
 
 
 def test_changed_parameters_come_first_and_by_their_names():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engine_mount.recordings.run.session import version_differences, versions_sentence
+from engine_mount.recordings.session import version_differences, versions_sentence
 
 HERE = {'numpy': '2.4.6', 'c_library': 'glibc 2.36', 'processor': 'AMD EPYC (avx2)'}
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from engine_mount.recordings.audit.losses import Losses
+from engine_mount.recordings.losses import Losses
 from engine_mount.reports.sections.section import GOOD, LOOK, UNKNOWN
 from engine_mount.reports.sections.verdict import findings
 

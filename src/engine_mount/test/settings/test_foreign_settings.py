@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_testing import mutated
 
-from engine_mount.recordings.run.session import SessionError, session_content, session_sample_rate
+from engine_mount.recordings.session import SessionError, session_content, session_sample_rate
 from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.settings.options import settings_of_options
 from mount_bringup.parameter_file import settings_in
@@ -17,15 +17,13 @@ from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.settings import check_policies, control_settings, defaults
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
-from mount_models.damper import DamperError
-from mount_models.friction.contact import CoefficientsRefusedError
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_models.quantity import ParameterError, quantities, with_flattened
+from mount_models.quantity import LawRefusedError, ParameterError, quantities, with_flattened
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE
 from mount_models.specimen import SpecimenError, default_specimen
 from mount_sim.parameters import SimParameters
 
-REFUSALS = (YamlError, ParameterError, SpecimenError, DamperError, CoefficientsRefusedError)
+REFUSALS = (YamlError, ParameterError, SpecimenError, ParameterError, LawRefusedError)
 SEEDS = st.integers(0, 1 << 62)
 KNOWN = defaults_of_nodes()
 SETS = {

@@ -7,7 +7,7 @@ from engine_mount.settings.options import owned, settings_of_options
 from mount_bringup.settings import SettingError, checked_settings, defaults_of_nodes
 from mount_control.policy import continuous_viscous
 from mount_control.policy.registry import POLICIES
-from mount_models.damper import DamperError, damper_curve
+from mount_models.damper import damper_curve
 from mount_models.quantity import ParameterError
 
 POINTS = {'velocity': [0.0, 0.004, 0.1], 'force': [0.0, 0.0, 200.0]}
@@ -33,7 +33,7 @@ def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(t
     settings = checked_settings(settings_of_options([f'mount_control.damper={file}']))
     file.unlink()
     assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, damper_curve(POINTS).table)
-    with pytest.raises(DamperError, match='cannot be read'):
+    with pytest.raises(ParameterError, match='cannot be read'):
         checked_settings({'mount_control': {'damper': str(file)}})
 
 

@@ -3,9 +3,9 @@
 import openpyxl
 import pytest
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats import excel
 from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.signal import SignalError
 
 
 def test_rows_with_a_far_cell_are_refused_with_their_width(tmp_path, monkeypatch):

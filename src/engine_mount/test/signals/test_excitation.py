@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.excitation import build_excitation, with_array
+from engine_mount.signals.signal import SignalError
 from mount_models.quantity import ParameterError, flattened, with_flattened
 from mount_sim.excitation import building
 from mount_sim.excitation.excitation import Seat

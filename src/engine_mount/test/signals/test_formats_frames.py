@@ -5,9 +5,9 @@ import struct
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.testing.buses import write_frames
 
 DBC = """VERSION ""

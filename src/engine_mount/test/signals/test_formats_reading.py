@@ -5,8 +5,8 @@ import hashlib
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.testing import MAKERS
 from engine_mount.signals.testing.made import BEGIN
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.headers import name_and_unit
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.formats.text import parsing
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.columns import read_chosen
 from engine_mount.signals.units.mapping import mapping_in_file
 

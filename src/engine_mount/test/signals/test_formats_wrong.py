@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats import excel
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.source import SourceError
 from engine_mount.signals.testing import MAKERS
 

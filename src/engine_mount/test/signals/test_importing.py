@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.edit.cut import cut
-from engine_mount.recordings.run.session import recorded_session, session_content
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.recordings.cut import cut
+from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.importing.importing import ImportOrder, import_recording
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.mapping import ColumnChoice, Mapping, MappingError, TimeChoice
 
 TIMES = np.arange(3000) / 1000.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from measured_columns import SHAKING, TIMES, TRAVEL, measured
 
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.mapping import Mapping, MappingError, with_options
 from engine_mount.signals.units.signals import signals
 from engine_mount.signals.units.unit import UnitError

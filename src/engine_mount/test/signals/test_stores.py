@@ -5,8 +5,8 @@ import shutil
 import pytest
 from served_stores import SECRET_KEY, HttpStore
 
-from engine_mount.recordings.run.place import open_run
-from engine_mount.recordings.run.session import recorded_session
+from engine_mount.recordings.place import open_run
+from engine_mount.recordings.session import recorded_session
 from engine_mount.signals.sources import looking, outlines
 from engine_mount.signals.sources.source import SourceError
 from engine_mount.signals.sources.stores import entries, fetched, local_copy, outline, traffic, uri_of

@@ -6,6 +6,8 @@ import socket
 import zlib
 from collections.abc import Iterator, Sequence
 
+from mount_models.quantity import ParameterError
+
 HIGHEST_DOMAIN = 101  # above, the ports of Fast DDS run into those of other programs on Linux
 
 # A ROS domain has 250 UDP ports from 7400 on (RTPS 2.2, section 9.6.1.1), of which two for each participant
@@ -17,15 +19,11 @@ _PLACES = 119  # namespaces told apart by their ports
 _PLACE = '\0engine_mount_port'  # the zero: a name of its own, no file
 
 
-class DomainError(ValueError):
-    """The ROS domain cannot be used; the text says why."""
-
-
 def chosen_domain(wanted: int | None) -> int:
     """Return the domain asked for, else that of the environment, else 0, checked."""
     text = str(wanted) if wanted is not None else os.environ.get('ROS_DOMAIN_ID', '0') or '0'
     if not text.isdigit() or int(text) > HIGHEST_DOMAIN:
-        raise DomainError(f'ROS domain {text!r} must be a whole number within 0 .. {HIGHEST_DOMAIN}')
+        raise ParameterError(f'ROS domain {text!r} must be a whole number within 0 .. {HIGHEST_DOMAIN}')
     return int(text)
 
 
@@ -44,7 +42,7 @@ def domain_lock(domain: int, namespace: str, mounts: Sequence[str] = ()) -> Iter
     """Hold the places of the one graph of this machine in a domain and namespace, and of its mounts in it.
 
     By a name among the sockets of Linux that stands in no file system: nothing is left behind, whatever ends
-    the process. Raises `DomainError` where another graph holds one of them.
+    the process. Raises `ParameterError` where another graph holds one of them.
     """
     with contextlib.ExitStack() as held:
         for mount in ('', *mounts):
@@ -54,7 +52,7 @@ def domain_lock(domain: int, namespace: str, mounts: Sequence[str] = ()) -> Iter
             try:
                 place.bind(f'{_PLACE}_{port}')
             except OSError:
-                raise DomainError(
+                raise ParameterError(
                     f'a graph already runs in ROS domain {domain}, namespace {name}, or in one whose CAN bus '
                     f'would have port {port} too; end it, or choose another domain with --domain or '
                     'ROS_DOMAIN_ID'

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import atan
-from mount_models.quantity import Quantity
+from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -16,26 +16,6 @@ LOWEST_SHARE = 1.0 / 60.0
 """Of the highest current, chosen: 0.05 A of 3 A."""
 
 _POLYNOMIAL = 'polynomial coefficients in powers of the gap in micrometres, lowest power first'
-
-
-class OutsideLawError(ValueError):
-    """A force law was asked for something that it was never fitted to; the text says what and the remedy."""
-
-
-class GapOutsideLaw(OutsideLawError):  # noqa: N818
-    """The air gap lies outside the guarded range of the force law."""
-
-
-class CurrentOutsideLaw(OutsideLawError):  # noqa: N818
-    """The coil current lies outside the guarded range of the force law."""
-
-
-class ForceOutsideLaw(OutsideLawError):  # noqa: N818
-    """No current within the guarded range gives this force at this air gap."""
-
-
-class ForceLawRefusedError(ValueError):
-    """A force law is not usable, or measurements lead to none; the text says why and the remedy."""
 
 
 class ForceLaw(NamedTuple):
@@ -123,7 +103,7 @@ def coefficients(law, gap):
 def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the magnetic force (N) for currents (A) and gaps (m) of any shapes that broadcast, Eq (3).
 
-    Raises `GapOutsideLaw` or `CurrentOutsideLaw`; nothing is ever extrapolated.
+    Raises `OutsideLawError` or `OutsideLawError`; nothing is ever extrapolated.
     """
     current, gap = np.broadcast_arrays(np.asarray(current, float), np.asarray(gap, float))
     check_gap(law, gap)
@@ -134,7 +114,7 @@ def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> 
 def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the current (A) for forces (N) and gaps (m) of any shapes that broadcast, inverse of Eq (3).
 
-    Raises `GapOutsideLaw`, or `ForceOutsideLaw` for a force that is negative or beyond `current_high`.
+    Raises `OutsideLawError`, or `OutsideLawError` for a force that is negative or beyond `current_high`.
     """
     force, gap = np.broadcast_arrays(np.asarray(force, float), np.asarray(gap, float))
     check_gap(law, gap)
@@ -142,7 +122,7 @@ def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.Arra
     unreachable = np.isnan(current)
     if unreachable.any():
         value, place = float(force[unreachable][0]), float(gap[unreachable][0])
-        raise ForceOutsideLaw(
+        raise OutsideLawError(
             f'magnetic force ({value:.2f} N) must lie within 0.00 .. '
             f'{_force_and_slope(coefficients(law, place), law.current_high)[0]:.2f} N, which '
             f'{law.current_high:.2f} A reach at an air gap of {place * 1e6:.1f} um; demand less force, '
@@ -152,12 +132,12 @@ def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.Arra
 
 
 def check_gap(law: ForceLaw, gap: npt.ArrayLike) -> None:
-    """Raise `GapOutsideLaw` unless every gap (m) lies in the guarded range of `law`."""
+    """Raise `OutsideLawError` unless every gap (m) lies in the guarded range of `law`."""
     gap = np.asarray(gap, float)
     inside = (gap >= law.gap_low - _GAP_ROUNDING) & (gap <= law.gap_high + _GAP_ROUNDING)
     if not inside.all():
         value = float(gap[~inside].flat[0])
-        raise GapOutsideLaw(
+        raise OutsideLawError(
             f'air gap ({value * 1e6:.1f} um) must lie within {law.gap_low * 1e6:.1f} .. '
             f'{law.gap_high * 1e6:.1f} um; beyond it the force law is not valid: check the gap measurement, '
             f'or calibrate the actuator over a wider range of gaps'
@@ -165,13 +145,13 @@ def check_gap(law: ForceLaw, gap: npt.ArrayLike) -> None:
 
 
 def check_force_law(law: ForceLaw, lowest_current: float = 0.0) -> None:
-    """Raise `ForceLawRefusedError` unless `law` can be inverted everywhere within its guarded range.
+    """Raise `LawRefusedError` unless `law` can be inverted everywhere within its guarded range.
 
     Looked at on 61 gaps and 119 currents from 1/60 of the highest up; below, the force is next to nothing.
     With a `lowest_current` (A) above that, from there up only.
     """
     if not (0.0 < law.gap_low < law.gap_high and law.current_high > 0.0):
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'guarded range ({law.gap_low * 1e6:.1f} .. {law.gap_high * 1e6:.1f} um, '
             f'0 .. {law.current_high:.2f} A) must hold gaps above 0 in rising order '
             'and currents above 0 A'
@@ -243,7 +223,7 @@ def _each_current(law, force, gap):
 def _check_current(law: ForceLaw, current: FloatArray) -> None:
     inside = (current >= 0.0) & (current <= law.current_high * (1.0 + _ROUNDING))
     if not inside.all():
-        raise CurrentOutsideLaw(
+        raise OutsideLawError(
             f'coil current ({float(current[~inside].flat[0]):.3f} A) must lie within 0.000 .. '
             f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
         )
@@ -252,7 +232,7 @@ def _check_current(law: ForceLaw, current: FloatArray) -> None:
 def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: FloatArray, what: str) -> None:
     if failed.any():
         row, column = np.argwhere(failed)[0]
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'the force must {what}; at {gaps[row] * 1e6:.0f} um and {currents[column]:.2f} A this law does '
             f'not: narrow its range of gaps, measure more points, or look for outliers'
         )

@@ -10,15 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_models.quantity import LawRefusedError, OutsideLawError
+
 FloatArray = npt.NDArray[np.float64]
-
-
-class OutsideCurveError(ValueError):
-    """A gap curve was asked for something beyond its calibration; the text says what and the remedy."""
-
-
-class GapCurvesRefusedError(ValueError):
-    """Gap curves are ambiguous, or measurements lead to none; the text says why and the remedy."""
 
 
 class ScaledPolynomial(NamedTuple):
@@ -59,22 +53,22 @@ def measured_inductance(
 
 
 def rest_gap_from_inductance(curves: GapCurves, inductance: npt.ArrayLike) -> FloatArray:
-    """Return the air gap (m) from the inductance (H) at the rest current; raises `OutsideCurveError`."""
+    """Return the air gap (m) from the inductance (H) at the rest current; raises `OutsideLawError`."""
     return _value(curves.gap_of_inductance, inductance, 'rest inductance', 'mH', 1e3)
 
 
 def inductance_from_gap(curves: GapCurves, gap: npt.ArrayLike) -> FloatArray:
-    """Return the inductance (H) at the rest current from the air gap (m); raises `OutsideCurveError`."""
+    """Return the inductance (H) at the rest current from the air gap (m); raises `OutsideLawError`."""
     return _value(curves.inductance_of_gap, gap, 'air gap', 'um', 1e6)
 
 
 def gap_from_crossing_current(curves: GapCurves, current: npt.ArrayLike) -> FloatArray:
-    """Return the air gap (m) from the current (A) of the 20 mH crossing; raises `OutsideCurveError`."""
+    """Return the air gap (m) from the current (A) of the 20 mH crossing; raises `OutsideLawError`."""
     return _value(curves.gap_of_crossing_current, current, 'crossing current', 'A', 1.0)
 
 
 def crossing_current_from_gap(curves: GapCurves, gap: npt.ArrayLike) -> FloatArray:
-    """Return the current (A) of the 20 mH crossing from the air gap (m); raises `OutsideCurveError`."""
+    """Return the current (A) of the 20 mH crossing from the air gap (m); raises `OutsideLawError`."""
     return _value(curves.crossing_current_of_gap, gap, 'air gap', 'um', 1e6)
 
 
@@ -91,7 +85,7 @@ def gap_per_crossing_current(curves: GapCurves, current: npt.ArrayLike) -> Float
 
 
 def check_gap_curves(curves: GapCurves, round_trip: float = 2e-6) -> None:
-    """Raise `GapCurvesRefusedError` unless each curve is monotone and leads back within `round_trip` (m)."""
+    """Raise `LawRefusedError` unless each curve is monotone and leads back within `round_trip` (m)."""
     for name, curve in zip(GapCurves._fields, curves, strict=True):
         _check_monotone(name, curve)
     for there, back in (
@@ -102,7 +96,7 @@ def check_gap_curves(curves: GapCurves, round_trip: float = 2e-6) -> None:
         with np.errstate(over='ignore', invalid='ignore'):  # a number beyond all is refused as any other
             error = np.abs(evaluate(back, evaluate(there, gaps)) - gaps)
         if not error.max() <= round_trip:
-            raise GapCurvesRefusedError(
+            raise LawRefusedError(
                 f'a gap curve and its inverse must agree within {round_trip * 1e6:.1f} um; they differ by '
                 f'{error.max() * 1e6:.1f} um at {gaps[int(np.argmax(error))] * 1e6:.1f} um: calibrate again'
             )
@@ -133,7 +127,7 @@ def _check_inside(
     rounding = 1e-9 * (polynomial.high - polynomial.low)
     inside = (x >= polynomial.low - rounding) & (x <= polynomial.high + rounding)
     if not inside.all():
-        raise OutsideCurveError(
+        raise OutsideLawError(
             f'{name} ({float(x[~inside].flat[0]) * factor:.3f} {unit}) must lie within '
             f'{polynomial.low * factor:.3f} .. {polynomial.high * factor:.3f} {unit}, where the gap curves '
             f'are calibrated; check the coil ripple signals, or calibrate over a wider range of gaps'
@@ -142,7 +136,7 @@ def _check_inside(
 
 def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
     if not (polynomial.low < polynomial.high and polynomial.scale > 0.0):
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'{name} must have a positive scale ({polynomial.scale:g}) and a range in rising order '
             f'({polynomial.low:g} .. {polynomial.high:g}); calibrate again'
         )
@@ -150,7 +144,7 @@ def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
     steps = np.sign(slope(polynomial, x))
     falters = ~((steps == steps[0]) & (steps != 0.0))
     if falters.any():
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'{name} must be monotone to tell gaps apart; it turns at {x[int(np.argmax(falters))]:.6g} (SI): '
             f'narrow the range of gaps, or choose another rest current or crossing inductance'
         )

@@ -11,8 +11,8 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from mount_models.coil.gap import GapCurves, OutsideCurveError, ScaledPolynomial, evaluate
-from mount_models.quantity import Quantity
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
+from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
 
 CONDUCTIVITY_COEFFICIENT = 0.0043
 """Relative rise of the core's resistivity per kelvin, 1/K (chosen: 8 % less conductivity after 20 K)."""
@@ -40,10 +40,6 @@ class TemperatureCompensation(NamedTuple):
     crossing_shift: ScaledPolynomial
 
 
-class CompensationError(ValueError):
-    """A temperature compensation makes no sense; the text says why and the remedy."""
-
-
 def temperature_share(compensation: TemperatureCompensation, celsius: float) -> float:
     """Return which share of the shifts holds at a coil temperature: 0 at calibration, 1 at reference."""
     there = skin_change(compensation, celsius)
@@ -62,7 +58,7 @@ def inductance_at_calibration(
 ) -> float:
     """Return what the inductance (H) at the rest current would be at the temperature of the curves.
 
-    Raises `OutsideCurveError` for a temperature that is not compensated.
+    Raises `OutsideLawError` for a temperature that is not compensated.
     """
     share = _checked_share(compensation, celsius)
     if share == 0.0:
@@ -81,7 +77,7 @@ def crossing_at_calibration(
 ) -> float:
     """Return what the crossing current (A) would be at the temperature of the curves.
 
-    Raises `OutsideCurveError` for a temperature that is not compensated.
+    Raises `OutsideLawError` for a temperature that is not compensated.
     """
     share = _checked_share(compensation, celsius)
     if share == 0.0:
@@ -96,27 +92,27 @@ def crossing_at_calibration(
 
 
 def check_compensation(compensation: TemperatureCompensation, curves: GapCurves) -> None:
-    """Raise `CompensationError` unless temperatures are in order and the curves stay monotone with them."""
+    """Raise `LawRefusedError` unless temperatures are in order and the curves stay monotone with them."""
     c = compensation
     if not c.lowest_celsius <= c.calibration_celsius <= c.highest_celsius:
-        raise CompensationError(
+        raise LawRefusedError(
             f'calibration_celsius ({c.calibration_celsius:g} degC) must lie within lowest_celsius .. '
             f'highest_celsius ({c.lowest_celsius:g} .. {c.highest_celsius:g} degC); correct the range'
         )
     if abs(c.reference_celsius - c.calibration_celsius) < _LEAST_DIFFERENCE:
-        raise CompensationError(
+        raise LawRefusedError(
             f'reference_celsius ({c.reference_celsius:g} degC) must differ from calibration_celsius '
             f'({c.calibration_celsius:g} degC) by {_LEAST_DIFFERENCE:g} K or more; record warmer or colder'
         )
     for name in ('reluctance_shift', 'crossing_shift'):
         shift = getattr(c, name)
         if not (shift.low < shift.high and shift.scale > 0.0):
-            raise CompensationError(
+            raise LawRefusedError(
                 f'{name} must have a positive scale ({shift.scale:g}) and a range in rising order '
                 f'({shift.low:g} .. {shift.high:g}); calibrate again'
             )
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
-        raise CompensationError(
+        raise LawRefusedError(
             f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
             f'resistivity at {c.lowest_celsius:g} degC; lower it, or raise lowest_celsius'
         )
@@ -126,7 +122,7 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
     for celsius in (c.lowest_celsius, c.highest_celsius):
         warm = 1.0 / evaluate(curve, gaps) + temperature_share(c, celsius) * shifts
         if not (np.all(warm > 0.0) and np.all(np.diff(warm) > 0.0)):
-            raise CompensationError(
+            raise LawRefusedError(
                 f'at {celsius:g} degC the compensated inductance must still fall with the gap; it does not: '
                 f'narrow lowest_celsius .. highest_celsius, or calibrate again'
             )
@@ -138,7 +134,7 @@ _HALVINGS = 60
 
 def _checked_share(compensation: TemperatureCompensation, celsius: float) -> float:
     if not compensation.lowest_celsius <= celsius <= compensation.highest_celsius:
-        raise OutsideCurveError(
+        raise OutsideLawError(
             f'coil temperature ({celsius:.1f} degC) must lie within {compensation.lowest_celsius:.1f} .. '
             f'{compensation.highest_celsius:.1f} degC, where the gap curves are compensated; let the coil '
             f'cool down or warm up, or calibrate over a wider range'

@@ -11,7 +11,7 @@ from mount_models.friction.coefficient import (
     slope_coefficient,
 )
 from mount_models.friction.simplified import FADED_BELOW
-from mount_models.quantity import Quantity
+from mount_models.quantity import LawRefusedError, Quantity
 
 LOWEST, HIGHEST = 0.05, 5.0
 """mu of both pads that is believed (chosen): linings have 0.4 .. 1.8, the controller's floor 0.05."""
@@ -25,10 +25,6 @@ HIGHEST_SPEED = 1.0
 HIGHEST_NORMAL_FORCE = 500.0
 """N, chosen: more than the magnet presses with at 3 A."""
 _FORCES = np.linspace(0.0, HIGHEST_NORMAL_FORCE, 101)
-
-
-class CoefficientsRefusedError(ValueError):
-    """The coefficients contradict each other or give no plausible friction; the text says where."""
 
 
 class FrictionContact(NamedTuple):
@@ -50,21 +46,21 @@ class FrictionContact(NamedTuple):
 
 
 def check_coefficients(coefs: FrictionCoefficients) -> None:
-    """Raise `CoefficientsRefusedError` unless mu is plausible both ways and over the normal force."""
+    """Raise `LawRefusedError` unless mu is plausible both ways and over the normal force."""
     _check_order(coefs)
     for speed in SPEEDS:
         for velocity in (speed, -speed):
             for load in (coefs.lowest_normal_force, coefs.highest_normal_force):
                 mu = float(dynamic_coefficient(coefs, velocity, 0.0, load))
                 if not LOWEST <= mu <= HIGHEST:
-                    raise CoefficientsRefusedError(
+                    raise LawRefusedError(
                         f'coefficient of friction ({mu:.3g} at {1e3 * velocity:+.0f} mm/s and {load:g} N) '
                         f'must lie within {LOWEST:g} .. {HIGHEST:g}; identify the friction again'
                     )
 
 
 def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> None:
-    """Raise `CoefficientsRefusedError` unless friction stays finite and positive wherever it can come to be.
+    """Raise `LawRefusedError` unless friction stays finite and positive wherever it can come to be.
 
     That is at any normal force, at speeds from where it is not faded to the end of the characteristics, and
     at any deflection xi of the contact. With mu = a + b u the equation of the creeping element (Eqs 8 and 9),
@@ -78,7 +74,7 @@ def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> Non
                 pull = coefs.scale * force * float(slope_coefficient(coefs, velocity, force))
                 where = f'at {1e3 * velocity:+.3g} mm/s and {force:g} N'
                 if not pull < stiffness:
-                    raise CoefficientsRefusedError(
+                    raise LawRefusedError(
                         f'normal force times slope b of the friction ({pull:.3g} N/m {where}) must stay '
                         f'below tangential_stiffness ({stiffness:g} N/m) of the contact, or its deflection '
                         'grows without end; set b_offset, b_1, b_2, beta_1, beta_2 and scale closer to '
@@ -89,7 +85,7 @@ def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> Non
                 rest = coefs.scale * float(offset_coefficient(coefs, velocity, force))
                 mu = rest * stiffness / (stiffness - pull)
                 if not 0.0 < mu <= HIGHEST_AT_ALL:
-                    raise CoefficientsRefusedError(
+                    raise LawRefusedError(
                         f'coefficient of friction ({mu:.3g} {where}) must be greater than 0 and not exceed '
                         f'{HIGHEST_AT_ALL:g}; set the parameters a_*, alpha_* and b_* of the friction closer '
                         'to their defaults'
@@ -99,7 +95,7 @@ def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> Non
 def _check_order(coefs: FrictionCoefficients) -> None:
     low, high = coefs.lowest_normal_force, coefs.highest_normal_force
     if low > high:
-        raise CoefficientsRefusedError(
+        raise LawRefusedError(
             f'lowest_normal_force ({low:g} N) must not exceed highest_normal_force ({high:g} N); '
             'exchange them, or identify again'
         )

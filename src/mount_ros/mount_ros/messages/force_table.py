@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_ros.messages.scalars import MessageError
+
 if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
     from std_msgs.msg import Float64MultiArray
 
@@ -19,10 +21,6 @@ FloatArray = npt.NDArray[np.float64]
 
 _ROWS_LABEL = 'rows: current (A), normal_force (N)'
 _ACTIVATION_LABEL = 'activation '
-
-
-class ForceTableMessageError(ValueError):
-    """A current-force table message holds no usable table; the text says why and the remedy."""
 
 
 class ForceTable(NamedTuple):
@@ -36,7 +34,7 @@ class ForceTable(NamedTuple):
 def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
     """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
 
-    `stamp` (ns) is that of the `air_gap` message. Raises `ForceTableMessageError` for a table
+    `stamp` (ns) is that of the `air_gap` message. Raises `MessageError` for a table
     that `from_message` would refuse.
     """
     from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
@@ -52,7 +50,7 @@ def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
 
 
 def from_message(message: 'Float64MultiArray') -> ForceTable:
-    """Return activation stamp and table of `message`, or raise `ForceTableMessageError`."""
+    """Return activation stamp and table of `message`, or raise `MessageError`."""
     shape = [(dimension.size, dimension.stride) for dimension in message.layout.dim]
     offset, numbers = message.layout.data_offset, np.array(message.data, float)
     count = numbers.size // 2
@@ -104,5 +102,5 @@ def _check(rows: FloatArray) -> None:
         )
 
 
-def _refusal(what: str) -> ForceTableMessageError:
-    return ForceTableMessageError(f'current_force_table {what}; activate mount_init again')
+def _refusal(what: str) -> MessageError:
+    return MessageError(f'current_force_table {what}; activate mount_init again')

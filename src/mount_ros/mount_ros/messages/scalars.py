@@ -32,16 +32,16 @@ Rows = NDArray[np.uint8]
 Numbers = NDArray[np.float64]
 
 
-class ScalarsError(ValueError):
-    """A message lacks a named scalar that its topic declares, or cannot carry what it shall."""
+class MessageError(ValueError):
+    """A serialised message is not what its topic holds; the text says why."""
 
 
 def stamp_of(raw: bytes) -> int:
-    """Return the header stamp of any serialised stamped message, ns; raises `ScalarsError` if it is cut."""
+    """Return the header stamp of any serialised stamped message, ns; raises `MessageError` if it is cut."""
     try:
         seconds, nanoseconds = _STAMP.unpack_from(raw, _STAMP_OFFSET)
     except struct.error:
-        raise ScalarsError(f'a message of {len(raw)} bytes has no stamp') from None
+        raise MessageError(f'a message of {len(raw)} bytes has no stamp') from None
     return seconds * _NANOSECONDS + nanoseconds
 
 
@@ -61,7 +61,7 @@ class _Layout:
             return rows
         seconds, nanoseconds = np.divmod(stamps, _NANOSECONDS)
         if not -_LAST_SECOND <= seconds.min() <= seconds.max() <= _LAST_SECOND:
-            raise ScalarsError(
+            raise MessageError(
                 f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns'
             )
         columns: list[tuple[int, NDArray[Any] | None, str]] = [
@@ -114,7 +114,7 @@ class ScalarsLayout(_Layout):
     def unpack(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         """Return (stamp ns, positions, velocities) in the order of the topic's names; velocities may be ().
 
-        Raises `ScalarsError` where a declared name is missing.
+        Raises `MessageError` where a declared name is missing.
         """
         if len(raw) != len(self._template) or raw[_STAMP_END : self._begin] != self._head:
             return self._unpack_foreign(raw)
@@ -126,7 +126,7 @@ class ScalarsLayout(_Layout):
     def _unpack_foreign(self, raw: bytes) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
         message = _decoded(raw)
         if not {*self.names} <= {*message.name} or len(message.position) != len(message.name):
-            raise ScalarsError(
+            raise MessageError(
                 f'{self.topic.name}: the message names {list(message.name)} with '
                 f'{len(message.position)} positions; needed are {list(self.names)} with one position each'
             )
@@ -183,7 +183,7 @@ def _decoded(raw: bytes) -> JointState:
     try:
         return deserialize_message(raw, JointState)
     except (RuntimeError, ValueError) as error:  # of the middleware; of a name that is no UTF-8
-        raise ScalarsError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
+        raise MessageError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
 
 
 def _marks(count: int, first: int) -> list[float]:

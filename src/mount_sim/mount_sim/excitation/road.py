@@ -14,17 +14,13 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import cosines, exp, log, sine_and_cosine, sines
-from mount_models.quantity import Quantity, checked
+from mount_models.quantity import ParameterError, Quantity, checked
 from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.random_numbers import RandomNumbers
 
 FloatArray = npt.NDArray[np.float64]
 REFERENCE_FREQUENCY = 0.1
 """n0 of ISO 8608 in cycles/m."""
-
-
-class RoadError(ValueError):
-    """A road cannot be built; the text says why and the remedy."""
 
 
 class RandomRoad(NamedTuple):
@@ -62,7 +58,7 @@ def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
 
     Taken with its slope at points of a fixed grid along the road, 16 to the shortest wave, and joined by
-    cubic pieces, which leaves 1e-4 of that wave's amplitude. Raises `RoadError` or `ParameterError`.
+    cubic pieces, which leaves 1e-4 of that wave's amplitude. Raises `ParameterError` or `ParameterError`.
     """
     road = checked(road)
     seconds = np.asarray(times, dtype=np.float64)
@@ -111,7 +107,7 @@ class _Waves(NamedTuple):
 @lru_cache(maxsize=4)
 def _waves(road: RandomRoad) -> _Waves:
     if not road.highest_frequency > road.lowest_frequency:
-        raise RoadError(
+        raise ParameterError(
             f'highest_frequency ({road.highest_frequency:g} cycles/m) must lie above lowest_frequency '
             f'({road.lowest_frequency:g} cycles/m)'
         )

@@ -8,12 +8,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.quantity import Quantity, checked
+from mount_models.quantity import ParameterError, Quantity, checked
 from mount_sim.plant.reluctance import ReluctanceActuator, force, force_and_gap_slope
-
-
-class ClosingError(ValueError):
-    """The closing mechanics cannot work as described; the text says why and the remedy."""
 
 
 class ClosingMechanics(NamedTuple):
@@ -78,18 +74,18 @@ def contact_current(mechanics, actuator):
 
 
 def checked_closing(mechanics: ClosingMechanics, actuator: ReluctanceActuator) -> ClosingMechanics:
-    """Return `mechanics` with every value in range, or raise `ParameterError` or `ClosingError`.
+    """Return `mechanics` with every value in range, or raise `ParameterError` or `ParameterError`.
 
     Refused are pads that touch already at rest, and springs that the magnet never overcomes.
     """
     mechanics = checked(mechanics)
     if not mechanics.contact_gap < mechanics.rest_gap:
-        raise ClosingError(
+        raise ParameterError(
             f'contact_gap ({mechanics.contact_gap * 1e6:.1f} um) must lie below rest_gap '
             f'({mechanics.rest_gap * 1e6:.1f} um): without current the pads must be free of the rod'
         )
     if math.isnan(contact_current(mechanics, actuator)):
-        raise ClosingError(
+        raise ParameterError(
             f'contact force ({contact_force(mechanics):.1f} N) is beyond what the magnet reaches at a gap of '
             f'{mechanics.contact_gap * 1e6:.1f} um; lower spring_stiffness or bring the gaps closer together'
         )

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mount_models.quantity import with_values
+from mount_models.quantity import ParameterError, with_values
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SAMPLE_TIME
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.reluctance import force as magnetic_force
@@ -34,10 +34,6 @@ RIPPLE_GAPS = np.linspace(250e-6, 550e-6, 16)
 
 FORCE_CURRENTS = np.linspace(0.1, HIGHEST_CURRENT, 59)
 """Currents at which the force is taken at each gap, A (chosen)."""
-
-
-class RackError(ValueError):
-    """The rack cannot do what is asked; the text says what and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +70,7 @@ def record_ripple(
     """Return the ripple at a fixed `gap` (m), 1 kHz: one third of `duration` (s) at rest, then a ramp.
 
     Columns: time_s, gap_um, coil_temperature_c, current_a, current_rate_a_per_s and flux_rate_t_per_s. Noise
-    is on both slopes, so that their quotient has `rack.noise`. Raises `RackError` where the bridge gives up.
+    is on both slopes, so that their quotient has `rack.noise`. Raises `ParameterError`.
     """
     coil = coil_at(rack.coil, rack.temperature, temperature)
     count = round(duration * SAMPLE_RATE)
@@ -85,7 +81,7 @@ def record_ripple(
     rates = np.array([current_rate(coil, rack.actuator, i, gap) for i in current.tolist()])
     flux = np.array([flux_rate(coil, rack.actuator, i) for i in current.tolist()])
     if not np.isfinite(rates).all():
-        raise RackError(
+        raise ParameterError(
             f'the bridge cannot hold {current[~np.isfinite(rates)][0]:.2f} A at {temperature:.0f} degC and '
             f'{coil.link_voltage:g} V; lower peak_current ({peak_current:.2f} A)'
         )

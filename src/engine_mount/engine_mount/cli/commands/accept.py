@@ -32,9 +32,9 @@ def accept(
     folder: Annotated[Path, typer.Option(help='folder of the references')] = Path('bags/reference'),
 ) -> None:
     """Make a run the reference that `make test` replays; the reason is kept with it."""
-    from engine_mount.recordings.compare.reference import ACCEPTED_NAME
-    from engine_mount.recordings.compare.reference import accept as accept_run
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.place import open_run
+    from engine_mount.recordings.reference import ACCEPTED_NAME
+    from engine_mount.recordings.reference import accept as accept_run
     from mount_recorder.versions import versions
 
     console = terminal()

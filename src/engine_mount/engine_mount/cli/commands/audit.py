@@ -31,10 +31,10 @@ def audit(
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.audit.audit import audit as audited
-    from engine_mount.recordings.audit.losses import losses
-    from engine_mount.recordings.audit.report import as_json, as_table, latency_lines, sentences
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.audit import audit as audited
+    from engine_mount.recordings.audit_report import as_json, as_table, latency_sentences, sentences
+    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
@@ -44,7 +44,7 @@ def audit(
         audits = audited(opened)
         found = losses(opened, audits)
     TerminalScreen(console).table(as_table(audits))
-    for line in latency_lines(audits):
+    for line in latency_sentences(audits):
         console.print(line, soft_wrap=True)
     for sentence in sentences(audits, found):
         console.print(sentence, soft_wrap=True)

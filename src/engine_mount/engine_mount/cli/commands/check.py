@@ -45,15 +45,20 @@ def check(
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.experiments.check.judgement import all_verdicts, passed
-    from engine_mount.experiments.check.page import PAGE, write_page
-    from engine_mount.experiments.check.session import CheckOrder, run_trials, trials_of
+    from engine_mount.experiments.check.report import (
+        PAGE,
+        Told,
+        all_verdicts,
+        figures_of,
+        passed,
+        table_of,
+        write_page,
+    )
+    from engine_mount.experiments.check.run import CORE, MODES, CheckOrder, run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, shipped_suite, suite_in_file
-    from engine_mount.experiments.check.telling import Told, figures_of, table_of
-    from engine_mount.experiments.check.trial import CORE, MODES
-    from engine_mount.recordings.run.folder import make_run_folder, new_place
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.options import settings_of_options
+    from engine_mount.settings.run_folder import make_run_folder, new_place
     from mount_bringup.graph.domain import chosen_domain
 
     console = terminal()

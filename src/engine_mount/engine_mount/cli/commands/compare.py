@@ -57,10 +57,11 @@ def _told(
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.compare.compare import compare as compare_recordings
-    from engine_mount.recordings.compare.signals import signal_table
-    from engine_mount.recordings.compare.tolerances import Tolerances
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.alignment import alignment_sentence
+    from engine_mount.recordings.compare import compare as compare_recordings
+    from engine_mount.recordings.difference import signal_table
+    from engine_mount.recordings.place import open_run
+    from engine_mount.recordings.tolerances import Tolerances
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
@@ -72,7 +73,7 @@ def _told(
     if comparison.differing:
         TerminalScreen(console).table(signal_table(comparison.signals))
     console.print(
-        f'Times are from the first displacement sample of A; {comparison.alignments.sentence}.',
+        f'Times are from the first displacement sample of A; {alignment_sentence(comparison.alignments)}.',
         soft_wrap=True,
     )
     for recording in recordings:

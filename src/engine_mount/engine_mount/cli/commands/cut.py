@@ -45,9 +45,9 @@ def cut(
 
     The times of the messages stay as they were, so the first message may be a session from long before.
     """
-    from engine_mount.recordings.edit.cut import cut as cut_recording
-    from engine_mount.recordings.events.recorded_events import event_time, find_event
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.cut import cut as cut_recording
+    from engine_mount.recordings.events import event_time, find_event
+    from engine_mount.recordings.place import open_run
 
     if bool(event) == bool(begin or end):
         raise typer.BadParameter('give --from and --to (or one of them), or --event')
@@ -75,7 +75,7 @@ def cut(
 
 
 def _seconds(text: str) -> float:
-    from engine_mount.recordings.run.amounts import duration_in_nanoseconds
+    from engine_mount.settings.amounts import duration_in_nanoseconds
 
     plain = text.replace('.', '', 1).isdigit()
     return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9

@@ -281,7 +281,7 @@ def given_without_file(**options: object) -> None:
 
 def _list_faults() -> None:
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.run.screen import Table
+    from engine_mount.recordings.screen import Table
     from mount_sim.electronics.faults.kinds import FAULTS
 
     rows = [(name, kind.meaning) for name, kind in FAULTS.items()]

@@ -60,7 +60,7 @@ def experiment(
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.registry import experiments_named, listed
-    from engine_mount.recordings.run.screen import Table
+    from engine_mount.recordings.screen import Table
 
     console = terminal()
     if show:

@@ -52,9 +52,9 @@ def faults(
     from engine_mount.faults.graph import Place
     from engine_mount.faults.page import table, write_page
     from engine_mount.faults.session import run_faults
-    from engine_mount.recordings.run.folder import make_run_folder
-    from engine_mount.recordings.run.screen import Table
+    from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.run_folder import make_run_folder
     from mount_bringup.graph.domain import chosen_domain
 
     console = terminal()

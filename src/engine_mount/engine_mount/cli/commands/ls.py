@@ -108,7 +108,7 @@ def info(
 
     Of a file of others, its columns.
     """
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
     from engine_mount.reports.recording_facts import recording_facts
     from engine_mount.signals.formats.reading import is_foreign
@@ -149,7 +149,7 @@ def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: P
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.run.session import duration_of, started_of, versions_sentence
+    from engine_mount.recordings.session import duration_of, started_of, versions_sentence
     from mount_recorder.versions import versions
 
     def tell(label: str, text: str) -> None:

@@ -23,8 +23,8 @@ def merge(
     ] = False,
 ) -> None:
     """Join recordings by log time; what stands in more than one of them is written once."""
-    from engine_mount.recordings.edit.merge import merge as merge_recordings
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.merge import merge as merge_recordings
+    from engine_mount.recordings.place import open_run
 
     console = terminal()
     opened = [open_run(local(place, console)) for place in recordings]

@@ -58,7 +58,7 @@ def record(
     from engine_mount.drives.record import RecordOrder
     from engine_mount.drives.record import record as run_record
     from engine_mount.drives.recorder_options import checked_recorder, recorder_options
-    from engine_mount.recordings.run.folder import new_place
+    from engine_mount.settings.run_folder import new_place
     from mount_bringup.graph.domain import chosen_domain
     from mount_recorder.parameters import RecorderParameters
 
@@ -86,10 +86,10 @@ def record(
 
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
-    from engine_mount.recordings.audit.audit import audit
-    from engine_mount.recordings.audit.losses import losses
-    from engine_mount.recordings.audit.report import sentences
-    from engine_mount.recordings.bag.recording import open_recording
+    from engine_mount.recordings.audit import audit
+    from engine_mount.recordings.audit_report import sentences
+    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.recording import open_recording
 
     recording = open_recording(folder)
     audits = audit(recording)

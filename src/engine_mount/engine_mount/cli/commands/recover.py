@@ -35,8 +35,8 @@ def recover(
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from engine_mount.cli.screen import progress_bar
-    from engine_mount.recordings.edit.recover import recover as recovered
-    from engine_mount.recordings.run.place import recording_place
+    from engine_mount.recordings.place import recording_place
+    from engine_mount.recordings.recover import recover as recovered
 
     console = terminal()
     source = recording_place(local(recording, console))

@@ -54,7 +54,7 @@ def report(
     Several recordings share the charts. What a recording lacks stands in the page in words.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.run.place import open_run
+    from engine_mount.recordings.place import open_run
     from engine_mount.reports.pages import default_pictures, write_report
 
     console = terminal()

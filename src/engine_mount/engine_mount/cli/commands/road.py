@@ -60,7 +60,7 @@ def show(
     With `--speed` also which frequencies it holds at that speed.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.run.screen import Table
+    from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
     from engine_mount.signals.roads.iso8608 import unevenness
     from engine_mount.signals.roads.speed import speed_of

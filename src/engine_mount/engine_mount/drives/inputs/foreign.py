@@ -8,11 +8,9 @@ import numpy as np
 
 from engine_mount.drives.inputs.input import ControlRun, Messages, ReplayError, ReplayInput, dated
 from engine_mount.drives.inputs.ramps import MeasuredGap, measured_gaps
-from engine_mount.recordings.run.place import open_run
-from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
-from engine_mount.recordings.signals.plausibility import check_size
-from engine_mount.recordings.signals.signal import SECOND
+from engine_mount.recordings.place import open_run
 from engine_mount.settings.chosen import Parameters, chosen_specimen, control_parameters
+from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.one_grid import (
@@ -23,6 +21,8 @@ from engine_mount.signals.importing.one_grid import (
     displacement_on_grid,
     rate_text,
 )
+from engine_mount.signals.plausibility import check_size
+from engine_mount.signals.signal import SECOND
 from engine_mount.signals.units.columns import place, read_chosen
 from engine_mount.signals.units.mapping import MEAN, Mapping, checked_scale, mapping_in_file, with_options
 from engine_mount.signals.units.signals import ChosenSignal, chosen_signals

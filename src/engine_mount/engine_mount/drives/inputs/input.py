@@ -19,9 +19,9 @@ from engine_mount.drives.inputs.taken import (
     control_runs,
     quiet_at_first,
 )
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.series import Payloads
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Payloads
+from engine_mount.recordings.session import (
     SessionError,
     recorded_session,
     session_content,

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.settings.chosen import Parameters
 from mount_ros.messages.event import ParametersChanged, read_change
 from mount_ros.topics import EVENT

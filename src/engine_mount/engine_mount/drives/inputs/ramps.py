@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.settings.chosen import chosen_specimen
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation
@@ -15,7 +15,8 @@ from mount_init.parameters import InitParameters
 from mount_models.quantity import with_flattened
 from mount_models.specimen import Specimen, SpecimenError
 from mount_ros import topics
-from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
+from mount_ros.messages.force_table import ForceTable, from_message
+from mount_ros.messages.scalars import MessageError
 
 Times = NDArray[np.int64]
 Column = NDArray[np.float64]
@@ -58,7 +59,7 @@ def measured_gaps(recording: Recording) -> list[MeasuredGap]:
     for message in messages:
         try:
             table = from_message(message)
-        except ForceTableMessageError:
+        except MessageError:
             continue  # a node does not take it either
         tables[table.stamp] = table
     columns = {name: series[name] for name in topics.AIR_GAP.names}

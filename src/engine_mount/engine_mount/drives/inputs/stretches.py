@@ -25,8 +25,8 @@ from engine_mount.drives.inputs.taken import (
     looked_up,
     places_in,
 )
-from engine_mount.recordings.bag.column_parts import ColumnPart, column_parts
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.columns import ColumnPart, column_parts
+from engine_mount.recordings.recording import Recording
 from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
@@ -126,7 +126,7 @@ class Stretches:
 
     def _take_first(self, part: ColumnPart, displacement: '_Waiting') -> None:
         if displacement.newest is None and len(part):
-            self.zero = self._notes.zero = self._recording.axis_from(part.topic, part).zero
+            self.zero = self._notes.zero = self._recording.axis_from(part.stamps, part.receive_times).zero
 
     def _check_order(self, part: ColumnPart, displacement: '_Waiting') -> None:
         stamps = part.stamps

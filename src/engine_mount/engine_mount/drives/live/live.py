@@ -17,10 +17,10 @@ from engine_mount.drives.keyboard import Keyboard
 from engine_mount.drives.live.live_control import LiveControl
 from engine_mount.drives.live.playback import Playback
 from engine_mount.drives.replay import check_parameters, with_changes
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.series import Payloads
-from engine_mount.recordings.run.place import open_mount
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.place import open_mount
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.screen import Screen
+from engine_mount.recordings.series import Payloads
 from engine_mount.settings.chosen import Parameters
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED

@@ -2,16 +2,44 @@
 
 import importlib.resources
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.experiments.check.measures import MEASURES, RACK, ROAD
+from engine_mount.experiments.harness.contract import Settings
 from mount_bringup.settings import checked_settings
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.quantity import ParameterError, check_name
 
-Settings = dict[str, dict[str, Any]]
+BANDS = ((3.0, 14.0), (14.0, 20.0), (20.0, 30.0), (30.0, 50.0), (20.0, 200.0))
+"""Hz: resonance of the engine; the isolation bands of the sweep; what the chassis passes on as sound."""
+REFERENCES = ('hydromount', 'undamped')
+ROAD, RACK, CLOCK = 'road', 'rack', 'clock'
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a number means, its unit ('' for counts and ratios), and on which seat it can be told.
+
+    One with the seat `CLOCK` is of real time and not judged in core and lock-step.
+    """
+
+    unit: str
+    meaning: str
+    seats: tuple[str, ...]
+
+
+def _shipped(file: str) -> Any:
+    """Return the content of a YAML file beside this module."""
+    return plain_yaml(importlib.resources.files(__package__).joinpath(file).read_text(encoding='utf-8'))
+
+
+MEASURES = {
+    name: Measure(unit, meaning, tuple(seats.split()))
+    for name, (unit, meaning, seats) in _shipped('measures.yaml').items()
+}
+"""{name: what it means}. A number that is not known is exceeded, whatever its limit."""
+
 
 SOURCES = ('contract', 'derived', 'paper', 'chosen')
 """Where the number of a limit comes from; `chosen` ones are a decision of whoever wrote the suite."""
@@ -28,28 +56,28 @@ class SuiteError(ValueError):
 
 @dataclass(frozen=True)
 class Limit:
-    """A bound of a measure: `at_most` or `at_least` so much, and where that comes from."""
+    """A bound of a measure: `at_most` or `at_least` so much, and where that comes from.
+
+    A `common` one is shared with all manoeuvres of the suite.
+    """
 
     measure: str
     bound: str
     value: float
     source: str
     reason: str
+    common: bool
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on.
-
-    `common` are the limits that it shares with all manoeuvres of its suite.
-    """
+    """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on."""
 
     name: str
     about: str
     evaluated_from: float
-    settings: Mapping[str, Mapping[str, Any]]
-    limits: tuple[Limit, ...]
-    common: tuple[Limit, ...]
+    settings: Settings
+    limits: tuple[Limit, ...] = ()
 
     @property
     def seat(self) -> str:
@@ -59,10 +87,7 @@ class Manoeuvre:
 
 def shipped_suite() -> tuple[Manoeuvre, ...]:
     """Return the manoeuvres that come with the package."""
-    text = (importlib.resources.files('engine_mount.experiments.check') / 'suite.yaml').read_text(
-        encoding='utf-8'
-    )
-    return suite_of(plain_yaml(text))
+    return suite_of(_shipped('suite.yaml'))
 
 
 def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:
@@ -76,7 +101,7 @@ def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:
 def suite_of(content: Any) -> tuple[Manoeuvre, ...]:
     """Return the manoeuvres of a suite's content; raises `SuiteError`."""
     told = _mapping('the suite', content, _OF_SUITE)
-    common = tuple(_limits('limits', told.get('limits', {})))
+    common = tuple(_limits('limits', told.get('limits', {}), common=True))
     named = _mapping('manoeuvres', told.get('manoeuvres'))
     if not named:
         raise SuiteError('manoeuvres must name at least one manoeuvre')
@@ -98,18 +123,14 @@ def _manoeuvre(name: str, entry: Any, common: tuple[Limit, ...]) -> Manoeuvre:
     begin = _number(f'{name}.evaluated_from_s', told.get('evaluated_from_s', 0.0))
     if begin < 0.0:
         raise SuiteError(f'{name}.evaluated_from_s ({begin:g} s) must be 0 or more')
-    made = Manoeuvre(
-        name,
-        _text(f'{name}.about', told.get('about')),
-        begin,
-        _settings(name, told.get('set')),
-        tuple(_limits(name, told.get('limits', {}))),
-        common,
-    )
-    for limit in made.limits:
+    about = _text(f'{name}.about', told.get('about'))
+    made = Manoeuvre(name, about, begin, _settings(name, told.get('set')))
+    own = tuple(_limits(name, told.get('limits', {})))
+    for limit in own:
         if made.seat not in MEASURES[limit.measure].seats:
             raise SuiteError(f'{name}: {limit.measure} cannot be told on a {made.seat}; leave it out')
-    return made
+    shared = (limit for limit in common if made.seat in MEASURES[limit.measure].seats)
+    return replace(made, limits=(*own, *shared))
 
 
 def _settings(name: str, entry: Any) -> Settings:
@@ -127,7 +148,7 @@ def _settings(name: str, entry: Any) -> Settings:
     return checked
 
 
-def _limits(name: str, entry: Any) -> Iterator[Limit]:
+def _limits(name: str, entry: Any, *, common: bool = False) -> Iterator[Limit]:
     for measure, told in _mapping(f'{name}', entry).items():
         _check_key(name, measure, MEASURES, 'quantity')
         place = f'{name}.{measure}'
@@ -139,7 +160,7 @@ def _limits(name: str, entry: Any) -> Iterator[Limit]:
         if not bounds:
             raise SuiteError(f'{place} must have {" or ".join(_BOUNDS)}')
         for bound in bounds:
-            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason)
+            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason, common)
 
 
 def _mapping(place: str, entry: Any, known: Collection[str] = ()) -> Mapping[str, Any]:

@@ -1,14 +1,12 @@
 """Controller and plant together, once through: driven, recorded, and read back."""
 
 import io
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from engine_mount.drives.drive import DriveOrder, record_drive
-from engine_mount.experiments.harness.contract import ExperimentError, Order
-from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.experiments.harness.contract import ExperimentError, Order, Settings, Values
+from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import defaults_of_nodes
@@ -23,9 +21,7 @@ def mode_of(order: Order) -> str:
     return 'lock-step' if order.graph else 'core'
 
 
-def settings_of_run(
-    order: Order, own: Mapping[str, Mapping[str, Any]], experiment: str
-) -> dict[str, dict[str, Any]]:
+def settings_of_run(order: Order, own: Settings, experiment: str) -> dict[str, Values]:
     """Return the nodes' parameters: the user's and the experiment's `own`; raises where both set the same."""
     merged = {node: dict(values) for node, values in order.settings.items() if node in defaults_of_nodes()}
     for node, values in own.items():
@@ -39,7 +35,7 @@ def settings_of_run(
     return with_control_of_mount(merged)
 
 
-def driven(order: Order, label: str, own: Mapping[str, Mapping[str, Any]], experiment: str) -> DriveSignals:
+def driven(order: Order, label: str, own: Settings, experiment: str) -> DriveSignals:
     """Run a scenario in `order.out / label`, by plain calls or through the real nodes, and read it back.
 
     Time and truth begin with the excitation; what rack and chassis measure is taken from the truth.

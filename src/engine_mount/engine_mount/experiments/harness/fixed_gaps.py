@@ -9,13 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from engine_mount.reports.drive.signals import FloatArray
 from mount_models.coil.gap import measured_inductance
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
-
-FloatArray = npt.NDArray[np.float64]
 
 RIG_GAPS = np.linspace(250e-6, 550e-6, 31)
 """Gaps held on the rig, m (chosen): contact gaps of new and worn pads up to the gap at rest."""

@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-import numpy.typing as npt
 from geometry_msgs.msg import WrenchStamped
 
 from mount_models.quantity import Quantity
@@ -23,8 +21,6 @@ from mount_ros.topics import (
     Delivery,
 )
 from mount_sim.rack.friction import RackRecording
-
-FloatArray = npt.NDArray[np.float64]
 
 ForceNoise = Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)]
 DisplacementNoise = Annotated[

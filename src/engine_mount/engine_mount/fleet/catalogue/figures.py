@@ -8,12 +8,12 @@ import numpy as np
 
 from engine_mount.fleet.catalogue.motion import Motion
 from engine_mount.fleet.catalogue.trace import Trace
-from engine_mount.recordings.audit.audit import TopicAudit, audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.peak_current import PeakCurrent
-from engine_mount.recordings.bag.column_parts import column_parts
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.session import recorded_sample_rate
+from engine_mount.recordings.answers import PeakCurrent
+from engine_mount.recordings.audit import TopicAudit, audit, control_spans
+from engine_mount.recordings.columns import column_parts
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import recorded_sample_rate
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 Figures = dict[str, Any]
@@ -56,7 +56,7 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
             figures[column] = float(gap[name][-1])
     if _count(part, COIL_TEMPERATURE.name):
         figures['coil_temperature_degc'] = _highest(part[COIL_TEMPERATURE.name]['temperature'])
-    peak, trace, motion = PeakCurrent(part, audits), Trace(), Motion()
+    peak, trace, motion = PeakCurrent(part, control_spans(audits)), Trace(), Motion()
     columns, takers = dict(peak.columns), dict.fromkeys(peak.columns, peak.add)
     for topic, taker in ((CONTROL_TRACE, trace), (DISPLACEMENT, motion)):
         if _count(part, topic.name):

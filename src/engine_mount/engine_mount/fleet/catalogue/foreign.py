@@ -13,11 +13,11 @@ from engine_mount.fleet.catalogue.motion import motion_figures
 from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.catalogue.rows import Row, Rows, named, place_of, reason_of, unreadable
 from engine_mount.fleet.foreign import ACCELERATION, Mapped, Said, columns_in, mapped_in
-from engine_mount.recordings.signals.signal import SECOND, Signal
 from engine_mount.signals.importing.channels import channels_of
 from engine_mount.signals.importing.joined import DATED
 from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.importing.reading import read_files
+from engine_mount.signals.signal import SECOND, Signal
 from engine_mount.signals.units.quantities import quantity
 from mount_models.sampling import SAMPLE_RATE
 

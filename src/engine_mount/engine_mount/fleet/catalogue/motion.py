@@ -6,9 +6,8 @@ import numpy as np
 
 from engine_mount.fleet.catalogue.columns import BANDS, band_name
 from engine_mount.fleet.catalogue.in_bands import FloatArray, in_bands
-from engine_mount.recordings.bag.column_parts import ColumnPart
-from engine_mount.recordings.messages.stamps import misdated
-from engine_mount.recordings.messages.times import Times, each_once
+from engine_mount.recordings.columns import ColumnPart
+from engine_mount.recordings.times import Times, each_once, misdated
 from mount_ros.topics import DISPLACEMENT
 
 

@@ -7,7 +7,7 @@ from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.catalogue.rows import Rows, named, rows_of, unreadable
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, own_recording
 from engine_mount.fleet.job import Answer
-from engine_mount.recordings.bag.recording import ReadingError
+from engine_mount.recordings.recording import ReadingError
 from engine_mount.signals.sources.source import StoreAwayError
 from engine_mount.signals.sources.stores import local_copy
 

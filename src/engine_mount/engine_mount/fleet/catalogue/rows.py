@@ -10,10 +10,10 @@ from typing import Any
 from engine_mount.fleet.catalogue.columns import DRIVE, OTHER, REPLAY, UNREADABLE
 from engine_mount.fleet.catalogue.figures import OF_FRICTION, lost_figures, state_figures
 from engine_mount.fleet.catalogue.places import Place
-from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.events.recorded_events import event_time, recorded_events
-from engine_mount.recordings.messages.series import SeriesError
-from engine_mount.recordings.run.session import (
+from engine_mount.recordings.events import event_time, recorded_events
+from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.series import SeriesError
+from engine_mount.recordings.session import (
     duration_of,
     session_parameters,
     started_of,

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.bag.column_parts import ColumnPart
-from engine_mount.recordings.events.switching_changes import switching_places
+from engine_mount.recordings.columns import ColumnPart
+from engine_mount.recordings.switching import switching_places
 
 _ACTIVE = 'damping_active'
 _BLOCK = 1 << 13  # samples whose power is summed together, chosen

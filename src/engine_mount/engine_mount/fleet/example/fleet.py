@@ -20,7 +20,7 @@ from engine_mount.drives.preflight import preflight
 from engine_mount.fleet.example.damages import DAMAGES
 from engine_mount.fleet.example.variations import DRIVES, VARIATIONS, Drive, Variation
 from engine_mount.fleet.runner import Done, run_tasks
-from engine_mount.recordings.edit.cut import cut
+from engine_mount.recordings.cut import cut
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.settings import checked_settings

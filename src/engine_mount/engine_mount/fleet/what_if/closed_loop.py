@@ -21,13 +21,13 @@ from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
 from engine_mount.fleet.what_if.compared import Recorded, changed_parameters
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.session import session_parameters
-from engine_mount.recordings.signals.even_grid import evenly_spaced
-from engine_mount.recordings.signals.signal import signal_of
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import session_parameters
 from engine_mount.settings.chosen import control_parameters
 from engine_mount.settings.options import with_sample_rate
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE, acceleration_at
+from engine_mount.signals.signal import signal_of
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.control_loop import SampleCounts
 from mount_control.policy.contract import Policy, trace_dtype

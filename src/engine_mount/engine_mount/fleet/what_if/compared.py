@@ -18,7 +18,7 @@ from engine_mount.drives.inputs.taken import Column, ControlRun, Notes, ReplayEr
 from engine_mount.drives.other_policy import check_effect
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
-from engine_mount.recordings.bag.recording import Recording
+from engine_mount.recordings.recording import Recording
 from engine_mount.settings.chosen import control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_ros import topics

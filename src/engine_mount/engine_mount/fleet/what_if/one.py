@@ -20,8 +20,8 @@ from engine_mount.fleet.what_if.compared import (
     compared_setpoints,
     recorded_in,
 )
-from engine_mount.recordings.bag.recording import open_recording
-from engine_mount.recordings.run.place import recording_hash, recording_place
+from engine_mount.recordings.place import recording_hash, recording_place
+from engine_mount.recordings.recording import open_recording
 from engine_mount.signals.sources.source import StoreAwayError
 from engine_mount.signals.sources.stores import local_copy
 from mount_recorder.versions import versions

@@ -21,15 +21,9 @@ from engine_mount.identification.actuator.points import (
     gap_groups,
 )
 from engine_mount.identification.single_threaded import single_threaded
-from mount_models.actuator.law import (
-    LOWEST_SHARE,
-    ForceLaw,
-    ForceLawRefusedError,
-    check_force_law,
-    checked_force,
-    coefficients,
-)
+from mount_models.actuator.law import LOWEST_SHARE, ForceLaw, check_force_law, checked_force, coefficients
 from mount_models.arithmetic.compiled import compiled
+from mount_models.quantity import LawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -98,7 +92,7 @@ def fit_force_law(
     `orders` are the numbers of coefficients of a1 .. a5; as in Table 1 there are 18. Weights are
     1 / (`force_floor` + 0.02 F). The search starts from several places derived from the points (`fit_start`)
     and keeps the best, within bounds. The law is guarded to the measured gaps and currents, and refused
-    (`ForceLawRefusedError`) where within them it is not positive, rising with current and falling with gap;
+    (`LawRefusedError`) where within them it is not positive, rising with current and falling with gap;
     so are points that lie far from it, and points too few.
     """
     gaps, currents, forces = checked_points(gap, current, force, orders)
@@ -267,14 +261,14 @@ def _known(value: float) -> float | None:
 
 
 def _check(law: ForceLaw, lowest: float) -> None:
-    """Raise `ForceLawRefusedError` for a law that cannot be inverted; it says where nothing was measured."""
+    """Raise `LawRefusedError` for a law that cannot be inverted; it says where nothing was measured."""
     try:
         check_force_law(law)
-    except ForceLawRefusedError as error:
+    except LawRefusedError as error:
         if lowest <= LOWEST_SHARE * law.current_high:
             raise
         check_force_law(law, lowest)
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'forces were measured from {lowest:.2f} A on only, where the law is right; below it is '
             'continued to '
             f'0 N at 0 A, and that fails: {str(error).partition(":")[0]}: measure from '

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from mount_models.actuator.law import ForceLawRefusedError
+from mount_models.quantity import LawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 Orders = tuple[int, int, int, int, int]
@@ -12,9 +12,9 @@ Orders = tuple[int, int, int, int, int]
 def checked_points(
     gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, orders: Orders
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return gaps (m), currents (A) and forces (N) as rows of one length, or raise `ForceLawRefusedError`."""
+    """Return gaps (m), currents (A) and forces (N) as rows of one length, or raise `LawRefusedError`."""
     if len(orders) != 5 or not all(1 <= order <= _HIGHEST_ORDER for order in orders):
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'orders ({", ".join(str(order) for order in orders)}) must be five numbers of coefficients '
             f'within 1 .. {_HIGHEST_ORDER}, for a1 .. a5; 4, 4, 4, 2, 4 as in Table 1'
         )
@@ -22,19 +22,19 @@ def checked_points(
     gaps, currents, forces = (np.ravel(array) for array in arrays)
     unknowns = sum(orders)
     if forces.size < 3 * unknowns:
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'force measurements ({forces.size}) must be at least {3 * unknowns}, three per coefficient; '
             f'measure more gaps or currents'
         )
     if not (np.isfinite(gaps).all() and np.isfinite(currents).all() and np.isfinite(forces).all()):
-        raise ForceLawRefusedError('force measurements must be finite; leave out the points that failed')
+        raise LawRefusedError('force measurements must be finite; leave out the points that failed')
     if currents.min() < 0.0 or currents.max() <= 0.0:
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'coil currents ({currents.min():.3f} .. {currents.max():.3f} A) must be 0 A or more, and some '
             f'above it; is the polarity of the current sensor right?'
         )
     if forces.max() <= 0.0 or np.mean(forces) < 0.0:
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'forces ({forces.min():.1f} .. {forces.max():.1f} N) must be positive where the magnet pulls; '
             f'is the sign of the load cell right?'
         )
@@ -53,7 +53,7 @@ def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
 def check_outliers(
     gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, tolerance: FloatArray
 ) -> None:
-    """Raise `ForceLawRefusedError` naming the points whose force lies far from the `expected` one (N).
+    """Raise `LawRefusedError` naming the points whose force lies far from the `expected` one (N).
 
     Far is more than six standard deviations of points with like forces, and more than `tolerance` (N).
     """
@@ -62,7 +62,7 @@ def check_outliers(
     if not far.size:
         return
     if far.size > _MANY * force.size:
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'{far.size} of {force.size} points lie far from any law of this form, the worst at '
             f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current and '
             'force of the same actuator, in the units of their columns, and taken at the same time?'
@@ -70,7 +70,7 @@ def check_outliers(
     worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
     named = '; '.join(_point(gap, current, force, expected, place) for place in worst)
     others = f' and {far.size - worst.size} more' if far.size > worst.size else ''
-    raise ForceLawRefusedError(
+    raise LawRefusedError(
         f'{far.size} of {force.size} points are outliers, off by more than {_FAR:.0f} standard deviations of '
         f'points with like forces: {named}{others}: measure them again, or leave them out'
     )
@@ -102,19 +102,19 @@ def _check_span(gaps: FloatArray, currents: FloatArray, highest_order: int) -> N
     steps = len(groups) if len(groups) > 1 else np.unique(gaps).size
     needed = highest_order + 1
     if steps < needed:
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'force measurements must span at least {needed} air gaps, one more than the longest polynomial '
             f'has coefficients; {steps} given: measure more gaps, or choose lower orders'
         )
     if span < _SMALLEST_SPAN * gaps.max():
-        raise ForceLawRefusedError(
+        raise LawRefusedError(
             f'air gaps ({gaps.min() * 1e6:.1f} .. {gaps.max() * 1e6:.1f} um) must span at least '
             f'{_SMALLEST_SPAN:.0%} of the largest; measure over the whole way of the halves'
         )
     for group in groups if len(groups) > 1 else []:
         different = np.unique(np.round(currents[group], 4)).size
         if different < _FEWEST_CURRENTS:
-            raise ForceLawRefusedError(
+            raise LawRefusedError(
                 f'each air gap must be measured at {_FEWEST_CURRENTS} currents or more; at '
                 f'{gaps[group].mean() * 1e6:.1f} um there are {different}: measure more, or leave this '
                 'gap out'

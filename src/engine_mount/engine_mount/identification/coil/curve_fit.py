@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine_mount.identification.coil.gap_point import GapPoint
-from mount_models.coil.gap import GapCurvesRefusedError, ScaledPolynomial, evaluate, slope
+from mount_models.coil.gap import ScaledPolynomial, evaluate, slope
+from mount_models.quantity import LawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,7 +38,7 @@ def fitted_curve(
     """Return the curve through `values` (n,) with deviations `stds` (n,) at the gaps of `points`.
 
     The degree is the lowest that predicts each point from the others nearly as well as the best one. Raises
-    `GapCurvesRefusedError`, which names the value by `what`, for a point that contradicts the others.
+    `LawRefusedError`, which names the value by `what`, for a point that contradicts the others.
     """
     gaps = np.array([point.gap for point in points])
     low, high = float(gaps.min()), float(gaps.max())
@@ -73,14 +74,14 @@ def fitted_curve(
 def inverse_curve(what: str, polynomial: ScaledPolynomial) -> ScaledPolynomial:
     """Return the gap over the value of the curve, exact to `_INVERSE_ERROR` where a polynomial can be.
 
-    Raises `GapCurvesRefusedError` for a curve that is not monotone.
+    Raises `LawRefusedError` for a curve that is not monotone.
     """
     gaps = np.linspace(polynomial.low, polynomial.high, 201)
     values = evaluate(polynomial, gaps)
     steps = np.diff(values)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         place = int(np.argmax(np.sign(steps) != np.sign(steps[steps.size // 2])))
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'the {what} must rise or fall steadily with the gap to tell gaps apart; it turns at '
             f'{gaps[place] * 1e6:.0f} um: narrow the range of gaps, or choose another rest current or '
             f'crossing inductance'
@@ -131,7 +132,7 @@ def _check_agreement(
     times, place, off, scatter = max(judged)
     if times > _FAR and off > _CONTRADICTION:
         point = points[place]
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'{point.name}: the {what} says that its gap is {off * 1e6:.1f} um off the given '
             f'{point.gap * 1e6:.1f} um, judged by the other recordings, which agree within '
             f'{scatter * 1e6:.1f} um; is the gap of this file right? Correct it, or leave the file out'

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from engine_mount.identification.coil.curve_fit import CurveFit, fitted_curve, inverse_curve
 from engine_mount.identification.coil.gap_point import GapPoint
 from engine_mount.identification.single_threaded import single_threaded
-from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, check_gap_curves
+from mount_models.coil.gap import GapCurves, check_gap_curves
+from mount_models.quantity import LawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -29,7 +30,7 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
     """Return the curves through points at one temperature, both ways.
 
     The degree is the lowest that predicts each point from the others nearly as well as the best one. Raises
-    `GapCurvesRefusedError` for too few gaps, a point that contradicts the others, or curves not monotone.
+    `LawRefusedError` for too few gaps, a point that contradicts the others, or curves not monotone.
     """
     points = sorted(points, key=lambda point: point.gap)
     gaps = np.array([point.gap for point in points])
@@ -57,7 +58,7 @@ _FEWEST_GAPS = 6  # chosen: a cubic and two to judge it
 
 def _check_gaps(gaps: FloatArray) -> None:
     if gaps.size < _FEWEST_GAPS or np.any(np.diff(gaps) < 1e-6):
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'gap curves need recordings at {_FEWEST_GAPS} or more air gaps that differ by 1 um or more; '
             f'{gaps.size} given: {", ".join(f"{gap * 1e6:.1f}" for gap in gaps)} um: record more gaps, and '
             f'each temperature and gap once'

@@ -13,7 +13,7 @@ from engine_mount.identification.coil.few_points import (
     falling_sentence,
 )
 from mount_models.coil.crossing import CrossingError, find_crossing
-from mount_models.coil.gap import GapCurvesRefusedError
+from mount_models.quantity import LawRefusedError
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def measured_point(
     crossing_inductance: float = 20e-3,
     crossing_half_width: float = 0.2,
 ) -> GapPoint:
-    """Return L_0.2 and i_20 of one recording; raises `GapCurvesRefusedError` naming it."""
+    """Return L_0.2 and i_20 of one recording; raises `LawRefusedError` naming it."""
     current, inductance = recording.current, recording.inductance
     if is_table(recording, rest_current):
         return _from_table(recording, rest_current, crossing_inductance)
@@ -63,7 +63,7 @@ def measured_point(
         steps = in_steps(recording)
         beyond = steps[1].max() < crossing_inductance or steps[1].min() > crossing_inductance
         sentence = falling_sentence(*steps, crossing_inductance) if beyond else error
-        raise GapCurvesRefusedError(f'{recording.name}: {sentence}') from error
+        raise LawRefusedError(f'{recording.name}: {sentence}') from error
     return GapPoint(
         recording.name,
         recording.gap,
@@ -107,7 +107,7 @@ def _from_table(recording: RippleRecording, rest_current: float, crossing_induct
         at_rest, rest_std = table.at(rest_current)
         crossing, crossing_std, crossing_slope = table.falls_through(crossing_inductance)
     except TableError as error:
-        raise GapCurvesRefusedError(f'{recording.name}: {error}') from error
+        raise LawRefusedError(f'{recording.name}: {error}') from error
     return GapPoint(
         recording.name, recording.gap, recording.celsius, at_rest, rest_std, crossing, crossing_std,
         crossing_slope, (float(table.current[0]), float(table.current[-1])),
@@ -120,7 +120,7 @@ def _rest_inductance(
     """Return the inductance (H) at the rest current and its std: a line through the samples around it."""
     near = np.abs(current - rest_current) <= _REST_HALF_WIDTH
     if near.sum() < _FEWEST_AT_REST:
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} A) '
             f'must be at least {_FEWEST_AT_REST}, {int(near.sum())} are; hold that current for longer'
         )

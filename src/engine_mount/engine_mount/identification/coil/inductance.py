@@ -12,10 +12,10 @@ from engine_mount.identification.coil.gap_point import GapPoint, RippleRecording
 from engine_mount.identification.coil.temperature_fit import measured_compensation, stated_compensation
 from engine_mount.identification.coil.temperature_left import COEFFICIENT_ERROR, measured, predicted
 from engine_mount.identification.coil.unique_region import UniqueRegion, unique_region, warnings
-from engine_mount.recordings.run.screen import Table
-from mount_models.actuator.law import ForceLaw, OutsideLawError
-from mount_models.coil.gap import GapCurvesRefusedError
-from mount_models.coil.temperature import CompensationError, TemperatureCompensation
+from engine_mount.recordings.screen import Table
+from mount_models.actuator.law import ForceLaw
+from mount_models.coil.temperature import TemperatureCompensation
+from mount_models.quantity import LawRefusedError, OutsideLawError
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,12 @@ class InductanceResult:
 def calibrate_inductance(
     recordings: Sequence[RippleRecording], law: ForceLaw, order: GapOrder
 ) -> InductanceResult:
-    """Return the calibration; raises `GapCurvesRefusedError` and `CompensationError`."""
+    """Return the calibration; raises `LawRefusedError` and `LawRefusedError`."""
     points = _points(recordings, order)
     fitted = [point for point in points if not _is_held_out(point, order)]
     by_temperature = _by_temperature(fitted)
     if not by_temperature:
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'all {len(points)} recordings are held out; leave those out of --held-out-temperature that the '
             f'curves shall be fitted to'
         )
@@ -146,8 +146,8 @@ def calibrate_inductance(
     found = warnings(region, order.rest_current, order.crossing_inductance)
     try:
         calibration = calibrate_gap_curves(by_temperature[own])
-    except GapCurvesRefusedError as error:
-        raise GapCurvesRefusedError('; '.join([str(error), *found])) from error
+    except LawRefusedError as error:
+        raise LawRefusedError('; '.join([str(error), *found])) from error
     celsius = float(np.mean([point.celsius for point in by_temperature[own]]))
     others = {key: group for key, group in by_temperature.items() if key != own}
 
@@ -169,7 +169,7 @@ def calibrate_inductance(
     try:
         compensation = of_coefficient(order.coefficient)
         how = _how(bool(others), compensation)
-    except (CompensationError, GapCurvesRefusedError, OutsideLawError) as error:
+    except (LawRefusedError, OutsideLawError) as error:
         if others:
             raise
         how = 'none'
@@ -187,11 +187,11 @@ def _points(recordings: Sequence[RippleRecording], order: GapOrder) -> list[GapP
     """Return the point of each recording; a refusal names the inductances that all of them fall through."""
     try:
         return [measured_point(each, order.rest_current, order.crossing_inductance) for each in recordings]
-    except GapCurvesRefusedError as error:
+    except LawRefusedError as error:
         low, high = levels_of_all([in_steps(each) for each in recordings])
         if 'fall through' not in str(error) or not low < high:
             raise
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'{error}; all {len(recordings)} recordings fall through {low * 1e3:.1f} .. {high * 1e3:.1f} mH'
         ) from error
 
@@ -254,7 +254,7 @@ def _by_temperature(points: Sequence[GapPoint]) -> dict[float, list[GapPoint]]:
 def _inside(law: ForceLaw, points: Sequence[GapPoint]) -> list[GapPoint]:
     found = [point for point in points if law.gap_low <= point.gap <= law.gap_high]
     if len(found) < 4:
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} um, '
             f'where only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it '
             'as --base'

@@ -14,13 +14,14 @@ import numpy.typing as npt
 
 from engine_mount.identification.coil.gap_point import GapPoint
 from mount_models.actuator.law import ForceLaw, checked_force
-from mount_models.coil.gap import GapCurves, GapCurvesRefusedError, ScaledPolynomial, evaluate
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
 from mount_models.coil.resistance import COPPER_COEFFICIENT
 from mount_models.coil.temperature import (
     CONDUCTIVITY_COEFFICIENT,
     TemperatureCompensation,
     check_compensation,
 )
+from mount_models.quantity import LawRefusedError
 from mount_sim.plant.ripple import RippleCoil, duty, skin_factor
 
 FloatArray = npt.NDArray[np.float64]
@@ -37,11 +38,11 @@ def measured_compensation(
 ) -> TemperatureCompensation:
     """Return the shifts that `points` at one other temperature show against the curves.
 
-    Raises `GapCurvesRefusedError` for too few gaps, `CompensationError` for temperatures too much alike.
+    Raises `LawRefusedError` for too few gaps, `LawRefusedError` for temperatures too much alike.
     """
     inside = [p for p in points if curves.inductance_of_gap.low <= p.gap <= curves.inductance_of_gap.high]
     if len(inside) < _FEWEST_GAPS:
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             f'a temperature compensation needs recordings at {_FEWEST_GAPS} or more gaps within '
             f'{curves.inductance_of_gap.low * 1e6:.0f} .. {curves.inductance_of_gap.high * 1e6:.0f} um at '
             f'the other temperature; {len(inside)} given: record more, or leave that temperature out'
@@ -83,7 +84,7 @@ def stated_compensation(
     at_rest = 1.0 / evaluate(curves.inductance_of_gap, gaps) - outside_core
     at_crossing = 1.0 / crossing_inductance - outside_core
     if not (np.all(at_rest > 0.0) and np.all(at_crossing > 0.0)):
-        raise GapCurvesRefusedError(
+        raise LawRefusedError(
             'the force law and the inductances contradict each other: by the force the gap alone has more '
             'reluctance than was measured; are they of the same actuator, and is turns_area right?'
         )

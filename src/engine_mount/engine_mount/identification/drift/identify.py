@@ -11,9 +11,9 @@ import numpy as np
 
 from engine_mount.identification.drift.law import FEWEST, Drift, DriftError, fitted_drift
 from engine_mount.identification.friction.files import TOPICS, read_recording
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.place import open_run
-from engine_mount.recordings.run.session import recorded_session, session_content
+from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import recorded_session, session_content
 from mount_models.specimen import Specimen
 from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE
 

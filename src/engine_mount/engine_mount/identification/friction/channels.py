@@ -10,8 +10,8 @@ import numpy as np
 from engine_mount.identification.friction.recording import FloatArray, IdentificationError
 from engine_mount.identification.rack.measured_table import MeasuredTable
 from engine_mount.identification.rack.unit_words import unit_word
-from engine_mount.recordings.signals.table import Table
 from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.table import Table
 from engine_mount.signals.units.column_unit import factor_beside_unit
 from engine_mount.signals.units.columns import stated_with
 from engine_mount.signals.units.mapping import ColumnChoice, Mapping, TimeChoice

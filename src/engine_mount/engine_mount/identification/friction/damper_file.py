@@ -15,7 +15,7 @@ from engine_mount.identification.friction.recording import (
     IdentificationError,
     checked_recording,
 )
-from engine_mount.recordings.signals.table import Table, read_json
+from engine_mount.signals.table import Table, read_json
 from engine_mount.signals.units.unit import unit_of
 
 CLAMPS = ('sliding', 'rest', 'none')

@@ -9,7 +9,7 @@ from engine_mount.identification.friction.kind import RAMP, SAWTOOTH, recognised
 from engine_mount.identification.friction.looks.cases import case_of
 from engine_mount.identification.friction.looks.force_zero import zeroed
 from engine_mount.identification.friction.recording import FrictionRecording, IdentificationError
-from engine_mount.recordings.run.place import recording_hash
+from engine_mount.recordings.place import recording_hash
 
 STEPS = ('auto', 'ramp', 'sawtooth', 'ladder')
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from engine_mount.identification.rack.measured_table import MeasuredTable
 from engine_mount.identification.rack.unit_words import unit_word
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.mapping import ColumnChoice
 from engine_mount.signals.units.unit import ZERO_CELSIUS
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from engine_mount.identification.rack.columns import RackRecordingError
 from engine_mount.identification.rack.measured_table import in_topics
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.place import open_run, recording_hash
+from engine_mount.recordings.place import open_run, recording_hash
+from engine_mount.recordings.recording import Recording
 from engine_mount.signals.formats.content import Stated
 from mount_ros.topics import COIL_RIPPLE
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.run.place import recording_place
-from engine_mount.recordings.signals.loading import is_recording
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.recordings.place import recording_place
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import FloatArray, Measured, MeasuredColumn, TimeBase, found
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.loading import is_recording
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.columns import may_hold_times
 from engine_mount.signals.units.mapping import TimeChoice
 from engine_mount.signals.units.time import times_of

@@ -28,8 +28,8 @@ from engine_mount.identification.rack.given import (
     is_table,
     topic_in,
 )
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import Recording
 from engine_mount.signals.units.mapping import ColumnChoice
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE

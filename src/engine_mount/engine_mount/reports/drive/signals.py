@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.messages.times import Times, each_once, is_in
-from engine_mount.recordings.run.session import recorded_sample_rate
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import recorded_sample_rate
+from engine_mount.recordings.times import Times, each_once, is_in
 from mount_models.sampling import SAMPLE_TIME
 from mount_ros.topics import CONTROL_TRACE, DISPLACEMENT, SIM_TRUTH
 

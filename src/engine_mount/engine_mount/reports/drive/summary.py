@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.audit.audit import TopicAudit
-from engine_mount.recordings.audit.losses import Losses
-from engine_mount.recordings.audit.peak_current import peak_current
-from engine_mount.recordings.bag.recording import Recording
-from engine_mount.recordings.events.switching_changes import switching_times
-from engine_mount.recordings.run.screen import Screen, Table
+from engine_mount.recordings.answers import peak_current
+from engine_mount.recordings.audit import TopicAudit, control_spans
+from engine_mount.recordings.losses import Losses
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.screen import Screen, Table
+from engine_mount.recordings.switching import switching_times
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
@@ -98,7 +98,7 @@ def _friction_figures(
         control_from=float(time[0]) if len(time) else None,
         switch_on=on.tolist(),
         switch_off=off.tolist(),
-        peak_current=_known(peak_current(recording, audits)),
+        peak_current=_known(peak_current(recording, control_spans(audits))),
         tracking_error=_known(error),
     )
 

@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.audit.audit import audit
-from engine_mount.recordings.audit.losses import losses
-from engine_mount.recordings.audit.report import as_table, sentences
-from engine_mount.recordings.bag.recording import Recording, open_recording
-from engine_mount.recordings.run.folder import RunFolder
-from engine_mount.recordings.run.screen import Screen
+from engine_mount.recordings.audit import audit
+from engine_mount.recordings.audit_report import as_table, sentences
+from engine_mount.recordings.losses import losses
+from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.evaluation import levels_of, samples_at_the_ends
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
 from engine_mount.reports.drive.summary import (
@@ -24,6 +23,7 @@ from engine_mount.reports.drive.undamped import Undamped, UndampedError, undampe
 from engine_mount.reports.json_file import write_json
 from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.run_folder import RunFolder
 from mount_recorder.folders import recordings_of, saved_snapshots
 from mount_recorder.parameters import RecorderParameters
 

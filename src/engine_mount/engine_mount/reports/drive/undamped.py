@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.recording import ReadingError, Recording
-from engine_mount.recordings.messages.series import SeriesError
+from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.series import SeriesError
 from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of
 from engine_mount.signals.excitation import build_excitation

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from engine_mount.recordings.audit.peak_current import peak_current
-from engine_mount.recordings.compare.quantity_text import quantity_text
-from engine_mount.recordings.run.session import session_values
+from engine_mount.recordings.answers import peak_current
+from engine_mount.recordings.audit import control_spans
+from engine_mount.recordings.difference import quantity_text
+from engine_mount.recordings.session import session_values
 from engine_mount.reports.sections.run_sections import HEAD_OF_SESSION
 from engine_mount.reports.sections.section import Cell, Link, Section, Table
 from engine_mount.reports.sections.subject import Subject
@@ -61,7 +62,7 @@ def _friction_figures(subject: Subject) -> dict[str, Cell]:
         names = ('peak current', 'damping switched on', 'friction force error')
         return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
     spans, setpoint = subject.signals.damping(), subject.setpoint()
-    peak = peak_current(subject.signals.recording, subject.audits)
+    peak = peak_current(subject.signals.recording, control_spans(subject.audits))
     error = subject.facts.tracking.error if subject.facts.tracking else math.nan
     told = 'not recorded' if spans is None else f'{len(spans)} times' if len(spans) != 1 else 'once'
     return {
@@ -112,7 +113,7 @@ def _peak(subject: Subject) -> float:
 def _peak_current(subject: Subject) -> float:
     if subject.facts.without_friction:
         return math.nan
-    return peak_current(subject.signals.recording, subject.audits)
+    return peak_current(subject.signals.recording, control_spans(subject.audits))
 
 
 def _times_on(subject: Subject) -> float:

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from engine_mount.recordings.audit.report import sentences as audit_sentences
-from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
-from engine_mount.recordings.compare.signals import by_importance
-from engine_mount.recordings.run.session import session_values
+from engine_mount.recordings.alignment import alignment_sentence
+from engine_mount.recordings.audit_report import sentences as audit_sentences
+from engine_mount.recordings.difference import by_importance, quantity_text, time_text
+from engine_mount.recordings.session import session_values
 from engine_mount.reports.sections import charts
 from engine_mount.reports.sections.charts import Named
 from engine_mount.reports.sections.coil_load import CoilLoad, coil_load
@@ -109,7 +109,7 @@ def differences(subjects: Sequence[Subject]) -> Section | None:
     if comparison is None:
         return None
     words = [
-        f'A is {comparison.name_a}, B is {comparison.name_b}; {comparison.alignments.sentence}.',
+        f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment_sentence(comparison.alignments)}.',
         *(f'- {sentence}' for sentence in comparison.sentences()),
     ]
     ordered = by_importance(comparison.signals)

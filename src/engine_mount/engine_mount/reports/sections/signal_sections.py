@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from engine_mount.recordings.compare.quantity_text import quantity_text
+from engine_mount.recordings.difference import quantity_text
 from engine_mount.reports.drawing.chart import Array
 from engine_mount.reports.sections import charts, periodic
 from engine_mount.reports.sections.charts import Levels, Named

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from engine_mount.recordings.audit.audit import TopicAudit, audit
-from engine_mount.recordings.audit.losses import Losses, losses
-from engine_mount.recordings.compare.compare import Comparison
+from engine_mount.recordings.audit import TopicAudit, audit
+from engine_mount.recordings.compare import Comparison
+from engine_mount.recordings.losses import Losses, losses
 from engine_mount.reports.drawing.chart import Array
 from engine_mount.reports.sections.charts import Levels
 from engine_mount.reports.sections.periodic import Sine, dominant_sine

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine_mount.recordings.compare.quantity_text import quantity_text, time_text
+from engine_mount.recordings.difference import quantity_text, time_text
 from engine_mount.reports.drawing.chart import Array
 from engine_mount.reports.sections.section import BAD, GOOD, LOOK, UNKNOWN, Cell, Finding, Link
 from engine_mount.reports.sections.subject import Subject

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag.recording import ReadingError, open_recording
-from engine_mount.recordings.messages.series import Series, SeriesError
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.recordings.recording import ReadingError, open_recording
+from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
+from engine_mount.signals.signal import SignalError
 
 _SECOND = 1_000_000_000  # ns
 _STAMP = 'header.stamp.'

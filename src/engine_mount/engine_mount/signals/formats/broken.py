@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError
 
 _LONGEST = 200  # letters of a library's own words, chosen
 

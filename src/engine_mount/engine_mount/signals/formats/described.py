@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.run.screen import Table
+from engine_mount.recordings.screen import Table
 from engine_mount.signals.formats.measured import FloatArray, Measured, MeasuredColumn
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.extras import required
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.headers import in_unit_row, is_unit, name_and_unit
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
+from engine_mount.signals.signal import SignalError
 
 _SECOND = 1_000_000_000  # ns
 _MISSING = ('', '#N/A', '#NV', '-', 'NaN', 'nan')

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.extras import required
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.can.frames import DecodedFrames
 from engine_mount.signals.formats.can.in_mdf import FRAME, OTHER_FRAMES, frames_in_mdf
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
+from engine_mount.signals.signal import SignalError
 
 _SECOND = 1_000_000_000  # ns
 _FRAGMENT = 1 << 22  # B read at once, chosen: an hour at 1 kHz is read within 0.3 GB, and not slower

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError
 
 FloatArray = NDArray[np.float64]
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.loading import is_recording
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Content, Stated
 from engine_mount.signals.formats.measured import (
     Heading,
@@ -18,6 +16,8 @@ from engine_mount.signals.formats.measured import (
     TimeBase,
     found,
 )
+from engine_mount.signals.loading import is_recording
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.stores import local_copy
 
 Opener = Callable[[Path, Stated], Content]

@@ -4,10 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from engine_mount.recordings.signals.even_grid import evenly_spaced
-from engine_mount.recordings.signals.plausibility import check_size
-from engine_mount.recordings.signals.resampling import has_step, resampled
-from engine_mount.recordings.signals.signal import SECOND, FloatArray, Signal, SignalError
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 from engine_mount.signals.importing.one_grid import (
     CHASSIS,
@@ -20,6 +17,9 @@ from engine_mount.signals.importing.one_grid import (
 from engine_mount.signals.importing.pieces import LONGEST_GAP
 from engine_mount.signals.importing.topics import recorded_as
 from engine_mount.signals.importing.writing import Channel, Times
+from engine_mount.signals.plausibility import check_size
+from engine_mount.signals.resampling import has_step, resampled
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError
 from engine_mount.signals.units.quantities import Quantity, quantity
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.signals.signal import SECOND, Signal
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.channels import channels_of
 from engine_mount.signals.importing.joined import joined
@@ -14,6 +13,7 @@ from engine_mount.signals.importing.pieces import Piece, pieces, within
 from engine_mount.signals.importing.provenance import SCENARIO, told_mapping
 from engine_mount.signals.importing.reading import Read, read_files
 from engine_mount.signals.importing.writing import Channel, write_channels
+from engine_mount.signals.signal import SECOND, Signal
 from engine_mount.signals.units.mapping import Mapping
 from mount_recorder.session import new_session
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SECOND, Signal, SignalError
+from engine_mount.signals.signal import SECOND, Signal, SignalError
 
 Signals = dict[str, Signal]
 DATED = 500_000_000 * SECOND

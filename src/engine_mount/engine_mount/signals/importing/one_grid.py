@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.signals.even_grid import EvenSignal
-from engine_mount.recordings.signals.resampling import has_step, resampled
-from engine_mount.recordings.signals.signal import SECOND, FloatArray, SignalError
+from engine_mount.signals.even_grid import EvenSignal
+from engine_mount.signals.resampling import has_step, resampled
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError
 from mount_models.sampling import sample_time_ns
 
 DISPLACEMENT = 'displacement'

@@ -6,15 +6,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from engine_mount.recordings.signals.even_grid import gaps
-from engine_mount.recordings.signals.signal import SECOND, Signal, SignalError
+from engine_mount.signals.even_grid import gaps
 from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE, SHORTEST
+from engine_mount.signals.signal import SECOND, Signal, SignalError
 
 LONGEST_GAP = 0.125
 """s: one period of the 8 Hz at which an engine moves on its mounts cannot be interpolated."""
 DRIVING = (DISPLACEMENT, ENGINE, CHASSIS, 'acceleration')
 """Quantities that controller or simulated car follow: a longer gap in one parts the recording."""
-_FEWEST = 10  # samples of a signal, as `engine_mount.recordings.signals.signal` needs
+_FEWEST = 10  # samples of a signal, as `engine_mount.signals.signal` needs
 Span = tuple[int, int]  # begin and end, ns
 
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from engine_mount.recordings.signals.signal import Signal, SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.importing.provenance import Told, told_columns, told_source
+from engine_mount.signals.signal import Signal, SignalError
 from engine_mount.signals.units.columns import heading_of, is_time, place, read_chosen, stated_with
 from engine_mount.signals.units.mapping import MEAN, ColumnChoice, Mapping, MappingError
 from engine_mount.signals.units.quantities import Quantity, names, quantity, titled

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.bag.told_units import units_text
-from engine_mount.recordings.signals.signal import FloatArray
+from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.importing.topics import PREFIX, RecordedAs
+from engine_mount.signals.signal import FloatArray
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_message, session_text

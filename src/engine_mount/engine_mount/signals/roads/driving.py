@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.even_grid import EvenSignal
-from engine_mount.recordings.signals.resampling import resampled
+from engine_mount.signals.even_grid import EvenSignal
 from engine_mount.signals.importing.provenance import told_provenance
+from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.iso8608 import unevenness
 from engine_mount.signals.roads.long_waves import LONGEST_WAVE, without_long_waves
 from engine_mount.signals.roads.profile import FloatArray, ProfileError, RoadProfile

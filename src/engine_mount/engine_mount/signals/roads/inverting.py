@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.even_grid import EvenSignal, evenly_spaced
-from engine_mount.recordings.signals.resampling import resampled
-from engine_mount.recordings.signals.signal import Signal
+from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE, acceleration_at
+from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.driving import BAND, STEP_TIME
 from engine_mount.signals.roads.inversion import Kept, kept, road_of
 from engine_mount.signals.roads.profile import FloatArray, ProfileError
 from engine_mount.signals.roads.speed import Speed
 from engine_mount.signals.roads.table import EFFECTIVE
+from engine_mount.signals.signal import Signal
 from mount_sim.excitation.scenario import STEP_TIME as PLANT_STEP
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.run.amounts import size_in_bytes
+from engine_mount.settings.amounts import size_in_bytes
 from engine_mount.signals.sources.source import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'
@@ -48,7 +48,7 @@ def default_folder() -> Path:
 
 
 def default_limit() -> int:
-    """Return how many bytes all copies may have; raises `SplitError` where the variable holds no size."""
+    """Return how many bytes all copies may have; raises `ParameterError` where the variable holds no size."""
     return size_in_bytes(os.environ.get(LIMIT_VARIABLE) or LIMIT)
 
 

@@ -7,8 +7,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
-from engine_mount.recordings.container.mcap_reading.chunks import gaps
-from engine_mount.recordings.container.mcap_reading.summary import Proof, Summary, read_summary
+from engine_mount.recordings.mcap_records import Summary, gaps, read_summary
 from engine_mount.signals.sources.fetching import write_whole
 from engine_mount.signals.sources.looking import Found
 from engine_mount.signals.sources.patience import Patience, persistent
@@ -97,7 +96,7 @@ class _Outline:
                     return False
                 self._take(file.fileno(), begin, tail)
                 summary = read_summary(data)
-            if summary.proof is not Proof.SOUND or summary.statistics is None:
+            if not summary.sound or summary.statistics is None:
                 return False
             if summary.statistics.chunk_count != len(summary.chunks) or not summary.chunks:
                 return False  # its messages would be looked for in the whole file

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, found, listed
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.mapping import Mapping, TimeChoice
 from engine_mount.signals.units.unit import UnitError, unit_of
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import FloatArray
+from engine_mount.signals.signal import FloatArray
 from engine_mount.signals.units.quantities import Quantity
 from engine_mount.signals.units.unit import STANDARD_GRAVITY, Unit, unit_of, units_of
 from mount_models.arithmetic.averages import mean

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SECOND, Signal, check_count
 from engine_mount.signals.formats.measured import FloatArray, Measured, MeasuredColumn
+from engine_mount.signals.signal import SECOND, Signal, check_count
 from engine_mount.signals.units.column_unit import unit_of_column
 from engine_mount.signals.units.columns import column_of, place
 from engine_mount.signals.units.mapping import MEAN, ColumnChoice, Mapping, MappingError

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SECOND, FloatArray
 from engine_mount.signals.formats.measured import Measured, MeasuredColumn, TimeBase
+from engine_mount.signals.signal import SECOND, FloatArray
 from engine_mount.signals.units.columns import column_of, group, is_time, known, place
 from engine_mount.signals.units.mapping import MappingError, TimeChoice
 from engine_mount.signals.units.unit import Unit, UnitError, si_unit, unit_of

@@ -9,7 +9,7 @@ not `ms`), but that of words of three letters or more is not (`Sec`). Factors ar
 import difflib
 from dataclasses import dataclass
 
-from engine_mount.recordings.signals.signal import FloatArray
+from engine_mount.signals.signal import FloatArray
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2, exact by definition (3rd CGPM, 1901)."""

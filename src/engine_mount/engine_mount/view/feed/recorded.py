@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.drives.live.playback import Playback
-from engine_mount.recordings.run.place import open_run
+from engine_mount.recordings.place import open_run
 from engine_mount.view.feed.feed import Fail, FeedError, Message, Receive
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 

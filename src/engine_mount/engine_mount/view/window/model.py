@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.recordings.messages.layout import LayoutError
+from engine_mount.recordings.layout import LayoutError
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import policy_of
 from engine_mount.view.beside.alternatives import Beside
@@ -24,7 +24,8 @@ from engine_mount.view.window.traces import (
     extents,
 )
 from mount_models.quantity import ParameterError
-from mount_ros.messages.force_table import ForceTable, ForceTableMessageError, from_message
+from mount_ros.messages.force_table import ForceTable, from_message
+from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import CURRENT_FORCE_TABLE, DISPLACEMENT, SIM_CHASSIS_ACCELERATION
 
 WINDOW = 60.0  # s: kept for who comes later
@@ -162,7 +163,7 @@ class Model:
 
         try:
             self._table = from_message(deserialize_message(message.raw, Float64MultiArray))
-        except ForceTableMessageError:
+        except MessageError:
             self._table = None
 
     def _beside_extents(self, columns) -> dict[str, Extent]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.container.stored import HEAD
-from engine_mount.recordings.messages.series import Payloads, Series, SeriesError, heads_of
+from engine_mount.recordings.series import Payloads, Series, SeriesError
+from engine_mount.recordings.stored import HEAD
 from engine_mount.view.feed.feed import Message
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
@@ -70,7 +70,7 @@ def _series(topic: Topic, messages: list[Message]) -> Series:
     heads = np.zeros(len(messages), HEAD)
     heads['log_time'] = [message.received for message in messages]
     heads['publish_time'] = [message.sent for message in messages]
-    return Series(topic.name, topic.type, Payloads([piece]), heads_of(heads))
+    return Series(topic.name, topic.type, (Payloads([piece]), heads))
 
 
 def _column(columns: Mapping[Topic, Series], trace: Trace) -> NDArray[np.float64]:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from engine_mount.recordings.signals.signal import signal_of
 from engine_mount.signals.roads.inversion import BAND, chassis_response, in_band, road_of
 from engine_mount.signals.roads.inverting import inverted
 from engine_mount.signals.roads.profile import ProfileError
 from engine_mount.signals.roads.speed import Speed, speed_of
+from engine_mount.signals.signal import signal_of
 from mount_sim.excitation.road import RandomRoad, random_road
 from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction

@@ -63,7 +63,7 @@ def query(
 def print_rows(answer: 'pyarrow.Table', console: Console) -> None:
     """Print rows as a table where it fits the terminal, else one below another."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.run.screen import Table
+    from engine_mount.recordings.screen import Table
 
     names = answer.column_names
     rows = [[_text(value) for value in row.values()] for row in answer.to_pylist()]

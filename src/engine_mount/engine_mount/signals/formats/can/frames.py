@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
+from engine_mount.signals.signal import SignalError
 
 EXTENDED = 0x80000000
 """Set in the keys of extended identifiers."""

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.can.frames import EXTENDED, DecodedFrames
+from engine_mount.signals.signal import SignalError
 
 FRAME = 'CAN_DataFrame'
 """The channel that holds frames, a record of what `_MEMBERS` name and others."""

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.can.frames import EXTENDED, DecodedFrames
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn
+from engine_mount.signals.signal import SignalError
 
 
 class CanLog:

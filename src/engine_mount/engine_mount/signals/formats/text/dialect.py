@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.headers import in_unit_row, is_unit, name_and_unit
 from engine_mount.signals.formats.measured import Heading, unique
 from engine_mount.signals.formats.text.cells import ALONE, BLANK, COMMENTS, Decimal, Kind, is_comment, kind_of
 from engine_mount.signals.formats.text.lines import Encoding, encoding_of, sample
 from engine_mount.signals.formats.text.splitting import Split, split_of
+from engine_mount.signals.signal import SignalError
 
 _GAPS = re.compile(r'\t+|\s{2,}')
 

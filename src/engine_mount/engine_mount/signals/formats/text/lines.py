@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError
 
 HEAD = 1 << 18
 """B at the beginning of a file by which its dialect is found, chosen: some thousand lines."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.text.cells import (
     BLANK,
     MISSING,
@@ -20,6 +19,7 @@ from engine_mount.signals.formats.text.cells import (
 )
 from engine_mount.signals.formats.text.dialect import Dialect
 from engine_mount.signals.formats.text.lines import blocks
+from engine_mount.signals.signal import SignalError
 
 Values = NDArray[Any]
 _NOT_SAMPLES = re.compile(rb'^[ \t]*(?:(?:#|%|//)[^\n]*)?$', re.MULTILINE)

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.text.cells import ALONE, BLANK, Decimal, Kind, cells_of, is_comment, kind_of
+from engine_mount.signals.signal import SignalError
 
 _DELIMITERS = (';', '\t', ',', '|', BLANK, ALONE)
 _NAMES = {

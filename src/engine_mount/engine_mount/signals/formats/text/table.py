@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase
 from engine_mount.signals.formats.text.dialect import dialect_of
 from engine_mount.signals.formats.text.parsing import columns_of
+from engine_mount.signals.signal import SignalError
 
 _SECOND = 1_000_000_000  # ns
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.trees.layouts import leaves_in
 from engine_mount.signals.formats.trees.leaves import Leaf, Leaves, leaves_of, with_dates
+from engine_mount.signals.signal import SignalError
 
 _PAIRS = (('value', 't'), ('values', 'times'), ('value.npy', 't.npy'))
 """Names of files that belong together in a folder, which is then the name of the signal."""

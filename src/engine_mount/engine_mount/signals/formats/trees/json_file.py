@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.text.cells import date_in
 from engine_mount.signals.formats.trees.layouts import leaves_in
 from engine_mount.signals.formats.trees.leaves import Leaves, with_dates
+from engine_mount.signals.signal import SignalError
 
 _LONGEST_VECTOR = 64  # numbers of one sample, chosen: a covariance has 36
 

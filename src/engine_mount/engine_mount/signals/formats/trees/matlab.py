@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.signals.signal import SignalError
 from engine_mount.signals.formats.broken import reading
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.trees.layouts import leaves_in
 from engine_mount.signals.formats.trees.leaves import Leaf, Leaves
+from engine_mount.signals.signal import SignalError
 
 _OBJECTS = (
     'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their '

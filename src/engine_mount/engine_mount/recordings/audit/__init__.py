@@ -1,1 +1,0 @@
-"""Whether anything was lost, unanswered or wrong."""

@@ -1,1 +1,0 @@
-"""A rosbag2 bag as a folder of files with metadata: written, and opened as a `Recording`."""

@@ -1,1 +1,0 @@
-"""Two recordings, sample by sample, in numbers and words; references."""

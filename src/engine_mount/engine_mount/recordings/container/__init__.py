@@ -1,1 +1,0 @@
-"""Bytes of MCAP and SQLite files: chunks, indexes, compression."""

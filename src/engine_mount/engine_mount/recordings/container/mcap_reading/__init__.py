@@ -1,1 +1,0 @@
-"""Reads MCAP files, damaged ones included."""

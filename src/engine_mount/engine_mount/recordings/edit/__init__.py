@@ -1,1 +1,0 @@
-"""A recording made of others: cut, merged, recovered."""

@@ -1,1 +1,0 @@
-"""Marks and switchings: what in a recording is worth finding again."""

@@ -1,0 +1,164 @@
+"""Several recordings of one drive, such as its cuts, as one."""
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from engine_mount.recordings.bag_copy import BagCopy, Messages, joined, read_messages
+from engine_mount.recordings.metadata import TopicInformation, with_step
+from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.session import session_differences
+from mount_recorder.session import time_text
+from mount_recorder.topic_groups import registered_topic
+from mount_ros.topics import SESSION, Delivery
+
+_HOLE = 0.1  # s, chosen: a longer silence between two parts is told
+_TOLD = 4  # differences of sessions in a refusal
+
+
+class MergeError(ValueError):
+    """Recordings do not fit together; the text says where and what to do."""
+
+
+@dataclass(frozen=True)
+class Merge:
+    """What was merged: messages written, and those that stood in more than one part."""
+
+    folder: Path
+    messages: int
+    repeated: int
+    holes: tuple[str, ...]  # times of which no part tells, in sentences
+    losses: tuple[str, ...]  # what of the parts could not be read, in sentences
+
+
+def merge(
+    recordings: Sequence[Recording], out: str | os.PathLike[str], *, different_sessions: bool = False
+) -> Merge:
+    """Write all messages of `recordings` by log time to the new recording `out`, each message once.
+
+    A message is the same where topic, times and bytes are; one that a recording itself has twice stays
+    there twice. Attachments and metadata come with them, each once, and what their recorders lost adds up.
+    Raises `MergeError` where a topic has two types, and where the sessions differ unless
+    `different_sessions`.
+    """
+    if not recordings:
+        raise MergeError('nothing to merge; name the recordings')
+    topics = _topics(recordings)
+    if not different_sessions:
+        _refuse_different_sessions(recordings)
+    parts, losses, repeated = [], [], 0
+    read: list[dict[str, int]] = [{} for _ in recordings]
+    for topic in topics.values():
+        found = []
+        for recording, counts in zip(recordings, read, strict=True):
+            if topic.name in recording.topics:
+                messages, damages = read_messages(recording, topic.name)
+                counts[topic.name] = len(messages)
+                found.append(messages)
+                losses += damages
+        parts.append(_united(topic, found))
+        repeated += sum(map(len, found)) - len(parts[-1])
+    step = {
+        'did': 'merge',
+        'recordings': [recording.short_name for recording in recordings],
+        'made': time_text(),
+    }
+    with BagCopy(out) as bag:
+        bag.add(parts)
+        bag.complete(recordings, read, with_step([recording.information for recording in recordings], step))
+    losses += [f'{name} is lost by damage' for recording in recordings for name in recording.lost_beside]
+    return Merge(Path(out), bag.added, repeated, tuple(_holes(recordings)), tuple(losses))
+
+
+def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
+    topics: dict[str, TopicInformation] = {}
+    for recording in recordings:
+        for name, topic in recording.topics.items():
+            known = topics.setdefault(name, topic)
+            if known.type != topic.type:
+                raise MergeError(
+                    f'{name} is {known.type} in one recording and {topic.type} in {recording.path}; '
+                    'they are no parts of one drive'
+                )
+            if known.type_hash and topic.type_hash and known.type_hash != topic.type_hash:
+                raise MergeError(f'{name}: {known.type} has another definition in {recording.path}')
+            if topic.offered_qos and not known.offered_qos:
+                topics[name] = replace(known, offered_qos=topic.offered_qos)
+    return topics
+
+
+def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
+    first, *others = recordings
+    known = _sessions(first)
+    for other in others:
+        sessions = _sessions(other)
+        if known.keys() & sessions.keys() or not (known or sessions):
+            continue
+        why = f'{(other if known else first).path} has no session that says what it is'
+        if known and sessions:
+            what = session_differences(next(iter(known.values())), next(iter(sessions.values())))
+            why = ': '.join(['their sessions differ', *(['; '.join(what[:_TOLD])] if what else [])])
+        raise MergeError(
+            f'{first.path} and {other.path} may be different drives: {why}; '
+            'merge them with --different-sessions'
+        )
+
+
+def _sessions(recording: Recording) -> dict[bytes, str]:
+    """Return {message: text} of all session messages in a recording."""
+    names = [name for name in recording if registered_topic(name, recording.topics[name].type) is SESSION]
+    return {
+        recording[name].payloads[place]: recording[name].message(place).data
+        for name in names
+        for place in range(len(recording[name]))
+    }
+
+
+def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
+    """Return the messages of all parts without those that an earlier part has as well.
+
+    Each part may repeat what the others have as often as the one that has it most often.
+    """
+    times, counts = np.unique(
+        np.concatenate([np.unique(part.log_times) for part in parts]), return_counts=True
+    )
+    most, kept = Counter[tuple[int, int, bytes]](), []
+    for part in parts:
+        own = Counter[tuple[int, int, bytes]]()
+        is_new = np.ones(len(part), bool)
+        for place in np.flatnonzero(np.isin(part.log_times, times[counts > 1])).tolist():
+            key = int(part.log_times[place]), int(part.publish_times[place]), part.payloads[place]
+            own[key] += 1
+            is_new[place] = own[key] > most[key]
+        most |= own
+        kept.append(part.chosen(np.flatnonzero(is_new)))
+    return joined(topic, kept)
+
+
+def _holes(recordings: Sequence[Recording]) -> list[str]:
+    """Return a sentence for each time span between the parts of which no part tells."""
+    spans = sorted(span for span in map(_streamed, recordings) if span is not None)
+    latest = np.maximum.accumulate([last for _, last in spans])
+    gaps = [(first - before) / 1e9 for (first, _), before in zip(spans[1:], latest, strict=False)]
+    return [f'between two parts {gap:.3f} s are missing' for gap in gaps if gap > _HOLE]
+
+
+def _streamed(recording: Recording) -> tuple[int, int] | None:
+    """Return first and last log time (ns) of the topic with most messages; latched ones came earlier."""
+    streams = [
+        topic
+        for topic in recording.topics.values()
+        if topic.message_count
+        and (
+            (known := registered_topic(topic.name, topic.type)) is None
+            or known.delivery is not Delivery.LATCHED
+        )
+    ]
+    if not streams:
+        return None
+    times = recording[max(streams, key=lambda topic: topic.message_count).name].receive_times
+    return int(times.min()), int(times.max())

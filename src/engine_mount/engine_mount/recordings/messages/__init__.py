@@ -1,1 +1,0 @@
-"""Serialised messages as columns of numbers, with their times."""

@@ -1,1 +1,0 @@
-"""A run: its folder, its session, what it was made with."""

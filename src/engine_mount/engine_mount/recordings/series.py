@@ -1,0 +1,327 @@
+"""All messages of one topic as columns of numbers."""
+
+import functools
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.recordings.definitions import Definition, installed_definition
+from engine_mount.recordings.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
+from engine_mount.recordings.times import NO_TIMES, Times
+from mount_recorder.topic_groups import registered_topic
+from mount_ros.topics import JOINT_STATE, Scalar, Topic
+
+Column = NDArray[np.float64]
+
+_SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
+STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
+"""Where the stamp stands in a message: paths, and places in their runs of numbers."""
+STAMP_BYTES = 8
+STAMP_END = HEAD + STAMP_BYTES
+_LITTLE_ENDIAN = (0, 1)  # the first bytes of a message: plain CDR
+_OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
+
+
+class SeriesError(ValueError):
+    """The messages of a topic have no such column or message; the text has those that are there."""
+
+
+class Payloads:
+    """Serialised messages: one block of rows where all have the same length, else one by one."""
+
+    def __init__(self, pieces: Sequence[NDArray[np.uint8] | list[bytes]]):
+        """Take them in pieces, each an array (messages x bytes) or a list."""
+        widths = {piece.shape[1] if isinstance(piece, np.ndarray) else -1 for piece in pieces}
+        self.rows: NDArray[np.uint8] | None = None
+        if len(widths) == 1 and -1 not in widths:
+            self.rows = np.concatenate(pieces)
+        self.messages: Any = self.rows
+        if self.rows is None:
+            self.messages = [bytes(message) for piece in pieces for message in piece]
+
+    def __len__(self) -> int:
+        return len(self.messages)
+
+    def __getitem__(self, index: int) -> bytes:
+        return bytes(self.messages[index])
+
+    def chosen(self, places: NDArray[np.int64]) -> 'Payloads':
+        """Return the messages at `places`."""
+        found = [self[place] for place in places.tolist()] if self.rows is None else self.rows[places]
+        return Payloads([found])
+
+
+class Series:
+    """The messages of one topic in the order in which they were recorded.
+
+    `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
+    the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
+    `series[name]` is a column: of a `JointState` the position of
+    that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
+    `time` is that of all columns, to plot.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        type_name: str,
+        messages: tuple[Payloads, np.ndarray] | Callable[[], tuple[Payloads, np.ndarray]],
+        *,
+        definition: Definition | None = None,
+        obstacle: str = '',
+        zero: int = 0,
+        units: Mapping[str, str] | None = None,
+    ):
+        """Take bytes and heads (dtype `HEAD`) of the messages, or a function that reads them when needed.
+
+        `definition` is that of the type, or `obstacle` the reason why there is none; without both the
+        installed type counts. `zero` (ns) is where `time` begins; `units` are those that the recording has
+        for fields that no registry knows.
+        """
+        self.topic = topic
+        self.type = type_name
+        self.columns: dict[str, Column] = {}
+        self.registered: Topic | None = registered_topic(topic, type_name)
+        self._source = messages
+        self._known_definition, self._obstacle = definition, obstacle
+        self._zero, self._units = zero, units or {}
+
+    def __len__(self) -> int:
+        return len(self.receive_times)
+
+    def add_columns(self, columns: Mapping[str, Column], received: Times, stamps: Times | None) -> None:
+        """Take columns and times (ns) of all messages, which then need not be read for them."""
+        self.columns |= columns
+        self.receive_times = received
+        if stamps is not None:
+            self.stamps = stamps
+
+    @functools.cached_property
+    def receive_times(self) -> Times:
+        """When the messages came in, ns."""
+        return np.ascontiguousarray(self._messages[1]['log_time'])
+
+    @property
+    def publish_times(self) -> Times:
+        """When the messages were sent, ns."""
+        return np.ascontiguousarray(self._messages[1]['publish_time'])
+
+    @property
+    def sequences(self) -> NDArray[np.uint32]:
+        """The numbers that the publisher gave the messages."""
+        return np.ascontiguousarray(self._messages[1]['sequence'])
+
+    @property
+    def payloads(self) -> Payloads:
+        """The serialised messages."""
+        return self._messages[0]
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the messages are in memory, not only `columns` of them."""
+        return isinstance(self._source, tuple)
+
+    @property
+    def _messages(self) -> tuple[Payloads, np.ndarray]:
+        if not isinstance(self._source, tuple):
+            self._source = self._source()
+        return self._source
+
+    @functools.cached_property
+    def stamps(self) -> Times:
+        """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
+        found, rows = [NO_TIMES], self.payloads.rows
+        if rows is not None and rows.shape[1] >= STAMP_END and self._definition.has_stamp:
+            beginnings = np.ascontiguousarray(rows[:, :STAMP_END])
+            if (beginnings[:, :2] == _LITTLE_ENDIAN).all():
+                times = beginnings.view('V4,<i4,<u4')[:, 0]
+                return np.asarray(times['f1'].astype(np.int64) * 1_000_000_000 + times['f2'])
+        for layout, rows in self._layouts:
+            if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
+                raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+            seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
+            found.append(seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows))
+        return np.concatenate(found)
+
+    @functools.cached_property
+    def stamp_place(self) -> int | None:
+        """Where the 8 bytes of the stamp begin, None where there is no stamp or its place varies."""
+        if self.layout is not None:
+            seconds = self.layout.numbers.get(_SECONDS)
+            return None if seconds is None else seconds.offset
+        try:
+            return HEAD if self._definition.has_stamp else None
+        except SeriesError:
+            return None
+
+    @functools.cached_property
+    def time(self) -> Column:
+        """Time in s from the beginning of the recording: of the samples, or of reception without stamps.
+
+        Stamps of another clock, as in lock-step, count from that clock's own zero.
+        """
+        try:
+            times = self.stamps
+        except SeriesError:
+            times = self.receive_times
+        if times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK:
+            return np.asarray(times * 1e-9, np.float64)
+        return np.asarray((times - self._zero) * 1e-9, np.float64)
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        if not len(self):
+            return self.registered.names if self.registered else ()
+        if self.type != JOINT_STATE:
+            if self.layout is None:
+                raise SeriesError(f'{self.topic}: messages of different shape have no columns; use message()')
+            return tuple(path for path, numbers in self.layout.numbers.items() if numbers.count == 1)
+        self._check_part('name')
+        return tuple(dict.fromkeys(name for layout, _ in self._layouts for name in _names_in(layout)))
+
+    def __getitem__(self, name: str) -> Column:
+        """Return the column `name` in the unit `unit(name)`; raises `SeriesError` with the known names."""
+        if name in self.columns:
+            return self.columns[name]
+        if self.type == JOINT_STATE:
+            return self._joint_column(name, 'position')
+        return self._path_column(name)
+
+    def derivative(self, name: str) -> Column:
+        """Return the time derivative that the messages carry for `name` (velocity of a `JointState`)."""
+        if self.type != JOINT_STATE:
+            raise SeriesError(f'{self.topic}: only JointState carries derivatives, this is {self.type}')
+        return self._joint_column(name, 'velocity')
+
+    def unit(self, name: str) -> str:
+        """Return the unit of `series[name]`, empty where neither registry nor recording has it."""
+        return self.registered.unit(name) if self.registered else self._units.get(name, '')
+
+    def derivative_unit(self, name: str) -> str:
+        """Return the unit of `series.derivative(name)`, empty where the registry does not know it."""
+        scalars: tuple[Scalar, ...] = self.registered.scalars if self.registered else ()
+        return next((scalar.derivative_unit for scalar in scalars if scalar.name == name), '')
+
+    def message(self, index: int) -> Any:
+        """Return message `index` as an object with its fields as attributes; raises `SeriesError`."""
+        try:
+            return decode(self.payloads[index], self._definition)
+        except LayoutError as error:
+            raise self._no_message(index, error) from None
+
+    def content(self, index: int) -> bytes:
+        """Return the bytes of message `index` without its stamp and without the options of its encoding."""
+        raw, place = self.payloads[index], self.stamp_place
+        if place is None:  # where it varies, it stands in the message's own layout
+            try:
+                seconds = layout_of(raw, self._definition).numbers.get(_SECONDS)
+            except (LayoutError, SeriesError):
+                seconds = None
+            place = seconds.offset if seconds is not None else len(raw)
+        return raw[: OPTIONS.start] + raw[OPTIONS.stop : place] + raw[place + STAMP_BYTES :]
+
+    def messages(self) -> Iterator[Any]:
+        """Yield all messages."""
+        return (self.message(index) for index in range(len(self)))
+
+    @functools.cached_property
+    def layout(self) -> Layout | None:
+        """The common layout of all messages, None where they differ or cannot be read in place."""
+        rows = self.payloads.rows
+        if rows is None or not len(rows):
+            return None
+        try:
+            layout = layout_of(rows[0].tobytes(), self._definition)
+        except LayoutError:
+            return None
+        return layout if layout.fits(rows) else None
+
+    @functools.cached_property
+    def _definition(self) -> Definition:
+        try:
+            if not self._obstacle:
+                return self._known_definition or installed_definition(self.type)
+            obstacle = self._obstacle
+        except ValueError as error:
+            obstacle = str(error)
+        raise SeriesError(f'{self.topic}: only its raw bytes can be read: {obstacle}')
+
+    @functools.cached_property
+    def _layouts(self) -> list[tuple[Layout, NDArray[np.uint8]]]:
+        """The common layout with all messages as rows; where they differ, the layout and row of each."""
+        if self.layout is not None and self.payloads.rows is not None:
+            return [(self.layout, self.payloads.rows)]
+        found = []
+        for place in range(len(self)):
+            raw = self.payloads[place]
+            try:
+                found.append((layout_of(raw, self._definition), np.frombuffer(raw, np.uint8)[None]))
+            except LayoutError as error:
+                raise self._no_message(place, error) from None
+        return found
+
+    def _no_message(self, place: int, error: LayoutError) -> SeriesError:
+        return SeriesError(f'{self.topic}: message {place} is no {self.type} ({error})')
+
+    def _check_part(self, part: str) -> None:
+        if part not in self._definition.types[self._definition.name]:
+            raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
+
+    def _joint_column(self, name: str, part: str) -> Column:
+        if name not in self.names:
+            known = ', '.join(self.names) or 'no messages'
+            raise SeriesError(f'{self.topic} has no {name!r}; it has {known}')
+        if not len(self):
+            return np.empty(0)
+        self._check_part(part)
+        found = []
+        for layout, rows in self._layouts:
+            names, numbers = _names_in(layout), layout.numbers.get(part)
+            if numbers is not None and name in names and numbers.count == len(names):
+                found.append(numbers.column(rows, names.index(name)))
+            else:
+                found.append(np.full(len(rows), math.nan))
+        return np.concatenate(found)
+
+    def _path_column(self, path: str) -> Column:
+        match = re.fullmatch(r'(.*)\[(\d+)\]', path)
+        owner, place = (match[1], int(match[2])) if match else (path, 0)
+        found = [np.empty(0)]
+        for layout, rows in self._layouts:
+            numbers = layout.numbers.get(path) or layout.numbers.get(owner)
+            if numbers is None or place >= numbers.count:
+                if self.layout is None:
+                    raise SeriesError(f'{self.topic}: not every message has a number {path!r}')
+                raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
+            found.append(numbers.column(rows, place).astype(np.float64))
+        return np.concatenate(found)
+
+
+@dataclass(frozen=True)
+class TopicTimes:
+    """Times in ns in the order of the recording; `obstacle` is the reason where `stamps` are None.
+
+    `receive_times` and `publish_times` are None where nobody needs them.
+    """
+
+    topic: str
+    type: str
+    count: int
+    stamps: Times | None
+    receive_times: Times | None
+    publish_times: Times | None
+    names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
+    obstacle: str = ''
+
+    def __len__(self) -> int:
+        return self.count
+
+
+def _names_in(layout: Layout) -> list[str]:
+    return [text for path, text in layout.strings.items() if path.startswith('name[')]

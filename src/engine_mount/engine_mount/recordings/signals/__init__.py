@@ -1,1 +1,0 @@
-"""Signals that others recorded: read from CSV, NPY, MCAP and JSON, evenly spaced, resampled, checked."""
