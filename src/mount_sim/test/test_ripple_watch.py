@@ -181,9 +181,10 @@ def test_some_more_noise_is_warned_of(learnt):
     assert 'scatters by more than 2.5 % (off at 5 %)' in learnt.warning
 
 
-def test_single_wild_readings_are_no_fault(learnt):
+@pytest.mark.parametrize(('every', 'factor'), [(40, 3.0), (3, math.nan)])
+def test_readings_that_are_wild_or_missing_now_and_then_are_no_fault(learnt, every, factor):
     samples = readings(DAMPING)
-    samples[1][::40] *= 3.0
+    samples[1][::every] *= factor
     assert fed(learnt, samples) is None
 
 
