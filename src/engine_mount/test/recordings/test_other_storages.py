@@ -4,10 +4,10 @@ import gc
 import os
 import shutil
 import sqlite3
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from mcap.records import Statistics
 from recorded_drive import PERIOD, START, joint_state, sample, write_drive
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -18,7 +18,7 @@ from engine_mount.recordings.cut import cut
 from engine_mount.recordings.merge import merge
 from engine_mount.recordings.recover import recover
 from engine_mount.recordings.series import SeriesError
-from mount_recorder.mcap_writer import McapWriter
+from mount_recorder import mcap_writer
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101
@@ -157,10 +157,8 @@ def test_copies_of_compressed_messages_are_plain_and_say_so(tmp_path, storage, c
 
 def test_times_are_those_of_the_chunks_where_the_statistics_tell_of_others(tmp_path, monkeypatch):
     honest = engine_mount.open(write_drive(tmp_path / 'honest', 50))
-    true = McapWriter._statistics
-    monkeypatch.setattr(
-        McapWriter, '_statistics', lambda self: replace(true(self), message_start_time=START - 3600 * 10**9)
-    )
+    false = {'message_start_time': START - 3600 * 10**9}
+    monkeypatch.setattr(mcap_writer, 'Statistics', lambda **true: Statistics(**{**true, **false}))
     lying = engine_mount.open(write_drive(tmp_path / 'lying', 50))
     assert honest.warnings == []
     assert lying.proven
