@@ -9,12 +9,12 @@ import pickle
 import signal
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -29,7 +29,6 @@ LOSSES = 3
 
 _LOST = f'{LOSSES} workers were lost with it: killed, or out of memory'
 _POLL = 0.1  # s, chosen: between two looks at an interrupt; a result ends the wait at once
-_AHEAD = 4  # tasks per worker that are handed over at a time, chosen
 _NICENESS = 10  # chosen: the user of the machine comes first
 _MEMORY_CHECK = 0.1  # s, chosen
 _PR_SET_PDEATHSIG = 1  # Linux, linux/prctl.h
@@ -74,8 +73,8 @@ def run_tasks(
 
     `scheduler` is `local` (`workers` processes of this machine, 0 for one on each core; each ends beyond
     `memory` bytes, 0 for its share of the machine's) or the address of a Dask cluster, tcp://HOST:PORT. One
-    that raises is a `Done` with its reason. A task whose worker is lost is run again, at the end and alone,
-    and given up after `LOSSES` workers. Raises `SchedulerLostError` where the cluster does not answer, and
+    that raises is a `Done` with its reason. A task whose worker is lost is run again, at the end, and given
+    up after `LOSSES` workers. Raises `SchedulerLostError` where the cluster does not answer, and
     `ChildProcessError` where no process can start.
     """
     if not items:
@@ -92,100 +91,93 @@ def processes_for(workers: int, tasks: int) -> int:
     return min(workers or len(os.sched_getaffinity(0)), tasks)
 
 
+class _Worker:
+    """A process with a pipe of its own: killed while it sends a result, it holds up no other one."""
+
+    def __init__(self, memory: int):
+        context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
+        self.pipe, theirs = context.Pipe()
+        self.place: int | None = None
+        """Which task it does."""
+        self.is_ready = False
+        self._process = context.Process(target=_serve, args=(theirs, os.getpid(), memory), daemon=True)
+        with _environment_of_workers():
+            self._process.start()
+        theirs.close()
+
+    def begin(self, place: int, task: bytes) -> None:
+        """Hand over a task; a worker that is lost by then is noticed by its pipe."""
+        self.place = place
+        with contextlib.suppress(OSError):
+            self.pipe.send_bytes(task)
+
+    def end(self) -> None:
+        """Kill the process."""
+        self._process.kill()
+        self._process.join()
+        self.pipe.close()
+
+
 def _run_here(
     work: Callable[[Item], Result],
     items: Sequence[Item],
-    workers: int,
+    threads: int,
     memory: int,
     raise_lost: Callable[[], None],
 ) -> Iterator[Done[Result]]:
-    waiting = deque(range(len(items)))
-    suspects: list[int] = []  # under way when a worker was lost
-    while waiting:
-        under_way: dict[Future[Any], int] = {}
-        done = 0
-        with _pool(workers, memory) as submit, contextlib.suppress(BrokenProcessPool):
-            while waiting or under_way:
-                while waiting and len(under_way) < _AHEAD * workers:
-                    future = submit(work, items[waiting[0]])
-                    under_way[future] = waiting.popleft()
-                for future in wait(under_way, _POLL, FIRST_COMPLETED).done:
-                    result = _done(under_way[future], future)
-                    del under_way[future]
-                    done += 1
-                    yield result
-                raise_lost()
-        if under_way and not done:
-            _check_start(memory)
-        suspects += under_way.values()
-    for place in sorted(
-        suspects
-    ):  # alone, so that no task is blamed for the worker that another one took along
-        yield _done_alone(work, items, place, memory, raise_lost)
-
-
-def _done_alone(
-    work: Callable[[Item], Result],
-    items: Sequence[Item],
-    place: int,
-    memory: int,
-    raise_lost: Callable[[], None],
-) -> Done[Result]:
-    for _ in range(LOSSES - 1):
-        with _pool(1, memory) as submit, contextlib.suppress(BrokenProcessPool):
-            future = submit(work, items[place])
-            while not wait([future], _POLL).done:
-                raise_lost()
-            return _done(place, future)
-    return Done(place, None, _LOST)
-
-
-def _check_start(memory: int) -> None:
-    """Raise `ChildProcessError` where a worker cannot even do nothing."""
-    with _pool(1, memory) as submit:
-        try:
-            submit(abs, 0).result()
-        except BrokenProcessPool:
-            raise ChildProcessError(
-                'no worker process could start: a script that starts workers needs the line '
-                "if __name__ == '__main__'; else check the memory of this machine"
-            ) from None
-
-
-def _done(place: int, future: Any) -> Done[Any]:
-    """Return the outcome of a task; raises `BrokenProcessPool`."""
-    try:
-        result, error = future.result()
-    except (BrokenProcessPool, CancelledError):
-        raise
-    except Exception as raised:  # a worker cannot load its task, or send its result
-        result, error = None, raised
-    return (
-        Done(place, result) if error is None else Done(place, None, f'{type(error).__name__}: {error}', error)
-    )
-
-
-@contextlib.contextmanager
-def _pool(workers: int, memory: int) -> Iterator[Callable[[Callable[[Any], Any], Any], Future[Any]]]:
-    """Give the function that hands a task to `workers` processes over pipes, which end with the block."""
     import cloudpickle  # only where tasks leave this process
 
-    before = set(multiprocessing.active_children())
     limit = memory or _memory_of_machine() // (os.cpu_count() or 1)
-    context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
-    pool = ProcessPoolExecutor(workers, context, _prepare_worker, (os.getpid(), limit))
-
-    def submit(work: Callable[[Any], Any], item: Any) -> Future[Any]:
-        with _environment_of_workers():
-            return pool.submit(_perform, cloudpickle.dumps((work, item)))
-
+    waiting, losses, failed_starts = deque(range(len(items))), Counter[int](), 0
+    workers: list[_Worker] = []
     try:
-        yield submit
+        while waiting or any(worker.place is not None for worker in workers):
+            while waiting and len(workers) < threads:
+                workers.append(_Worker(limit))
+            for worker in workers:
+                if waiting and worker.place is None:
+                    place = waiting.popleft()
+                    worker.begin(place, cloudpickle.dumps((work, items[place])))
+            busy: dict[Any, _Worker] = {worker.pipe: worker for worker in workers if worker.place is not None}
+            for pipe in wait(list(busy), _POLL):
+                worker = busy[pipe]
+                assert worker.place is not None
+                try:
+                    answer = worker.pipe.recv()
+                except (EOFError, OSError):
+                    workers.remove(worker)
+                    worker.end()
+                    failed_starts = 0 if worker.is_ready else failed_starts + 1
+                    _check_starts(failed_starts)
+                    losses[worker.place] += 1
+                    if losses[worker.place] < LOSSES:
+                        waiting.append(worker.place)
+                    else:
+                        yield Done(worker.place, None, _LOST)
+                    continue
+                worker.is_ready = True
+                if answer is not None:
+                    place, worker.place = worker.place, None
+                    yield _done(place, *answer)
+            raise_lost()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for child in set(multiprocessing.active_children()) - before:
-            child.kill()
-            child.join()
+        for worker in workers:
+            worker.end()
+
+
+def _check_starts(failed: int) -> None:
+    """Raise `ChildProcessError` where no worker could begin to work, several times in a row."""
+    if failed >= LOSSES:
+        raise ChildProcessError(
+            f'no worker process could start in {LOSSES} attempts: a script needs the line '
+            "if __name__ == '__main__' where it starts workers; else check the memory of this machine"
+        )
+
+
+def _done(place: int, result: Any, error: BaseException | None) -> Done[Any]:
+    if error is None:
+        return Done(place, result)
+    return Done(place, None, f'{type(error).__name__}: {error}', error)
 
 
 @contextlib.contextmanager
@@ -217,6 +209,15 @@ def _memory_of_machine() -> int:
     return whole
 
 
+def _serve(pipe: Connection, starter: int, memory: int) -> None:
+    """Do pickled tasks from a pipe, one after the other, until it is closed."""
+    _prepare_worker(starter, memory)
+    pipe.send(None)  # it has begun to work
+    with contextlib.suppress(EOFError):
+        while True:
+            pipe.send_bytes(_perform(pipe.recv_bytes()))
+
+
 def _prepare_worker(starter: int, memory: int) -> None:
     """Tie this process to its starter, lower its priority, and end it beyond `memory` bytes."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -235,17 +236,17 @@ def _limit_memory(memory: int) -> None:
         time.sleep(_MEMORY_CHECK)
 
 
-def _perform(task: bytes) -> tuple[Any, Exception | None]:
-    """Return the result of a pickled task, or its error in a form that other processes can load."""
-    work, item = pickle.loads(task)
+def _perform(task: bytes) -> bytes:
+    """Return result and error of a pickled task, an error in a form that other processes can load."""
     try:
-        return work(item), None
+        work, item = pickle.loads(task)
+        return pickle.dumps((work(item), None))
     except Exception as error:
         try:
             pickle.loads(pickle.dumps(error))
         except Exception:  # an exception of a library may raise anything there
-            return None, RuntimeError(f'{type(error).__name__}: {error}')
-        return None, error
+            error = RuntimeError(f'{type(error).__name__}: {error}')
+        return pickle.dumps((None, error))
 
 
 def _run_on_cluster(
@@ -270,11 +271,10 @@ def _run_on_cluster(
                 for future in arrived:
                     place = places[future.key]
                     try:
-                        done: Done[Result] = _done(place, future)
-                    except CancelledError:
-                        client.nthreads()  # raises where the scheduler was lost
-                        done = Done(place, None, _LOST)
-                    yield Done(place, None, _LOST) if isinstance(done.error, KilledWorker) else done
+                        yield _done(place, *pickle.loads(future.result()))
+                    except (CancelledError, KilledWorker):
+                        client.nthreads()  # raises where it was the scheduler that was lost
+                        yield Done(place, None, _LOST)
                     left -= 1
         except OSError as error:
             raise SchedulerLostError(

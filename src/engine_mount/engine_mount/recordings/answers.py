@@ -1,5 +1,6 @@
 """Which samples the control had to answer, which have no setpoint, how long answers took, the highest one."""
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.columns import ColumnPart, column_parts
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import SeriesError
 from engine_mount.recordings.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.topic_groups import registered_topic
@@ -168,34 +169,23 @@ def on_one_clock(stamps: Times, times: Times) -> bool:
     return not (stamped > 1_000_000_000 and abs(timed / stamped - 1.0) > _SAME_PACE)
 
 
-class PeakCurrent:
-    """The highest setpoint while control was active, found part by part.
+def peak_current(recording: Recording, spans: Mapping[str, Sequence[Span]]) -> float:
+    """Return the highest setpoint (A) while control was active, NaN where none is known.
 
     The ramp of an initialisation does not count. `spans` are those of control by the topic of its setpoints.
     """
-
-    def __init__(self, recording: Recording, spans: Mapping[str, Sequence[Span]]):
-        self._spans = {
-            name: own
-            for name, own in spans.items()
-            if name in recording.topics
-            and registered_topic(name, recording.topics[name].type) is CURRENT_SETPOINT
-        }
-        self.columns: dict[str, tuple[str, ...]] = dict.fromkeys(self._spans, (_CURRENT,))
-        """Which columns of which topics it needs."""
-        self.value = math.nan
-        """In A, NaN where none is known."""
-
-    def add(self, part: ColumnPart) -> None:
-        """Take a part of one of these topics."""
-        inside = part.column(_CURRENT)[spanned(part.stamps, self._spans[part.topic]) >= 0]
-        if np.isfinite(inside).any():
-            self.value = float(np.fmax(self.value, inside[np.isfinite(inside)].max()))
-
-
-def peak_current(recording: Recording, spans: Mapping[str, Sequence[Span]]) -> float:
-    """Return the highest setpoint (A) while control was active, NaN where none is known."""
-    found = PeakCurrent(recording, spans)
-    for part in column_parts(recording, found.columns):
-        found.add(part)
-    return found.value
+    names = [
+        name
+        for name in spans
+        if name in recording.topics
+        and registered_topic(name, recording.topics[name].type) is CURRENT_SETPOINT
+    ]
+    recording.load_columns(dict.fromkeys(names, (_CURRENT,)))
+    highest = math.nan
+    for name in names:
+        series = recording[name]
+        with contextlib.suppress(SeriesError):  # foreign setpoints without a current
+            inside = series[_CURRENT][spanned(series.stamps, spans[name]) >= 0]
+            if np.isfinite(inside).any():
+                highest = float(np.fmax(highest, inside[np.isfinite(inside)].max()))
+    return highest

@@ -1,30 +1,26 @@
-"""What a catalogue tells of the displacement and of the control trace, collected part by part."""
+"""What a catalogue tells of the displacement and of the control trace."""
 
 import numpy as np
 import pytest
 
-from engine_mount.fleet.catalogue.motion import Motion
-from engine_mount.fleet.catalogue.trace import Trace
-from engine_mount.recordings.columns import ColumnPart
+from engine_mount.fleet.catalogue.motion import displacement_figures
+from engine_mount.fleet.catalogue.trace import trace_figures
 
 START = 1_700_000_000_000_000_000
 PERIOD = 1_000_000
 RATE = 1000.0
 
 
-def parts(topic, stamps, columns, size=700):
-    for begin in range(0, len(stamps), size):
-        here = slice(begin, begin + size)
-        yield ColumnPart(
-            topic, stamps[here], stamps[here] + 200_000, {name: each[here] for name, each in columns.items()}
-        )
+class Columns(dict):
+    """Columns of a topic with their stamps, as a `Series` has them."""
+
+    def __init__(self, stamps, columns):
+        super().__init__(columns)
+        self.stamps = stamps
 
 
 def motion_of(stamps, values):
-    motion = Motion()
-    for part in parts('/displacement', stamps, {'mount': values}):
-        motion.add(part)
-    return motion.figures(RATE)
+    return displacement_figures(Columns(stamps, {'mount': values}), RATE)
 
 
 @pytest.fixture
@@ -61,7 +57,7 @@ def test_a_displacement_that_is_never_known_has_no_figures(drive):
     assert motion_of(stamps, np.full(len(values), np.nan)) == {}
 
 
-def test_the_parts_of_the_files_do_not_change_the_figures_of_a_trace(drive):
+def test_the_work_of_the_pads_is_that_of_all_samples(drive):
     stamps, values = drive
     columns = {
         'damping_active': (values > 5.5e-3).astype(float),
@@ -70,14 +66,8 @@ def test_the_parts_of_the_files_do_not_change_the_figures_of_a_trace(drive):
         'normal_force': np.abs(values) * 1e4,
     }
     columns['velocity'][5] = np.nan
-    found = []
-    for size in (1, 700, 20_000):
-        trace = Trace()
-        for part in parts('/control_trace', stamps, columns, size):
-            trace.add(part)
-        found.append(trace.figures(1 / RATE))
-    assert found[0] == found[1] == found[2]
+    found = trace_figures(Columns(stamps, columns), 1 / RATE)
     power = np.abs(0.3 * columns['normal_force'] * columns['velocity'])
-    assert found[0]['pad_energy_j'] == pytest.approx(1e-3 * np.nansum(power), rel=1e-12)
-    assert found[0]['damping_s'] == 1e-3 * np.count_nonzero(columns['damping_active'])
-    assert found[0]['switched_on'] == np.count_nonzero(np.diff(columns['damping_active']) > 0)
+    assert found['pad_energy_j'] == pytest.approx(1e-3 * np.nansum(power), rel=1e-12)
+    assert found['damping_s'] == 1e-3 * np.count_nonzero(columns['damping_active'])
+    assert found['switched_on'] == np.count_nonzero(np.diff(columns['damping_active']) > 0)

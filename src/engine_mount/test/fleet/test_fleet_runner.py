@@ -131,7 +131,7 @@ def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
 
 
 def test_processes_that_cannot_start_end_the_run_with_a_sentence(monkeypatch):
-    monkeypatch.setattr(runner, '_prepare_worker', int)  # it raises
+    monkeypatch.setattr(runner, '_serve', divmod)  # it raises
     with pytest.raises(ChildProcessError, match='no worker process could start'):
         list(run_tasks(abs, range(4), workers=1))
 

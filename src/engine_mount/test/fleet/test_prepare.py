@@ -1,9 +1,12 @@
 """What is compiled ahead is what a fleet's index and replay would compile."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+import ros_testing
 
 _AFTER = """
 import sys
@@ -31,8 +34,9 @@ for place in places([sys.argv[1]]).values():
 
 @pytest.mark.slow
 def test_a_worker_of_a_fleet_finds_everything_compiled_that_it_needs(tmp_path):
+    support = {**os.environ, 'PYTHONPATH': str(Path(ros_testing.__file__).parent)}
     run = subprocess.run(
-        [sys.executable, '-c', _AFTER, str(tmp_path)], capture_output=True, text=True, check=True
+        [sys.executable, '-c', _AFTER, str(tmp_path)], capture_output=True, text=True, check=True, env=support
     )
     outcome = run.stdout.strip().split(' ', 3)
     assert outcome[:2] == ['indexed', 'replayed']

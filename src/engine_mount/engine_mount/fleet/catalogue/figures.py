@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.fleet.catalogue.motion import Motion
-from engine_mount.fleet.catalogue.trace import Trace
-from engine_mount.recordings.answers import PeakCurrent
+from engine_mount.fleet.catalogue.motion import displacement_figures
+from engine_mount.fleet.catalogue.trace import TRACE_COLUMNS, trace_figures
+from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, audit, control_spans
-from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.losses import losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sample_rate
@@ -56,17 +55,17 @@ def state_figures(part: Recording, audits: Mapping[str, TopicAudit]) -> Figures:
             figures[column] = float(gap[name][-1])
     if _count(part, COIL_TEMPERATURE.name):
         figures['coil_temperature_degc'] = _highest(part[COIL_TEMPERATURE.name]['temperature'])
-    peak, trace, motion = PeakCurrent(part, control_spans(audits)), Trace(), Motion()
-    columns, takers = dict(peak.columns), dict.fromkeys(peak.columns, peak.add)
-    for topic, taker in ((CONTROL_TRACE, trace), (DISPLACEMENT, motion)):
-        if _count(part, topic.name):
-            name = part.resolve(topic.name)
-            columns[name], takers[name] = taker.COLUMNS, taker.add
-    for found in column_parts(part, columns):
-        takers[found.topic](found)
     rate = recorded_sample_rate(part)
-    figures['peak_current_a'] = peak.value
-    return figures | trace.figures(1.0 / rate) | motion.figures(rate)
+    columns = {CONTROL_TRACE.name: TRACE_COLUMNS, DISPLACEMENT.name: DISPLACEMENT.names}
+    columns = {name: names for name, names in columns.items() if _count(part, name)}
+    part.load_columns(columns)
+    if CONTROL_TRACE.name in columns:
+        figures |= trace_figures(part[CONTROL_TRACE.name], 1.0 / rate)
+    if DISPLACEMENT.name in columns:
+        figures |= displacement_figures(part[DISPLACEMENT.name], rate)
+    part.release()
+    figures['peak_current_a'] = peak_current(part, control_spans(audits))
+    return figures
 
 
 def _count(part: Recording, name: str) -> int:

@@ -1,4 +1,4 @@
-"""What the displacement of a recording was, collected part by part."""
+"""What the displacement of a recording was."""
 
 from typing import Any
 
@@ -6,40 +6,26 @@ import numpy as np
 
 from engine_mount.fleet.catalogue.columns import BANDS, band_name
 from engine_mount.fleet.catalogue.in_bands import FloatArray, in_bands
-from engine_mount.recordings.columns import ColumnPart
+from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.times import Times, each_once, misdated
 from mount_ros.topics import DISPLACEMENT
 
 
-class Motion:
-    """Stamps and displacement of all samples."""
+def displacement_figures(displacement: Series, rate: float) -> dict[str, Any]:
+    """Return peak and rms, of the whole displacement and in bands, {} where none is known; `rate` in Hz.
 
-    COLUMNS = DISPLACEMENT.names
-
-    def __init__(self) -> None:
-        self._stamps = [np.empty(0, np.int64)]
-        self._values = [np.empty(0)]
-
-    def add(self, part: ColumnPart) -> None:
-        """Take a part of the topic."""
-        self._values.append(part.column(DISPLACEMENT.names[0]))
-        self._stamps.append(part.stamps)
-
-    def figures(self, rate: float) -> dict[str, Any]:
-        """Return peak and rms, of the whole displacement and in bands, {} where none is known."""
-        return motion_figures(*self._by_stamps(), rate)
-
-    def _by_stamps(self) -> tuple[Times, FloatArray]:
-        """Return the samples in the order of their stamps, of several with the same stamp the first.
-
-        Those that are misdated are left out: between them and the others there is nothing to look at.
-        """
-        stamps, values = np.concatenate(self._stamps), np.concatenate(self._values)
-        wrong = misdated(stamps)
-        if wrong.any():
-            stamps, values = stamps[~wrong], values[~wrong]
-        rising, places = each_once(stamps)
-        return rising, values[places]
+    Samples count in the order of their stamps, of several with the same stamp the first. Those that are
+    misdated are left out: between them and the others there is nothing to look at.
+    """
+    try:
+        stamps, values = displacement.stamps, displacement[DISPLACEMENT.names[0]]
+    except SeriesError:
+        return {}
+    wrong = misdated(stamps)
+    if wrong.any():
+        stamps, values = stamps[~wrong], values[~wrong]
+    rising, places = each_once(stamps)
+    return motion_figures(rising, values[places], rate)
 
 
 def motion_figures(stamps: Times, values: FloatArray, rate: float) -> dict[str, Any]:
