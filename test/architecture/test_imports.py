@@ -14,8 +14,8 @@ FLOORS = (
     ('mount_ros',),
     ('mount_driver', 'mount_init', 'mount_control', 'mount_recorder'),
     ('mount_sim',),
-    ('engine_mount.recordings',),  # below the launch files as long as one plays a recording
     ('mount_bringup',),
+    ('engine_mount.recordings',),
     ('engine_mount.settings',),
     ('engine_mount.signals',),
     ('engine_mount.drives', 'engine_mount.faults', 'engine_mount.identification', 'engine_mount.reports'),
