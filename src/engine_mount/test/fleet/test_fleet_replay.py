@@ -254,7 +254,7 @@ def children(process):
 killed = []
 
 def report(progress):
-    if not killed:
+    if progress.done and not killed:
         killed.append(children(os.getpid())[0])
         os.kill(killed[0], signal.SIGKILL)
 
