@@ -224,8 +224,8 @@ class DataPath:
             with one_at_a_time:
                 try:
                     if not directly:
-                        # A stranger is matched before its first message arrives.
-                        if watched is not None and count_publishers() != watched.count:
+                        # A stranger is matched before its first message arrives; its name may come later.
+                        if watched is not None and (watch.suspected or count_publishers() != watched.count):
                             watch.check()
                         if local.senders:  # handed over before, or of a stranger
                             return
