@@ -76,12 +76,12 @@ class PublisherWatch:
         """Check who publishes each topic: 15 us each."""
         with self._guard:
             before = self.confirmed, self.suspected
-            every = self._watched.items()
-            for topic, watched in every:
+            for topic, watched in self._watched.items():
                 watched.count = watched.subscription.get_publisher_count()
                 self._judge(topic, watched)
-            self.confirmed = next((each.confirmed for _, each in every if each.confirmed), '')
-            self.suspected = next((each.suspected for _, each in every if each.suspected), '')
+            every = self._watched.values()
+            self.confirmed = next((each.confirmed for each in every if each.confirmed), '')
+            self.suspected = next((each.suspected for each in every if each.suspected), '')
             changed = before != (self.confirmed, self.suspected)
         if changed:
             self.report()

@@ -11,7 +11,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 
 import numpy as np
@@ -110,38 +110,57 @@ def _requests(domain: int, namespace: str) -> Iterator[Begin]:
 
 
 @contextmanager
-def _on_topic(
-    topic: topics.Topic,
-    messages: Iterator[bytes] | None,
-    answer: Callable[[bytes], bytes | None],
-    domain: int,
-    namespace: str,
-) -> Iterator[Begin]:
-    """Publish `messages`, or where there are none what `answer` makes of each displacement, if anything."""
+def _path(domain: int, namespace: str) -> Iterator[DataPath]:
     with _node(domain, namespace) as node:
         path = DataPath(node)
-        send: list[Callable[[bytes], None]] = []
-
-        def take(raw: bytes) -> None:
-            if send and (message := answer(raw)) is not None:
-                send[0](message)
-
-        def begin() -> Step:
-            sender, end = path.sender(topic), time.monotonic() + _MATCH_LIMIT
-            while path.unmatched() and time.monotonic() < end:
-                time.sleep(0.01)
-            send.append(sender)
-            if messages is None:
-                return lambda: None
-            return lambda: [sender(message) for message in itertools.islice(messages, _FLOOD)]
-
-        if messages is None:
-            path.subscribe(topics.DISPLACEMENT, take)
-            path.start()
         try:
-            yield begin
+            yield path
         finally:
             path.stop()
+
+
+def _sender(path: DataPath, topic: topics.Topic) -> Callable[[bytes], None]:
+    """Return what publishes on a topic, once a node subscribes or `_MATCH_LIMIT` is over."""
+    send, end = path.sender(topic), time.monotonic() + _MATCH_LIMIT
+    while path.unmatched() and time.monotonic() < end:
+        time.sleep(0.01)
+    return send
+
+
+@contextmanager
+def _publisher(
+    topic: topics.Topic, messages: Iterator[bytes], domain: int, namespace: str
+) -> Iterator[Begin]:
+    """Publish `messages`, a few in each period, until there are no more."""
+    with _path(domain, namespace) as path:
+
+        def begin() -> Step:
+            send = _sender(path, topic)
+            return lambda: [send(message) for message in itertools.islice(messages, _FLOOD)]
+
+        yield begin
+
+
+@contextmanager
+def _replier(
+    topic: topics.Topic, answer: Callable[[bytes], bytes | None], domain: int, namespace: str
+) -> Iterator[Begin]:
+    """Publish what `answer` makes of each displacement, if anything."""
+    with _path(domain, namespace) as path:
+        senders: list[Callable[[bytes], None]] = []
+
+        def take(raw: bytes) -> None:
+            for send in senders:
+                if (message := answer(raw)) is not None:
+                    send(message)
+
+        def begin() -> Step:
+            senders.append(_sender(path, topic))
+            return lambda: None
+
+        path.subscribe(topics.DISPLACEMENT, take)
+        path.start()
+        yield begin
 
 
 def _setpoint(raw: bytes) -> bytes:
@@ -172,25 +191,21 @@ def _table(currents: tuple[float, ...], forces: tuple[float, ...], stamp: int = 
     yield serialised(table)
 
 
-def _nothing(raw: bytes) -> None:
-    """Answer no displacement."""
-
-
 _EVENT = serialised(String(data='flood ' + 'x' * 100))
 _TABLE = (0.0, 1.0, 3.0), (0.0, 500.0, 1000.0)  # A, N
 _FALLING = (0.0, 2.0, 1.0), (0.0, 300.0, 500.0)
 
-KINDS: Mapping[str, Callable[[int, str], object]] = {
+KINDS: Mapping[str, Callable[[int, str], AbstractContextManager[Begin]]] = {
     'can_host': partial(_on_bus, _second_host),
     'can_electronics': partial(_on_bus, _second_electronics),
     'can_garbage': _datagrams,
-    'current_setpoint': partial(_on_topic, topics.CURRENT_SETPOINT, None, _setpoint),
-    'displacement': partial(_on_topic, topics.DISPLACEMENT, None, _displacement),
-    'air_gap': partial(_on_topic, topics.AIR_GAP, _air_gap(), _nothing),
-    'table': partial(_on_topic, topics.CURRENT_FORCE_TABLE, _table(*_TABLE), _nothing),
-    'table_old': partial(_on_topic, topics.CURRENT_FORCE_TABLE, _table(*_TABLE, 1_000_000_000), _nothing),
-    'table_not_monotone': partial(_on_topic, topics.CURRENT_FORCE_TABLE, _table(*_FALLING), _nothing),
-    'flood_topic': partial(_on_topic, topics.EVENT, itertools.repeat(_EVENT), _nothing),
+    'current_setpoint': partial(_replier, topics.CURRENT_SETPOINT, _setpoint),
+    'displacement': partial(_replier, topics.DISPLACEMENT, _displacement),
+    'air_gap': partial(_publisher, topics.AIR_GAP, _air_gap()),
+    'table': partial(_publisher, topics.CURRENT_FORCE_TABLE, _table(*_TABLE)),
+    'table_old': partial(_publisher, topics.CURRENT_FORCE_TABLE, _table(*_TABLE, 1_000_000_000)),
+    'table_not_monotone': partial(_publisher, topics.CURRENT_FORCE_TABLE, _table(*_FALLING)),
+    'flood_topic': partial(_publisher, topics.EVENT, itertools.repeat(_EVENT)),
     'flood_service': _requests,
 }
 """{kind: context that gives the beginning of the sender}, of a domain and a namespace."""
@@ -200,7 +215,7 @@ def main() -> None:
     """Send as the command line says, from the first line of the input to its end."""
     prepare_environment()
     kind, domain, namespace = sys.argv[1:]
-    with KINDS[kind](int(domain), namespace) as begin:  # type: ignore[attr-defined]
+    with KINDS[kind](int(domain), namespace) as begin:
         print('ready', flush=True)
         sys.stdin.readline()
         step = begin()

@@ -72,10 +72,20 @@ def write_table(table: 'pyarrow.Table', file: Path) -> None:
     Raises `WritingError`.
     """
     parquet = required('pyarrow.parquet', TABLES)
+    with replacing(file) as beside:
+        parquet.write_table(table, beside, compression='zstd')
+
+
+@contextlib.contextmanager
+def replacing(file: Path) -> Iterator[Path]:
+    """Give the place of a new file that takes the place of `file` when the block ends, whole or not at all.
+
+    Raises `WritingError`.
+    """
     beside = file.with_name(f'.{file.name}.{os.getpid()}')
     with writing(file):
         try:
-            parquet.write_table(table, beside, compression='zstd')
+            yield beside
             beside.replace(file)
         finally:
             beside.unlink(missing_ok=True)

@@ -12,11 +12,12 @@ import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from engine_mount.fleet.catalogue.places import Place
-from engine_mount.fleet.columns import Column, table_of, write_table, writing
+from engine_mount.fleet.columns import Column, replacing, table_of, write_table, writing
 from engine_mount.fleet.runner import LOCAL, run_tasks
 from engine_mount.signals.sources.source import StoreAwayError
 
@@ -202,18 +203,13 @@ class TableJob:
 
 
 def _line(uri: str, answer: Answer) -> str:
-    return json.dumps([uri, answer.fingerprint, answer.rows], default=str) + '\n'
+    return json.dumps([uri, answer.fingerprint, answer.rows], default=datetime.isoformat) + '\n'
 
 
 def _write(file: Path, text: str) -> None:
     """Write a file whole or not at all; raises `WritingError`."""
-    beside = file.with_name(f'.{file.name}.{os.getpid()}')
-    with writing(file):
-        try:
-            beside.write_text(text, encoding='utf-8')
-            beside.replace(file)
-        finally:
-            beside.unlink(missing_ok=True)
+    with replacing(file) as beside:
+        beside.write_text(text, encoding='utf-8')
 
 
 def _holds_anything(folder: Path) -> bool:

@@ -271,11 +271,16 @@ def _run_on_cluster(
                 for future in arrived:
                     place = places[future.key]
                     try:
-                        yield _done(place, *pickle.loads(future.result()))
+                        done = _done(place, *pickle.loads(future.result()))
                     except (CancelledError, KilledWorker):
                         client.nthreads()  # raises where it was the scheduler that was lost
-                        yield Done(place, None, _LOST)
+                        done = Done(place, None, _LOST)
+                    except OSError:
+                        raise  # of the connection
+                    except Exception as error:  # a worker cannot load its task
+                        done = _done(place, None, error)
                     left -= 1
+                    yield done
         except OSError as error:
             raise SchedulerLostError(
                 f'the scheduler ({address}) was lost with {left} tasks under way; what was done until then '

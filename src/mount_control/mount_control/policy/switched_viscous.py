@@ -95,7 +95,7 @@ TRACE = {
 def design(parameters: Parameters, sample_time: float) -> Design:
     """Return the law with the table of the characteristic, force (N) over speed, and a window of one period.
 
-    Raises `ParameterError`, or `ParameterError` for the characteristic.
+    Raises `ParameterError`, for the characteristic too.
     """
     _check(parameters)
     lead_time = delay_at(parameters.lead_time, sample_time)

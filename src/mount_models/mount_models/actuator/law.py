@@ -103,7 +103,7 @@ def coefficients(law, gap):
 def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the magnetic force (N) for currents (A) and gaps (m) of any shapes that broadcast, Eq (3).
 
-    Raises `OutsideLawError` or `OutsideLawError`; nothing is ever extrapolated.
+    Raises `OutsideLawError`; nothing is ever extrapolated.
     """
     current, gap = np.broadcast_arrays(np.asarray(current, float), np.asarray(gap, float))
     check_gap(law, gap)
@@ -114,7 +114,7 @@ def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> 
 def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
     """Return the current (A) for forces (N) and gaps (m) of any shapes that broadcast, inverse of Eq (3).
 
-    Raises `OutsideLawError`, or `OutsideLawError` for a force that is negative or beyond `current_high`.
+    Raises `OutsideLawError`, also for a force that is negative or beyond `current_high`.
     """
     force, gap = np.broadcast_arrays(np.asarray(force, float), np.asarray(gap, float))
     check_gap(law, gap)

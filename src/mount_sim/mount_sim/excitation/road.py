@@ -58,7 +58,7 @@ def random_road(times: npt.ArrayLike, road: RandomRoad) -> FloatArray:
     """Return heights (n,) in m at `times` (n,) in s: a sum of waves with random phases.
 
     Taken with its slope at points of a fixed grid along the road, 16 to the shortest wave, and joined by
-    cubic pieces, which leaves 1e-4 of that wave's amplitude. Raises `ParameterError` or `ParameterError`.
+    cubic pieces, which leaves 1e-4 of that wave's amplitude. Raises `ParameterError`.
     """
     road = checked(road)
     seconds = np.asarray(times, dtype=np.float64)

@@ -74,7 +74,7 @@ def contact_current(mechanics, actuator):
 
 
 def checked_closing(mechanics: ClosingMechanics, actuator: ReluctanceActuator) -> ClosingMechanics:
-    """Return `mechanics` with every value in range, or raise `ParameterError` or `ParameterError`.
+    """Return `mechanics` with every value in range, or raise `ParameterError`.
 
     Refused are pads that touch already at rest, and springs that the magnet never overcomes.
     """

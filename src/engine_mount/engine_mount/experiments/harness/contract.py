@@ -102,11 +102,6 @@ def parameters_of(order: Order, name: str, defaults: P) -> P:
     return with_flattened(defaults, order.settings.get(name, {}))
 
 
-def part_of(progress: Progress, first: float, last: float) -> Progress:
-    """Return a progress whose 0 .. 1 is `first` .. `last` of `progress`."""
-    return lambda share, what: progress(first + (last - first) * share, what)
-
-
 _EVEN = 0.02  # chosen: two rms count as even within so much of each other
 
 

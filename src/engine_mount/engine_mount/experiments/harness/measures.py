@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from engine_mount.experiments.harness.contract import Values
@@ -29,16 +30,20 @@ def sweep_parameters(level: float, last: float, idle: float = 0.0) -> Values:
 
 def peak_in(frequency: FloatArray, displacement: FloatArray, band: Band) -> float | None:
     """Return the largest displacement (m) while the sweep passes a band (Hz), None where it does not."""
-    within = (frequency >= band[0]) & (frequency < band[1])
-    whole = frequency[-1] >= band[1] - 0.01
-    return float(np.max(np.abs(displacement[within]))) if whole and within.any() else None
+    within = _passing(frequency, band)
+    return float(np.max(np.abs(displacement[within]))) if within.any() else None
 
 
 def rms_in(frequency: FloatArray, acceleration: FloatArray, band: Band) -> float | None:
     """Return the rms of the acceleration (m/s^2) while the sweep passes a band, None where it does not."""
-    within = (frequency >= band[0]) & (frequency < band[1])
-    whole = frequency[-1] >= band[1] - 0.01
-    return float(np.sqrt(np.mean(acceleration[within] ** 2))) if whole and within.any() else None
+    within = _passing(frequency, band)
+    return float(np.sqrt(np.mean(acceleration[within] ** 2))) if within.any() else None
+
+
+def _passing(frequency: FloatArray, band: Band) -> NDArray[np.bool_]:
+    """Return which samples of a sweep are in a band; none where it does not pass all of it."""
+    inside = (frequency >= band[0]) & (frequency < band[1])
+    return inside & (frequency[-1] >= band[1] - 0.01)
 
 
 def peak_and_rms(displacement: FloatArray, acceleration: FloatArray) -> Values:

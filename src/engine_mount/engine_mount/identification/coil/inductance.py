@@ -131,7 +131,7 @@ class InductanceResult:
 def calibrate_inductance(
     recordings: Sequence[RippleRecording], law: ForceLaw, order: GapOrder
 ) -> InductanceResult:
-    """Return the calibration; raises `LawRefusedError` and `LawRefusedError`."""
+    """Return the calibration; raises `LawRefusedError`."""
     points = _points(recordings, order)
     fitted = [point for point in points if not _is_held_out(point, order)]
     by_temperature = _by_temperature(fitted)

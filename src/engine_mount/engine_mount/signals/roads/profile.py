@@ -1,6 +1,6 @@
 """A measured road: its height over the distance, and why one cannot be used."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,3 @@ class RoadProfile:
     def name(self) -> str:
         """The file's name, for sentences."""
         return self.provenance.uri.rpartition('/')[2]
-
-    def noting(self, *notes: str) -> 'RoadProfile':
-        """Return the same road with more notes."""
-        return replace(self, notes=(*self.notes, *notes))
