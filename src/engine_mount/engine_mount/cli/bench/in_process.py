@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from engine_mount.cli.bench.comparison import Comparison, in_turn
 from engine_mount.drives.loop.run import run_core
-from engine_mount.drives.replay import ReplayOrder, replay_without_output
+from engine_mount.drives.replay import replay as replay_recording
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw, Controller
 from mount_control.force_maker import resample
@@ -84,7 +84,7 @@ def closed_loop() -> Comparison:
 
 
 def replay() -> Comparison:
-    """A recorded drive: from the messages of displacement in memory to the last setpoint."""
+    """A recorded drive: from the displacement in memory to the last setpoint."""
     order = {'mount_sim': {'scenario': 'bench', 'timeline.duration': _DRIVEN}}
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / 'recording'
@@ -96,10 +96,10 @@ def replay() -> Comparison:
         writer.close()
         times = []
         for _ in range(_ROUNDS):
-            outcome = replay_without_output(ReplayOrder(recording))
+            outcome = replay_recording(recording)
             assert outcome.agreement is not None
             assert outcome.agreement.equal
-            times.append(outcome.computing_time / sum(len(run.stamps) for run in outcome.replayed.runs))
+            times.append(outcome.replayed.control_time / outcome.samples)
     return Comparison('replay one sample', statistics.median(times), 'real time', SAMPLE_TIME)
 
 

@@ -15,11 +15,10 @@ from engine_mount.drives.inputs.parameter_changes import recorded_changes, witho
 from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp, ramps_of
 from engine_mount.drives.inputs.stretches import STRETCH, OutOfOrderError, Stretch, Stretches
 from engine_mount.drives.inputs.taken import Column, ControlRun, Notes, ReplayError, quiet_at_first
-from engine_mount.drives.other_policy import check_effect
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
 from engine_mount.recordings.recording import Recording
-from engine_mount.settings.chosen import control_parameters
+from engine_mount.settings.chosen import check_effect, control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_ros import topics
 
