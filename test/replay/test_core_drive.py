@@ -19,6 +19,7 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.settings import chosen
 from engine_mount.settings.chosen import policy_of
 from engine_mount.signals.excitation import build_excitation
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
@@ -231,7 +232,7 @@ def test_without_compensation_a_warm_coil_would_shift_both_gaps():
     settings = {**SHORT, 'electronics.coil_temperature': 40.0, 'temperature.copper': 0.0}
     unaware = replace(default_specimen(), temperature=None)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(core_run, 'chosen_specimen', lambda *_: unaware)
+        patch.setattr(chosen, 'chosen_specimen', lambda *_: unaware)
         result = run_core({'mount_sim': settings}, lambda topic, raw, stamp: None).result
     assert result is not None
     assert result.rest_gap - 508e-6 == pytest.approx(-26e-6, abs=3e-6)

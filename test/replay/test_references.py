@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.drives.inputs.input import Notes, recorded_parameters
+from engine_mount.drives.inputs.consumed_samples import Notes
+from engine_mount.drives.inputs.input import recorded_parameters
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference

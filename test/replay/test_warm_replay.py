@@ -3,7 +3,7 @@
 import pytest
 
 import engine_mount
-from engine_mount.drives.inputs.ramps import measured_gaps
+from engine_mount.drives.inputs.input import measured_gaps
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.reference import accept

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
-from engine_mount.drives.inputs.input import ReplayInput, Times
+from engine_mount.drives.inputs.consumed_samples import Times
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.difference import (
     Column,
     Moment,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from rclpy.context import Context
 from rclpy.node import Node
 
-from engine_mount.drives.inputs.input import ReplayError, has, replay_input
+from engine_mount.drives.inputs.consumed_samples import ReplayError
+from engine_mount.drives.inputs.input import has, replay_input
 from engine_mount.drives.lockstep import NodePlayer, displacement_messages
 from engine_mount.drives.replay import check_parameters, parsed_changes, with_changes
 from engine_mount.recordings.place import open_mount

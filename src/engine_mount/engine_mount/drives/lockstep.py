@@ -10,7 +10,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from rclpy.context import Context
@@ -18,17 +19,31 @@ from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from engine_mount.drives.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed, activation_before
-from engine_mount.drives.inputs.input import Column, ControlRun, ReplayError, ReplayInput, Times
-from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp
+from engine_mount.drives.core import (
+    OFF,
+    ControlAnswers,
+    Progress,
+    RampAnswers,
+    Replayed,
+    activation_before,
+    replay_parts,
+)
+from engine_mount.drives.inputs.consumed_samples import (
+    Column,
+    ControlRun,
+    MeasuredGap,
+    Ramp,
+    ReplayError,
+    Times,
+)
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import from_bytes, to_message
+from mount_ros.messages.force_table import from_bytes
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.messages.sensors import temperature_layout
 from mount_ros.nodes.diagnostics import Level
@@ -47,30 +62,18 @@ def replay_in_lockstep(
     given: ReplayInput, parameters: Parameters, domain: int, progress: Progress = lambda share: None
 ) -> Replayed:
     """Replay all parts through mount_init and mount_control; raises a `ValueError` where one refuses."""
-    replayed, done = Replayed(), 0
     total = sum(len(part.stamps) for part in given.parts)
-    measured: MeasuredGap | None = None
+    done = 0
+
+    def play(play_part: Callable[..., Any], part: Ramp | ControlRun, *gap: MeasuredGap) -> Any:
+        nonlocal done
+        answers = play_part(part, *gap, lambda samples: progress((done + samples) / total))
+        done += len(part.stamps)
+        return answers
+
     with ros_context(domain) as context:
         player = NodePlayer(context, parameters, f'/replay_{os.getpid()}')
-        for part in given.parts:
-
-            def report(samples: int, before: int = done) -> None:
-                progress((before + samples) / total)
-
-            if isinstance(part, Ramp):
-                answers = player.play_ramp(part, report)
-                measured = answers.gap
-                replayed.parts.append(answers)
-            else:
-                gap = part.gap
-                if measured is not None and measured.stamp == gap.stamp:
-                    gap = measured
-                begin = time.perf_counter()
-                replayed.parts.append(player.play_run(part, gap, report))
-                replayed.control_time += time.perf_counter() - begin
-                replayed.gaps.append(gap)
-            done += len(part.stamps)
-    return replayed
+        return replay_parts(given, partial(play, player.play_ramp), partial(play, player.play_run))
 
 
 class NodePlayer:
@@ -130,10 +133,9 @@ class NodePlayer:
         sent = (topics.DISPLACEMENT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
         with self._node(MountControl, 'mount_control', sent, receive) as (node, senders):
             send, send_gap, send_table = senders
-            stamp, layout = activation_before(int(run.stamps[0])), ScalarsLayout(topics.AIR_GAP)
-            send_gap(layout.pack(stamp, [gap.numbers[name] for name in layout.names]))
-            table = np.stack([gap.table.current, gap.table.normal_force])
-            send_table(serialised(to_message(stamp, table)))
+            stamp = activation_before(int(run.stamps[0]))
+            for send_part, raw in zip((send_gap, send_table), gap.dated(stamp).messages(), strict=True):
+                send_part(raw)
             send(ScalarsLayout(topics.DISPLACEMENT).pack(stamp, (float(run.displacement[0]),)))
             transition(node.trigger_activate, node, 'mount_control')
             yield node, send

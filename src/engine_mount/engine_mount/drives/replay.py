@@ -22,9 +22,9 @@ from engine_mount.drives.agreement import (
     switching_text,
 )
 from engine_mount.drives.core import Progress, Replayed, replay_in_core
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input
-from engine_mount.drives.inputs.input import ReplayError, ReplayInput, replay_input
-from engine_mount.drives.inputs.parameter_changes import without
+from engine_mount.drives.inputs.input import ReplayInput, replay_input, without
 from engine_mount.drives.output import write_replay
 from engine_mount.recordings.place import open_mount
 from engine_mount.recordings.recording import Recording

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.drives.inputs.taken import ReplayError
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.replay import Replay, replay
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from engine_mount.fleet.what_if.closed_loop import both_motions

@@ -12,6 +12,9 @@ from mount_control.settings import (
     policy_parameters,
     without_effect,
 )
+from mount_init.estimate import TemperatureReadings
+from mount_init.initialisation import Initialisation
+from mount_init.parameters import InitParameters
 from mount_models.quantity import ParameterError, with_flattened
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of
@@ -62,6 +65,14 @@ def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specime
     """Return the specimen of a run, as `node` loads it."""
     values = parameters.get(node, {})
     return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
+
+
+def chosen_initialisation(
+    parameters: Parameters, temperatures: TemperatureReadings | None = None
+) -> Initialisation:
+    """Return a ramp of mount_init before its first sample; `temperatures` are those of the coil."""
+    own = with_flattened(InitParameters(), parameters.get('mount_init', {}))
+    return Initialisation(chosen_specimen(parameters), own, temperatures or TemperatureReadings())
 
 
 def chosen_control(parameters: Parameters) -> ControlSettings:

@@ -10,7 +10,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 
 from engine_mount.cli.bench.comparison import Comparison
-from engine_mount.drives.inputs.taken import QUIET_AT_FIRST
+from engine_mount.drives.inputs.consumed_samples import QUIET_AT_FIRST
 from engine_mount.fleet.catalogue.places import Place, places
 from engine_mount.fleet.example.fleet import make_one, whole_fleet
 from engine_mount.fleet.example.variations import VARIATIONS

@@ -13,15 +13,13 @@ import numpy as np
 
 from engine_mount.drives.loop import compiled_loop as loop
 from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns
-from engine_mount.settings.chosen import Parameters, chosen_control, chosen_specimen
+from engine_mount.settings.chosen import Parameters, chosen_control, chosen_initialisation
 from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.settings import check_sample_rate
 from mount_control.control_loop import OFF, ControlLoop
 from mount_init.estimate import TemperatureReadings
-from mount_init.initialisation import Initialisation, InitialisationResult
-from mount_init.parameters import InitParameters
-from mount_models.quantity import with_flattened
+from mount_init.initialisation import InitialisationResult
 from mount_sim.electronics.electronics import Reading, status_every
 from mount_sim.electronics.faults.schedule import check_without_bus
 from mount_sim.excitation.excitation import Excitation
@@ -63,10 +61,8 @@ class CoreChain:
     """Initialisation and control of one mount: the first answers until its ramp is over, then the second."""
 
     def __init__(self, parameters: Parameters):
-        init_parameters = with_flattened(InitParameters(), parameters.get('mount_init', {}))
         self.temperatures = TemperatureReadings()
-        specimen = chosen_specimen(parameters)
-        self._initialisation = Initialisation(specimen, init_parameters, self.temperatures)
+        self._initialisation = chosen_initialisation(parameters, self.temperatures)
         self.control = chosen_control(parameters)
         self.loop = ControlLoop()
         self.result: InitialisationResult | None = None

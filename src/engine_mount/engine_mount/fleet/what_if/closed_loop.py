@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import has
-from engine_mount.drives.inputs.taken import ReplayError
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import CoreChain, run_core_into
 from engine_mount.fleet.what_if.compared import Recorded, changed_parameters
