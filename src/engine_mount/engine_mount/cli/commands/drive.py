@@ -31,7 +31,7 @@ from engine_mount.cli.commands.road_arguments import (
     height_column,
     road_excitation,
 )
-from engine_mount.cli.completion.values import faults, listed, named
+from engine_mount.cli.completion import faults, listed, named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import note, terminal
 from mount_bringup.graph.nodes import RESTART_LIMIT
