@@ -136,7 +136,7 @@ def drive(
     if composed and (lockstep or core):
         raise CombinationError('--composed is for real time: in lock-step the nodes share a process anyway')
     mode = CORE if core else LOCKSTEP if lockstep else REAL_TIME
-    screen = screen or Screen(io.StringIO())
+    screen, domain = screen or Screen(io.StringIO()), chosen_domain(domain)
     values = {node: dict(own) for node, own in (parameters or {}).items()}
     sim = values.setdefault(SIM.name, {})
     scenario = _scenario(scenario, sim, excitation)
@@ -164,7 +164,7 @@ def drive(
         apart_in_time = Grouping.COMPOSED if composed else Grouping.APART
         settings = GraphSettings(
             namespace=namespace,
-            domain=chosen_domain(domain),
+            domain=domain,
             parameters=values,
             grouping=Grouping.TOGETHER if lockstep and not apart else apart_in_time,
             priority=0 if lockstep else priority,
