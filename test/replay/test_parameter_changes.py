@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from std_msgs.msg import String
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreChain, MountRun
@@ -10,7 +9,7 @@ from engine_mount.drives.replay import LOCKSTEP, change_notes, replay
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT
 
@@ -43,7 +42,7 @@ def changed_drive(tmp_path_factory):
     def end_and_report(self):
         end(self)
         for stamp, text in told:
-            self._sink._write(EVENT, serialised(String(data=text)), stamp)
+            self._sink._write(EVENT, string_message(text), stamp)
 
     patch.setattr(MountRun, 'take_many', take_many_and_change)
     patch.setattr(MountRun, 'end', end_and_report)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from mount_control.settings import ControlParameters, policy_parameters
 from mount_models.sampling import sample_time_ns
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import ForceTable, to_message
+from mount_ros.messages.force_table import ForceTable, table_message
 from mount_ros.messages.scalars import ScalarsLayout
 
 Times = NDArray[np.int64]
@@ -67,7 +66,7 @@ class MeasuredGap:
         table = np.stack([self.table.current, self.table.normal_force])
         return (
             layout.pack(self.stamp, [self.numbers[name] for name in layout.names]),
-            serialised(to_message(self.stamp, table)),
+            table_message(self.stamp, table),
         )
 
 
