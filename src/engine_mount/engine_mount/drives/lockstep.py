@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from rclpy.context import Context
@@ -93,7 +94,7 @@ class ControlPlayer:
 
         `receive` takes its setpoints and traces.
         """
-        own = {'context': self._context, 'namespace': self._namespace}
+        own: dict[str, Any] = {'context': self._context, 'namespace': self._namespace}
         node = MountControl(parameter_overrides=self._overrides, **own)
         node.data_thread = self._thread
         node.get_logger().set_level(LoggingSeverity.WARN)  # the command speaks for it
