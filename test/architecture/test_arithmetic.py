@@ -51,6 +51,7 @@ ALLOWED = {
     ('engine_mount.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.time_axis', 'np.interp'): 'times told to people',
+    ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',
     ('engine_mount.recordings.times', '**'): 'rates of topics, for the eye',
     ('engine_mount.recordings.times', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',

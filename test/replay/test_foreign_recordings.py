@@ -6,7 +6,6 @@ from sensor_msgs.msg import JointState
 
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.units.unit import UnitError
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 
@@ -56,7 +55,7 @@ def test_a_displacement_beyond_the_range_is_refused_with_its_sample(tmp_path):
     values = np.where(np.arange(1000) == 321, 400.0, MILLIMETRES)
     with pytest.raises(SignalError, match=r'displacement at 1 kHz: sample 3210 at 3\.2100 s is .* m, beyond'):
         given(write(tmp_path, TIMES, values))
-    with pytest.raises(UnitError, match='write --map displacement=x:mm'):
+    with pytest.raises(SignalError, match='write --map displacement=x:mm'):
         given(write(tmp_path), scale=1.0)
 
 

@@ -14,9 +14,9 @@ MOTORWAY = Path(__file__).resolve().parents[5] / 'shared' / 'data' / 'motorway_i
 
 def driven(tmp_path, file, columns, **more):
     """Return the acceleration (m/s^2) that drives the car, and what is brought."""
-    brought, factor = recorded_acceleration(str(file), columns, **more)
+    brought = recorded_acceleration(str(file), columns, **more)
     even = recorded_signal(RecordedScenario(str(brought.write(tmp_path / 'given'))))
-    return acceleration_at(even, factor, 1e-3)[:], brought
+    return acceleration_at(even, 1.0, 1e-3)[:], brought
 
 
 def test_it_is_to_the_bit_what_the_simulator_reads_by_itself(tmp_path):
