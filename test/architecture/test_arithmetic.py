@@ -48,7 +48,6 @@ ALLOWED = {
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.stored', 'np.cumsum'): 'whole numbers',
-    ('engine_mount.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.time_axis', 'np.interp'): 'times told to people',
     ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',

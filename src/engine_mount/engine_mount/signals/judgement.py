@@ -86,7 +86,7 @@ def unit_of_column(
                 f'{write(unit.symbol)} if that is right'
             )
         notes.append(f'{column.name}: {in_gravity}; taken as {unit.symbol}, as you say')
-    if not said and not header:
+    if not said and not header and scale != 1.0:
         notes.append(f'{column.name}: factor {scale:g} to {unit.symbol}, as you say')
     return unit, scale, notes
 

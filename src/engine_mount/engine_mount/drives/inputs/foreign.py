@@ -22,10 +22,9 @@ from engine_mount.signals.importing.one_grid import (
     rate_text,
 )
 from engine_mount.signals.mapping import MEAN, Mapping, mapping_in_file, with_options
-from engine_mount.signals.plausibility import check_size
 from engine_mount.signals.quantities import QUANTITIES
 from engine_mount.signals.selection import select
-from engine_mount.signals.signal import SECOND
+from engine_mount.signals.signal import SECOND, check_size
 from mount_init.parameters import InitParameters
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
