@@ -22,7 +22,7 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
-from engine_mount.signals.times import may_hold_times, times_of
+from engine_mount.signals.times import SLOWEST, may_hold_times, times_of
 from engine_mount.signals.units import is_unit, unit_of
 from mount_models.arithmetic.averages import mean
 
@@ -77,6 +77,7 @@ def select_rows(
     needed: Collection[str],
     *,
     timed: bool = False,
+    slowest: float = SLOWEST,
 ) -> dict[str, FloatArray]:
     """Return the quantities of a table row by row in SI, (n,) each, with `timed` the `time` in s.
 
@@ -87,26 +88,27 @@ def select_rows(
     """
     mapping = _mapping(choices, known).of(known)
     there = _headings(source) if isinstance(source, Measured) else headings(source, mapping.stated)
+    uri = source.provenance.uri if isinstance(source, Measured) else str(source)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
         if name not in mapping.columns:
             option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
             raise SignalError(
-                f'{source} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
+                f'{uri} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
             )
     measured = _opened(source, mapping, timed=timed)
-    where = name_of(measured.provenance.uri)
     columns = [measured.column(choice.column) for choice in mapping.columns.values()]
-    base = times_of(measured, columns[0], mapping.time)[0] if timed else columns[0].time
+    base = times_of(measured, columns[0], mapping.time, slowest)[0] if timed else columns[0].time
     inside = np.full(columns[0].values.size, True)
     rows = {}
     for name, column in zip(mapping.columns, columns, strict=True):
+        where = f'{name_of(uri)}, column {column.name!r}'
         at_first = replace(column, values=_at_times_of(columns[0], column, where, inside))
         bad = np.flatnonzero(inside & ~np.isfinite(at_first.values))
         if bad.size:
             raise SignalError(
-                f'{where}, column {column.name!r}: row {bad[0] + 1} is {column.values[bad[0]]} ({bad.size} '
+                f'{where}: row {bad[0] + 1} is {column.values[bad[0]]} ({bad.size} '
                 f'such of {column.values.size}); leave these rows out'
             )
         rows[name], _ = _in_si(where, at_first, known[name], mapping.columns[name], mapping.option)
@@ -230,7 +232,7 @@ def _at_times_of(
     if column.time is first.time or column.time is None or first.time is None:
         if column.values.size != first.values.size:
             raise SignalError(
-                f'{where}: {column.name} has {column.values.size} samples, {first.name} has '
+                f'{where} has {column.values.size} samples, {first.name} has '
                 f'{first.values.size}, and no times tell which belong together; give columns of one length'
             )
         return column.values
@@ -241,7 +243,6 @@ def _at_times_of(
         inside &= (at >= own[0] - _SAME_TIME) & (at <= own[-1] + _SAME_TIME)
     if not (own.size and inside.any()):
         raise SignalError(
-            f'{where}: {column.name} and {first.name} have no time in common; give columns that were sampled '
-            'together'
+            f'{where}, and {first.name} have no time in common; give columns that were sampled together'
         )
     return np.interp(at, own, column.values[known])

@@ -35,14 +35,16 @@ def may_hold_times(there: Sequence[Heading]) -> set[str]:
     return {one.name for one in there if is_time(one)} | {one.name for one in there[:1] if not one.timed}
 
 
-def times_of(measured: Measured, column: MeasuredColumn, choice: TimeChoice) -> Times:
+def times_of(
+    measured: Measured, column: MeasuredColumn, choice: TimeChoice, slowest: float = SLOWEST
+) -> Times:
     """Return the times of a column.
 
     What is said by hand goes before what the format tells, that before a column with a usual title, and that
-    before a first column that rises. Raises `SignalError`.
+    before a first column that rises. A rate below `slowest` (Hz) doubts their unit. Raises `SignalError`.
     """
     if choice.column:
-        return _in_column(measured, measured.column(choice.column), choice.unit)
+        return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
     found = _time_column(measured, column)
     if choice.rate is not None:
         own = column.time.times if column.time else None
@@ -57,7 +59,7 @@ def times_of(measured: Measured, column: MeasuredColumn, choice: TimeChoice) -> 
             f'--time COLUMN:UNIT (there are {listed([*measured.columns.values(), *measured.others])}), or '
             'the rate with --rate HZ'
         )
-    base, notes = _in_column(measured, found, choice.unit)
+    base, notes = _in_column(measured, found, choice.unit, slowest)
     first = () if is_time(found) else (f'{found.name}: the first column rises: taken as the time',)
     return base, (*first, *notes)
 
@@ -89,7 +91,7 @@ def _at_rate(measured: Measured, column: MeasuredColumn, rate: float, own: Float
     return TimeBase(np.arange(column.values.size) / rate, begin, told), ()
 
 
-def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> Times:
+def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: float) -> Times:
     where = f'{measured.provenance.uri}, column {column.name!r}'
     if column.time is not None and not np.isfinite(column.values).any():
         return column.time, ()  # dates, which are no numbers
@@ -100,7 +102,7 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> Times:
             f'{where}: {what} ({bad.size} such of {column.values.size}); remove these samples, or say the '
             'rate with --rate HZ'
         )
-    unit, notes = _unit(where, column, said)
+    unit, notes = _unit(where, column, said, slowest)
     raw = column.values
     epoch = _EPOCH[0] < raw[0] * unit.factor < _EPOCH[1]
     begin = round(float(raw[0]) * round(unit.factor * SECOND))
@@ -108,7 +110,7 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> Times:
     return TimeBase((raw - raw[0]) * unit.factor, begin, told), notes
 
 
-def _unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tuple[str, ...]]:
+def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tuple[Unit, tuple[str, ...]]:
     """Return the unit of a column of times; it must give a rate that can be."""
     chosen = said or column.unit
     unit = unit_of(chosen or 's', 'time')
@@ -125,7 +127,7 @@ def _unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tuple[st
     if step <= 0.0:
         return unit, notes  # of times that do not rise the even grid tells
     rate = 1.0 / (step * unit.factor)
-    if SLOWEST <= rate <= FASTEST and (rate <= _LIKELY[1] or count >= _SHORTEST * rate):
+    if slowest <= rate <= FASTEST and (rate <= _LIKELY[1] or count >= _SHORTEST * rate):
         assumed = f'{column.name}: no unit is said; taken as s: {rate:.4g} samples per second'
         return unit, notes if chosen else (assumed,)
     units = ('s', 'ms', 'us', 'ns', 'min')

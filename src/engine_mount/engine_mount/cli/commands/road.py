@@ -62,9 +62,8 @@ def show(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
+    from engine_mount.signals.roads.driving import as_figures, as_rows, speed_of
     from engine_mount.signals.roads.iso8608 import unevenness
-    from engine_mount.signals.roads.speed import speed_of
-    from engine_mount.signals.roads.telling import as_figures, as_rows
 
     console = terminal()
     profile = road_of_options(file, lateral, column, distance)
@@ -105,8 +104,8 @@ def invert(
     """
     from engine_mount.reports.json_file import write_json
     from engine_mount.signals.mapping import Mapping, with_options
-    from engine_mount.signals.roads.inverting import UNKNOWN, inverted
-    from engine_mount.signals.roads.speed import speed_of
+    from engine_mount.signals.roads.driving import speed_of
+    from engine_mount.signals.roads.inversion import UNKNOWN, inverted
     from engine_mount.signals.selection import select
 
     if not column:
