@@ -52,7 +52,9 @@ def test_a_unit_that_is_not_said_is_refused_with_a_guess(table):
     assert 'no unit is said; values from' in refusal(
         table(distance=('m', PLACES), height=('', 1000.0 * HEIGHTS))
     )
-    assert 'that is of voltage, but height is of length' in refusal(table(distance=('m', PLACES), height=('V', HEIGHTS)))
+    assert 'that is of voltage, but height is of length' in refusal(
+        table(distance=('m', PLACES), height=('V', HEIGHTS))
+    )
 
 
 @pytest.mark.parametrize(
