@@ -60,7 +60,6 @@ ALLOWED = {
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',
     ('engine_mount.signals.formats.trees.matlab', 'scipy'): 'reads files',
-    ('engine_mount.signals.sources.patience', '**'): 'how long is waited for a store',
 }
 
 
