@@ -35,7 +35,6 @@ _KEYS = {
     'ssh': 'ssh to this host must work without a question: a key in the agent or in ~/.ssh/config',
     'http': "what the server wants to know stands in fsspec's configuration, as client_kwargs of http",
 }
-_LIBRARIES = {'s3': 's3fs', 'gs': 'gcsfs', 'ssh': 'sshfs', 'http': 'aiohttp'}
 _REFUSED = {  # exceptions of the libraries below fsspec, by name: they are not loaded here
     'DefaultCredentialsError', 'HostKeyNotVerifiable', 'KeyEncryptionError', 'KeyImportError',
     'NoCredentialsError', 'PartialCredentialsError', 'PermissionDenied', 'ProfileNotFound',
@@ -79,7 +78,7 @@ def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
         for file in files:
             target = folder / name / file.place
             target.parent.mkdir(parents=True, exist_ok=True)
-            _fetch(file.entry, target, lambda came, before=done: progress(before + came, size))
+            _fetch(file.entry, target, partial(_add, progress, done, size))
             done += file.entry.size
         if _key(list_files(uri)) != key:
             raise SourceError(
@@ -89,6 +88,10 @@ def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
     key = _key(files)
     with cached_copy(key, name, size, fill) as path:
         yield path
+
+
+def _add(progress: Progress, done: int, size: int, came: int) -> None:
+    progress(done + came, size)
 
 
 def _key(files: Sequence[RemoteFile]) -> str:
@@ -163,7 +166,7 @@ def _retry(uri: str, work: Callable[[], T]) -> T:
                 )
                 kind = SourceError if lasting else StoreAwayError
                 raise kind(f'{shown(uri)}: {reason}{tries}; {remedy}') from error
-        pause = min(LONGEST_PAUSE, FIRST_PAUSE * 2.0 ** (attempt - 1))
+        pause = min(LONGEST_PAUSE, FIRST_PAUSE * (1 << attempt - 1))
         time.sleep(pause * random.uniform(0.75, 1.0))
         _filesystem_class(uri).clear_instance_cache()  # a connection that broke stays broken
 
@@ -175,8 +178,8 @@ def _reason(error: BaseException, uri: str) -> tuple[bool, str, str]:
         isinstance(cause, OSError) or type(cause).__module__.startswith('aiohttp')
     ):
         error = cause or error
-    status = getattr(error, 'status', None) or getattr(error, 'code', None)
-    status = int(status) if str(status).isdecimal() else 0
+    told = str(getattr(error, 'status', None) or getattr(error, 'code', None))
+    status = int(told) if told.isdecimal() else 0
     classes = {kind.__name__ for kind in type(error).__mro__}
     words = f'{type(error).__name__}: {" ".join(str(error).split())}'.removesuffix(': ')
     if type(error).__name__ == 'HostKeyNotVerifiable':
@@ -203,8 +206,15 @@ def _filesystem_class(uri: str) -> Any:
     """Return the class of fsspec behind a scheme; raises `MissingLibraryError`."""
     kind, what = _kind(uri), f'reading {shown(uri)}'
     fsspec = required('fsspec', what)
-    library = required(_LIBRARIES[kind], what) if kind in _LIBRARIES else None
-    return library.SSHFileSystem if kind == 'ssh' and library else fsspec.get_filesystem_class(kind)
+    if kind == 'ssh':
+        return required('sshfs', what).SSHFileSystem
+    if kind == 's3':
+        required('s3fs', what)
+    elif kind == 'gs':
+        required('gcsfs', what)
+    elif kind == 'http':
+        required('aiohttp', what)
+    return fsspec.get_filesystem_class(kind if kind != 'http' else scheme_of(uri))
 
 
 def _filesystem(uri: str) -> tuple[Any, str]:
