@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import yaml
 from command import done
+from foreign_files import MAKERS
 
 import engine_mount
 from engine_mount import fleet
 from engine_mount.recordings.session import recorded_session, session_content
-from engine_mount.signals.testing import MAKERS
 
 TIMES = np.arange(400) / 200.0  # s: 200 Hz, as vehicles record
 TRAVEL = 0.8e-3 * np.sin(2.0 * np.pi * 8.0 * TIMES)  # m

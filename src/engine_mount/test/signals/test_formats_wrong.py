@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from foreign_files import MAKERS
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +13,6 @@ from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.testing import MAKERS
 
 N = 60
 TIMES = np.arange(N) / 100.0
