@@ -1,7 +1,6 @@
-"""A recorded acceleration of others as what the simulator reads: a plain file, its origin told beside it."""
+"""A foreign recorded acceleration as what the simulator reads: a plain file, its origin told beside it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,25 +10,18 @@ from engine_mount.drives.brought import Brought
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.measured import Heading
+from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.provenance import told_columns, told_mapping, told_source
+from engine_mount.signals.importing.provenance import told_mapping, told_provenance
 from engine_mount.signals.importing.topics import recorded_as
-from engine_mount.signals.signal import Signal
-from engine_mount.signals.units.columns import read_chosen, stated_with
-from engine_mount.signals.units.mapping import (
-    ColumnChoice,
-    Mapping,
-    MappingError,
-    checked_scale,
-    mapping_in_file,
-    with_options,
-)
-from engine_mount.signals.units.quantities import quantity
-from engine_mount.signals.units.signals import chosen_signals
+from engine_mount.signals.mapping import ColumnChoice, Mapping, mapping_in_file, with_options
+from engine_mount.signals.quantities import QUANTITIES
+from engine_mount.signals.selection import select
+from engine_mount.signals.signal import Signal, SignalError
 
 _ACCELERATION = 'acceleration'
-_OWN = recorded_as(quantity(_ACCELERATION))
+_QUANTITY = {_ACCELERATION: QUANTITIES[_ACCELERATION]}
+_OWN = recorded_as(QUANTITIES[_ACCELERATION])
 _OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
 
 
@@ -42,55 +34,42 @@ def recorded_acceleration(
     scale: float | None = None,
     mapping_file: Path | None = None,
     stated: Stated | None = None,
-) -> tuple[Brought, float]:
-    """Return the acceleration that the options of the command name in `file`, and the factor to m/s^2.
+) -> Brought:
+    """Return the acceleration that `columns` (`COLUMN[:UNIT]`) choose in `file`, a path or URI, in m/s^2.
 
-    `file` is a path or URI. `columns` are `COLUMN[:UNIT]`, one where a mapping file names none; of a
-    recording of this project it may be left out. What is brought are the samples in the unit of the file:
-    what the simulator computes does not depend on who reads them. Raises `MappingError`, `UnitError`,
+    One column where a mapping file names none; of a recording of this project none is needed. Raises
     `SignalError` or `SourceError`, also for values that could be in another unit.
     """
     mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
-    mapping = with_options(mapping, columns, time, rate, default=_ACCELERATION)
-    if _ACCELERATION not in mapping.columns:
-        there = headings(file, stated_with(mapping, stated))
-        mapping = replace(mapping, columns={_ACCELERATION: _own_column(there, file)})
-    choice = mapping.columns[_ACCELERATION]
-    if scale is not None:
-        choice = replace(choice, scale=checked_scale(scale, '--scale'))
-    mapping = replace(mapping, columns={_ACCELERATION: choice}, others={})
-    measured = read_chosen(file, mapping, stated)
-    chosen = chosen_signals(measured, mapping)
-    signal = chosen[_ACCELERATION].signal
+    mapping = mapping.of(_QUANTITY)
+    mapping = with_options(
+        mapping, columns, time, rate, default=_ACCELERATION, known=_QUANTITY, stated=stated
+    )
+    if not mapping.columns:
+        there = headings(file, mapping.stated)
+        if not any(heading.name == _OWN_COLUMN for heading in there):
+            raise SignalError(
+                f'{file}: say which column is the acceleration, upwards, with --column COLUMN:UNIT; there '
+                f'are {listed(there)}'
+            )
+        mapping = mapping.only({_ACCELERATION: ColumnChoice(_OWN_COLUMN)})
+    mapping = with_options(mapping, scale=scale)
+    selection = select(file, mapping)
+    signal = selection.signals[_ACCELERATION]
     evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
     told = {
-        **told_source(measured),
+        **told_provenance(selection.provenance),
         'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
-        'columns': told_columns(chosen),
+        'columns': selection.columns,
     }
-    brought = Brought('recorded.file', partial(_write, signal), told, (*measured.notes, *signal.notes))
-    return brought, chosen[_ACCELERATION].factor
+    return Brought('recorded.file', partial(_write, signal), told, (*selection.notes, *signal.notes))
 
 
 def _write(signal: Signal, folder: Path) -> Path:
     """Write a pair of NPY files, values and times; return that of the values."""
     folder.mkdir(parents=True, exist_ok=True)
-    name = _plain(signal.name)
+    plain = ''.join(sign if sign.isalnum() else ' ' for sign in signal.name)
+    name = '_'.join(plain.split()) or _ACCELERATION
     np.save(folder / f'{name}_value.npy', signal.values)
     np.save(folder / f'{name}_t.npy', signal.times)
     return folder / f'{name}_value.npy'
-
-
-def _own_column(there: Sequence[Heading], file: str) -> ColumnChoice:
-    """Return the column of an acceleration that this project recorded; raises `MappingError`."""
-    if any(heading.name == _OWN_COLUMN for heading in there):
-        return ColumnChoice(_OWN_COLUMN)
-    raise MappingError(
-        f'{file}: say which column is the acceleration, upwards, with --column COLUMN:UNIT; there are '
-        + ', '.join(f'{one.name} [{one.unit}]' if one.unit else one.name for one in there)
-    )
-
-
-def _plain(name: str) -> str:
-    """Return a name for files: letters, digits and _ of a name in sentences."""
-    return '_'.join(''.join(sign if sign.isalnum() else ' ' for sign in name).split()) or _ACCELERATION

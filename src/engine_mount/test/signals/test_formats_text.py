@@ -12,9 +12,9 @@ from engine_mount.signals.formats import text as module
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.headers import name_and_unit
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.mapping import mapping_in_file
+from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.units.columns import read_chosen
-from engine_mount.signals.units.mapping import mapping_in_file
 
 ROWS = [[0.0, 1.25, -3.5e-3], [0.01, 2.5, 1200.0], [0.02, -0.125, 7.0], [0.03, 0.5, 8.75]]
 
@@ -275,9 +275,9 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, data):
 
 
 def test_a_mapping_file_states_what_a_table_leaves_open(tmp_path):
-    (tmp_path / 'drive.csv').write_text('0,1\n2,3\n')
+    (tmp_path / 'drive.csv').write_text('0,1\n2,3\n' * 5)
     (tmp_path / 'system.yaml').write_text(
         'decimal: ","\ntime: {rate: 100}\ncolumns: {displacement: {column: "0", unit: mm}}\n'
     )
-    measured = read_chosen(tmp_path / 'drive.csv', mapping_in_file(tmp_path / 'system.yaml'))
-    np.testing.assert_array_equal(measured.column('0').values, [0.1, 2.3])
+    found = select(tmp_path / 'drive.csv', mapping_in_file(tmp_path / 'system.yaml'))
+    assert found.signals['displacement'].values == pytest.approx(1e-3 * (0.1 + 2.2 * (np.arange(10) % 2)))

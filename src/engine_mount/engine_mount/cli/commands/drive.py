@@ -244,9 +244,7 @@ def drive(
         said = [f'{topic}.{name}' if topic else name for name in column or []]
         how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file}
         how['stated'] = stated(dbc, decimal, delimiter)
-        recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
-        brought = (recorded,)
-        parameters['mount_sim']['recorded.scale'] = factor
+        brought = (recorded_acceleration(str(local(file, console)), said, **how),)
     order = DriveOrder(
         scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
     )

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from engine_mount.signals.units.unit import is_unit as is_convertible
+from engine_mount.signals.units import is_unit as is_convertible
 
 _OTHERS = (
     'kg', 't', 'Nm', 'kNm', 'W', 'kW', 'J', 'Wb', 'kV', 'MHz', 'GPa', 'mrad', 'G', 'knots',

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine_mount.signals.local_cubic import interpolated
+from engine_mount.signals.even_grid import interpolated
 from engine_mount.signals.roads.profile import FloatArray, ProfileError
 
 LONGEST_GAP = 0.5  # m, chosen: 0.03 s at 60 km/h, less than half a period of the engine on its mounts

@@ -58,7 +58,7 @@ def inverted(signal: Signal, speed: Speed, vehicle: Vehicle | None = None) -> In
     """
     vehicle = vehicle or Vehicle()
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
-    acceleration = acceleration_at(even, 1.0, STEP_TIME)[:]
+    acceleration = acceleration_at(even, STEP_TIME)[:]
     # the road is as if repeated for ever: a pause keeps its end from its beginning
     pause = np.zeros(round(_PAUSE / STEP_TIME))
     height = road_of(np.concatenate([acceleration, pause]), STEP_TIME, vehicle)

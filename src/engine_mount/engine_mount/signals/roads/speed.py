@@ -11,7 +11,7 @@ import numpy as np
 from engine_mount.signals.formats.measured import Measured
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.roads.profile import FloatArray, ProfileError
-from engine_mount.signals.units.unit import is_unit, unit_of
+from engine_mount.signals.units import is_unit, unit_of
 
 SLOWEST, FASTEST = 0.5, 90.0
 """m/s, chosen: below, no wave within the body's and the engine's range is met; above, km/h are meant."""

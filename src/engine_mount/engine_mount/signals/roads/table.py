@@ -7,7 +7,7 @@ import numpy as np
 
 from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, listed
 from engine_mount.signals.roads.profile import FloatArray, ProfileError
-from engine_mount.signals.units.unit import is_unit, unit_of
+from engine_mount.signals.units import is_unit, unit_of
 
 _DISTANCES = (
     'distance', 'dist', 'x', 's', 'u', 'station', 'chainage', 'position', 'weg', 'strecke', 'wegstrecke',

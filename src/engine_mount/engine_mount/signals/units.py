@@ -9,7 +9,7 @@ not `ms`), but that of words of three letters or more is not (`Sec`). Factors ar
 import difflib
 from dataclasses import dataclass
 
-from engine_mount.signals.signal import FloatArray
+from engine_mount.signals.signal import FloatArray, SignalError
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2, exact by definition (3rd CGPM, 1901)."""
@@ -23,10 +23,6 @@ _TURN = 6.283185307179586  # rad
 _WORD = 3  # letters, chosen: shorter spellings differ by case alone (mS and ms, MN and mN)
 
 
-class UnitError(ValueError):
-    """A unit is not known, or not said, or not that of the values; the text says which it may be."""
-
-
 @dataclass(frozen=True)
 class Unit:
     """A unit: one of it is `factor` of the SI unit of its `dimension`, its zero lies at `zero` of that."""
@@ -37,41 +33,19 @@ class Unit:
     zero: float = 0.0
 
     def to_si(self, values: FloatArray) -> FloatArray:
-        """Return `values` (n,) of this unit in SI; the same array where nothing changes."""
-        if self.factor == 1.0 and self.zero == 0.0:
-            return values
+        """Return `values` (n,) of this unit in SI."""
         return values * self.factor + self.zero if self.zero else values * self.factor
 
 
-SI_UNITS = {
-    'length': 'm',
-    'velocity': 'm/s',
-    'acceleration': 'm/s^2',
-    'force': 'N',
-    'current': 'A',
-    'voltage': 'V',
-    'time': 's',
-    'temperature': 'K',
-    'pressure': 'Pa',
-    'inductance': 'H',
-    'flux density': 'T',
-    'resistance': 'Ohm',
-    'frequency': 'Hz',
-    'angle': 'rad',
-    'angular velocity': 'rad/s',
-    'ratio': '1',
-}
-"""The SI unit of each dimension."""
-
-_SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
+_UNITS_OF: dict[str, tuple[tuple[str, float], ...]] = {
     'length': (
-        ('m metre meter metres meters', 1.0),
         ('mm millimetre millimeter', 1e-3),
         ('um micron microns micrometre micrometer', 1e-6),
-        ('nm', 1e-9),
-        ('cm centimetre centimeter', 1e-2),
-        ('km', 1e3),
+        ('m metre meter metres meters', 1.0),
         ('in inch inches " zoll', _INCH),
+        ('cm centimetre centimeter', 1e-2),
+        ('nm', 1e-9),
+        ('km', 1e3),
         ('mil thou', 1e-3 * _INCH),
         ("ft foot feet '", _FOOT),
     ),
@@ -87,10 +61,10 @@ _SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
     ),
     'acceleration': (
         ('m/s^2 m/s2 m/s/s mps2 m/sec^2 m/sec2 m*s^-2 m*s-2 m*s^-2 ms^-2 ms-2', 1.0),
-        ('mm/s^2 mm/s2', 1e-3),
-        ('cm/s^2 cm/s2 gal', 1e-2),
         ('g g_n gn g0 g_0', STANDARD_GRAVITY),
         ('mg milli-g', 1e-3 * STANDARD_GRAVITY),
+        ('mm/s^2 mm/s2', 1e-3),
+        ('cm/s^2 cm/s2 gal', 1e-2),
         ('ug', 1e-6 * STANDARD_GRAVITY),
         ('ft/s^2 ft/s2', _FOOT),
         ('in/s^2 in/s2', _INCH),
@@ -115,7 +89,7 @@ _SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
         ('min minute minutes minuten', 60.0),
         ('h hour hours', 3600.0),
     ),
-    'temperature': (('K kelvin', 1.0),),
+    'temperature': (('degC celsius C grdC gradC', 1.0), ('K kelvin', 1.0), ('degF fahrenheit F', 5.0 / 9.0)),
     'pressure': (
         ('Pa pascal', 1.0),
         ('hPa mbar', 100.0),
@@ -125,7 +99,9 @@ _SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
         ('psi lbf/in^2', _POUND_FORCE / (_INCH * _INCH)),
         ('ksi', 1e3 * _POUND_FORCE / (_INCH * _INCH)),
     ),
+    'current/time': (('A/s', 1.0), ('A/ms', 1e3), ('mA/s', 1e-3), ('mA/ms', 1.0)),
     'inductance': (('H henry', 1.0), ('mH', 1e-3), ('uH', 1e-6), ('nH', 1e-9)),
+    'flux density/time': (('T/s', 1.0), ('T/ms', 1e3), ('mT/s', 1e-3), ('mT/ms', 1.0)),
     'flux density': (('T tesla Vs/m^2', 1.0), ('mT', 1e-3), ('uT', 1e-6)),
     'resistance': (('Ohm Ω', 1.0), ('mOhm mΩ', 1e-3), ('kOhm kΩ', 1e3)),
     'frequency': (('Hz 1/s', 1.0), ('kHz', 1e3)),
@@ -137,10 +113,7 @@ _SPELLINGS: dict[str, tuple[tuple[str, float], ...]] = {
     ),
     'ratio': (('1 -', 1.0), ('%', 1e-2)),
 }
-_TEMPERATURES = (
-    (Unit('degC', 'temperature', 1.0, ZERO_CELSIUS), 'degC celsius C grdC gradC'),
-    (Unit('degF', 'temperature', 5.0 / 9.0, ZERO_CELSIUS - 32.0 * 5.0 / 9.0), 'degF fahrenheit F'),
-)
+_ZEROS = {'degC': ZERO_CELSIUS, 'degF': ZERO_CELSIUS - 32.0 * 5.0 / 9.0}  # K
 _SIGNS = str.maketrans({'µ': 'u', 'μ': 'u', '²': '^2', '·': '*', '⋅': '*', '°': 'deg', '″': '"', 'Ω': 'Ω'})
 _TRAPS = {
     'G': 'G is gauss or gravity; for gravity write g, for gauss give the values in T',
@@ -150,38 +123,57 @@ _TRAPS = {
     'M': 'M is mega alone; for metres write m, for minutes min',
     'KN': 'KN is no unit; for kilonewtons write kN',
 }
+_UNITS = {
+    spelling: Unit(spellings.split()[0], dimension, factor, _ZEROS.get(spellings.split()[0], 0.0))
+    for dimension, rows in _UNITS_OF.items()
+    for spellings, factor in rows
+    for spelling in spellings.split()
+}
+_WORDS = {
+    name: unit
+    for name, unit in _UNITS.items()
+    if len(name) >= _WORD and name.islower() and name.isalpha() and name[1:] not in _UNITS
+}
+"""Those that mean the same in capitals: not `msec` nor `mbar`, of which M would be mega."""
 
 
-def unit_of(text: str) -> Unit:
-    """Return the unit that `text` spells, such as `m/s²`, `[mm]` or `lbf`; raises `UnitError`."""
-    plain = _plain(text)
+def unit_of(text: str, dimension: str = '') -> Unit:
+    """Return the unit that `text` spells, such as `m/s²`, `[mm]` or `lbf`; raises `SignalError`.
+
+    Of a known `dimension` small letters will do, as headers write them (`_mh`, `_n`, `a_per_s`), unless two
+    units differ by capitals alone.
+    """
+    plain = text.strip().strip('[](){}').replace('**', '^').replace(' ', '').translate(_SIGNS)
     unit = _UNITS.get(plain) or _WORDS.get(plain.lower())
-    if unit is not None:
-        return unit
-    raise UnitError(f'unit {text!r} is not known: {_TRAPS.get(plain) or _nearest(plain)}')
+    if dimension and (unit is None or unit.dimension != dimension):
+        small = plain.replace('_per_', '/')
+        fitting = {
+            one for name, one in _UNITS.items() if one.dimension == dimension and name.lower() == small
+        }
+        if len(fitting) == 1 and not min(one.symbol for one in fitting).startswith('M'):
+            return fitting.pop()
+    if unit is None:
+        raise SignalError(f'unit {text!r} is not known: {_TRAPS.get(plain) or _nearest(plain)}')
+    return unit
 
 
-def is_unit(text: str) -> bool:
-    """Return whether `text` spells a unit that is known here."""
-    plain = _plain(text)
-    return plain in _UNITS or plain.lower() in _WORDS
+def is_unit(text: str, dimension: str = '') -> bool:
+    """Return whether `text` spells a known unit, of `dimension` where one is named."""
+    try:
+        unit = unit_of(text, dimension)
+    except SignalError:
+        return False
+    return dimension in ('', unit.dimension)
 
 
 def si_unit(dimension: str) -> Unit:
     """Return the SI unit of a dimension."""
-    return _UNITS[SI_UNITS[dimension]]
+    return next(unit for unit in units_of(dimension) if unit.factor == 1.0 and unit.zero == 0.0)
 
 
 def units_of(dimension: str) -> tuple[Unit, ...]:
-    """Return the units of a dimension, the SI unit first."""
-    found = dict.fromkeys(unit for unit in _UNITS.values() if unit.dimension == dimension)
-    return tuple(sorted(found, key=lambda unit: unit.symbol != SI_UNITS[dimension]))
-
-
-def _plain(text: str) -> str:
-    """Return a spelling without brackets and blanks, and with the characters of the table."""
-    bare = text.strip().strip('[](){}').replace('**', '^').replace(' ', '')
-    return bare.translate(_SIGNS)
+    """Return the units of a dimension, the likeliest at an engine mount first."""
+    return tuple(dict.fromkeys(unit for unit in _UNITS.values() if unit.dimension == dimension))
 
 
 def _nearest(plain: str) -> str:
@@ -190,23 +182,3 @@ def _nearest(plain: str) -> str:
     if near:
         return f'is it {" or ".join(near)}?'
     return f'known are {", ".join(dict.fromkeys(unit.symbol for unit in _UNITS.values()))}'
-
-
-def _table() -> dict[str, Unit]:
-    table = {}
-    for dimension, rows in _SPELLINGS.items():
-        for spellings, factor in rows:
-            names = spellings.split()
-            table.update(dict.fromkeys(names, Unit(names[0], dimension, factor)))
-    for unit, spellings in _TEMPERATURES:
-        table.update(dict.fromkeys(spellings.split(), unit))
-    return table
-
-
-_UNITS = _table()
-_WORDS = {
-    name: unit
-    for name, unit in _UNITS.items()
-    if len(name) >= _WORD and name.islower() and name.isalpha() and name[1:] not in _UNITS
-}
-"""Those that mean the same in capitals: not `msec` nor `mbar`, of which M would be mega."""

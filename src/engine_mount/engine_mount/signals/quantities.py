@@ -2,23 +2,27 @@
 
 from dataclasses import dataclass
 
-from engine_mount.signals.units.unit import SI_UNITS, Unit, UnitError, si_unit
+from engine_mount.signals.signal import SignalError
+from engine_mount.signals.units import Unit, si_unit
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One quantity: its name, dimension, and between which bounds its values vary (SI, peak to peak).
 
-    The bounds are chosen wide: they tell a wrong unit, never a rough road from a smooth one. `titles` are
-    words by which columns of others name it.
+    The bounds are chosen wide: they tell a wrong unit, never a rough road from a smooth one. With `by_size`
+    they hold for the largest value. `titles` are words by which other systems name such a column; `mapped` is
+    its name in a mapping file where that is another one.
     """
 
     name: str
     dimension: str
     sentence: str
-    least: float
-    most: float
+    least: float = 0.0
+    most: float = float('inf')
     titles: tuple[str, ...] = ()
+    by_size: bool = False
+    mapped: str = ''
 
     @property
     def unit(self) -> Unit:
@@ -26,7 +30,15 @@ class Quantity:
         return si_unit(self.dimension)
 
 
-QUANTITIES: tuple[Quantity, ...] = (
+Quantities = dict[str, Quantity]
+
+
+def by_name(*quantities: Quantity) -> Quantities:
+    """Return quantities by their names."""
+    return {quantity.name: quantity for quantity in quantities}
+
+
+QUANTITIES = by_name(
     Quantity(
         'displacement', 'length', 'displacement of the mount, engine minus chassis', 20e-6, 0.1,
         ('weg', 'federweg', 'travel', 'stroke', 'disp', 'mount'),
@@ -48,46 +60,23 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity('inductance', 'inductance', 'inductance of the coil', 1e-6, 1.0, ('induktivitaet',)),
     Quantity('air_gap', 'length', 'air gap of the actuator', 1e-6, 5e-3, ('gap', 'luftspalt')),
     Quantity('flux_density', 'flux density', 'flux density in the gap', 1e-4, 3.0),
-    Quantity('temperature', 'temperature', 'temperature of the coil', 0.1, 300.0, ('temp', 'temperatur')),
+    Quantity(
+        'temperature', 'temperature', 'temperature of the coil', 200.0, 600.0, ('temp', 'temperatur'), True
+    ),
     Quantity('pressure', 'pressure', 'pressure', 10.0, 1e9, ('druck',)),
     Quantity('speed', 'velocity', 'speed of the vehicle', 0.1, 100.0, ('geschwindigkeit', 'v_vehicle')),
 )  # fmt: skip
-_BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+"""Quantities that every command knows; those of racks, rigs and roads stand where these are read."""
 
 
-def quantity(name: str) -> Quantity:
-    """Return the quantity `name`; raises `UnitError` with those that are known."""
-    if name not in _BY_NAME:
-        raise UnitError(f'{name!r} is no quantity; known are {names()}')
-    return _BY_NAME[name]
+def quantity(name: str, known: Quantities = QUANTITIES) -> Quantity:
+    """Return the quantity `name`; raises `SignalError` with those that are known."""
+    if name not in known:
+        raise SignalError(f'{name!r} is no quantity; known are {", ".join(known)}')
+    return known[name]
 
 
-def names() -> str:
-    """Return the names of all quantities, for sentences."""
-    return ', '.join(_BY_NAME)
-
-
-def is_quantity(name: str) -> bool:
-    """Return whether `name` is a quantity that is known here."""
-    return name in _BY_NAME
-
-
-def quantity_of(unit: Unit) -> Quantity:
-    """Return the first quantity that is measured in `unit`, or raise `UnitError`."""
-    found = next((one for one in QUANTITIES if one.dimension == unit.dimension), None)
-    if found is None:
-        raise UnitError(
-            f'a column in {unit.symbol} can be no quantity by its unit alone; say which: QUANTITY=COLUMN:UNIT'
-        )
-    return found
-
-
-def titled(title: str) -> Quantity | None:
+def titled(title: str, known: Quantities = QUANTITIES) -> Quantity | None:
     """Return the quantity that a column of this title holds, None where its words tell none."""
     word = title.strip().lower().replace(' ', '_')
-    return next((one for one in QUANTITIES if word == one.name or word in one.titles), None)
-
-
-def other(name: str, unit: Unit) -> Quantity:
-    """Return a quantity of the user's own: any size is taken."""
-    return Quantity(name, unit.dimension, f'{name}, in {SI_UNITS[unit.dimension]}', 0.0, float('inf'))
+    return next((one for one in known.values() if word == one.name or word in one.titles), None)
