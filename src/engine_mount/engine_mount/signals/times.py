@@ -70,9 +70,12 @@ def _group(heading: Heading) -> str:
 
 
 def _time_column(measured: Measured, column: MeasuredColumn) -> MeasuredColumn | None:
-    """Return the column of times by its title, in the same group first, else the first if it rises."""
+    """Return the column of times by its title, in the nearest group first, else the first if it rises."""
     others = [one for one in measured.columns.values() if one is not column]
-    titled = sorted(filter(is_time, others), key=lambda one: _group(one) != _group(column))
+    titled = sorted(
+        filter(is_time, others),
+        key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
+    )
     rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
     return next(iter([*titled, *rising]), None)
 

@@ -1,25 +1,20 @@
-"""What a cell of a text table may be: a number, a date, nothing, or text."""
+"""What a cell of a text can be: a number, a date, nothing, or text."""
 
 import csv
 import re
 from datetime import UTC, datetime
-from typing import Literal
 
 BLANK = 'blank'
 """Any number of blanks between cells."""
 ALONE = '\x1f'
 """Between the cells of a table of one column: a sign that no text holds."""
-Kind = Literal['number', 'date', 'missing', 'text']
-Decimal = Literal['.', ',']
-COMMENTS = ('#', '%', '//')
-
 _WORDS = (
     'nan',
+    '-nan',
     'na',
     'n/a',
     'null',
     'none',
-    '-nan',
     '#n/a',
     '#nv',
     '#na',
@@ -31,14 +26,15 @@ _WORDS = (
 )
 MISSING = (
     '',
-    *dict.fromkeys(form(word) for word in _WORDS for form in (str.lower, str.upper, str.title)),
     'NaN',
+    *dict.fromkeys(form(word) for word in _WORDS for form in (str.lower, str.upper, str.title)),
 )
 """How a missing value is written."""
 _MISSING = frozenset(MISSING)
+_NUMBER = r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?)'
 _NUMBERS = {
-    '.': re.compile(r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?)', re.IGNORECASE),
-    ',': re.compile(r'[+-]?(?:(?:\d+|\d*,\d+)(?:[eE][+-]?\d+)?|inf(?:inity)?)', re.IGNORECASE),
+    '.': re.compile(_NUMBER, re.IGNORECASE),
+    ',': re.compile(_NUMBER.replace(r'\.?\d*', r'(?:,\d+)?').replace(r'\.', ','), re.IGNORECASE),
 }
 _DATE = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?(?:Z|[+-]\d\d:?\d\d)?')  # ISO 8601
 _FRACTION = re.compile(r'\.(\d+)')
@@ -51,8 +47,8 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def kind_of(cell: str, decimal: Decimal) -> Kind:
-    """Return what a cell holds with that decimal sign."""
+def kind_of(cell: str, decimal: str) -> str:
+    """Return `number`, `date`, `missing` or `text` for a cell with that decimal sign."""
     if cell in _MISSING:
         return 'missing'
     if _NUMBERS[decimal].fullmatch(cell):
@@ -60,7 +56,7 @@ def kind_of(cell: str, decimal: Decimal) -> Kind:
     return 'date' if _DATE.fullmatch(cell) else 'text'
 
 
-def number_in(cell: str, decimal: Decimal) -> float:
+def number_in(cell: str, decimal: str) -> float:
     """Return the number in a cell, NaN where none is written; raises `ValueError` for anything else."""
     if cell in _MISSING:
         return float('nan')
@@ -77,8 +73,3 @@ def date_in(cell: str) -> int:
     moment = datetime.fromisoformat(_FRACTION.sub('', cell))
     seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     return round(seconds) * 1_000_000_000 + (int(fraction[1].ljust(9, '0')) if fraction else 0)
-
-
-def is_comment(line: str) -> bool:
-    """Return whether a line is a comment."""
-    return line.lstrip().startswith(COMMENTS)
