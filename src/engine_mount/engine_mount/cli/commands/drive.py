@@ -180,7 +180,7 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import DriveOrder, record_drive, recorder_parameters
     from engine_mount.drives.recorder_options import recorder_options
-    from engine_mount.reports.drive.telling import tell_drive, tell_snapshots
+    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.options import settings_of_options, with_sample_rate
     from mount_bringup.graph.domain import chosen_domain
@@ -254,9 +254,9 @@ def drive(
     folder, run, complaints = record_drive(order, screen)
     recorder = recorder_parameters(order)
     if recorder.snapshot:
-        told = tell_snapshots(folder, recorder, run, screen)
+        told = evaluate_snapshots(folder, recorder, run, screen)
     else:
-        told = tell_drive(folder, parameters, run, screen, report=report)
+        told = evaluate_drive(folder, parameters, run, screen, report=report)
     complaints += told.complaints
     if json_file is not None:
         write_json(told.figures, json_file)
