@@ -32,7 +32,7 @@ from engine_mount.cli.commands.road_arguments import (
     given_without_road,
     height_column,
 )
-from engine_mount.cli.completion.values import faults, listed, named
+from engine_mount.cli.completion import faults, listed, named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import note, terminal
 from mount_bringup.graph.nodes import RESTART_LIMIT

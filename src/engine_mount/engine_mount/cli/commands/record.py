@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 
 from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
-from engine_mount.cli.completion.values import named
+from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on

@@ -20,7 +20,7 @@ from engine_mount.cli.commands.options import (
     stated,
 )
 from engine_mount.cli.commands.other_than_recorded import OtherThanRecorded, changes_of
-from engine_mount.cli.completion.values import listed, named
+from engine_mount.cli.completion import listed, named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import terminal
 
