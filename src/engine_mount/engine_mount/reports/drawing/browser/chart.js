@@ -159,7 +159,8 @@ function paintPanel(chart, panel, width, ink) {
   paintFrame(paint, chart, told, area, last, width, ink);
   paint.save();
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
-  for (const line of lines) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, chart.shown, area);
+  const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
+  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, chart.shown, area);
   paintLevels(paint, told.levels, area, ink);
   if (chart.spike !== null) { paint.strokeStyle = ink('--ink'); stroke(paint, Math.round(x(chart.spike)) + 0.5, 0, Math.round(x(chart.spike)) + 0.5, bottom); }
   if (chart.dragged) {
@@ -200,7 +201,7 @@ function paintFrame(paint, chart, told, { x, right, bottom, low, high }, last, w
   paint.textBaseline = 'top';
   for (const tick of ticks) {
     const at = Math.round(x(tick)) + 0.5;
-    if (at < LEFT || at > right + 1) continue;
+    if (at < LEFT || at > right + 1 || (chart.live && tick < 0)) continue;
     stroke(paint, at, TOP, at, bottom);
     paint.textAlign = at > right - 8 ? 'right' : 'center'; // whole at the edge of the page too
     if (last) paint.fillText(Number(tick.toPrecision(8)), at > right - 8 ? right + RIGHT : at, bottom + 4);
