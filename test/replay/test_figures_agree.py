@@ -13,7 +13,7 @@ import engine_mount
 from engine_mount.cli.command import app
 from engine_mount.drives import drive as driving
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BENCH = (
@@ -74,9 +74,7 @@ def spoiled(folder: Path) -> None:
 
 
 def mark(words: str) -> bytes:
-    from std_msgs.msg import String
-
-    return serialised(String(data=f'{{kind: fault, text: {words}}}'))
+    return string_message(f'{{kind: fault, text: {words}}}')
 
 
 def told(folder: Path, *options: str) -> Told:

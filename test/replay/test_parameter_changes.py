@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from std_msgs.msg import String
 
 from engine_mount.drives.loop import recording as core_recording
 from engine_mount.drives.loop import run as core_run
@@ -12,7 +11,7 @@ from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, _told, repla
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT
 
@@ -45,7 +44,7 @@ def changed_drive(tmp_path_factory):
     def run_core_and_tell(parameters, write, *arguments):
         outcome = run_core(parameters, write, *arguments)
         for stamp, text in told:
-            write(EVENT, serialised(String(data=text)), stamp)
+            write(EVENT, string_message(text), stamp)
         return outcome
 
     patch.setattr(core_run, '_take_many', take_many_and_change)

@@ -28,10 +28,9 @@ from mount_init.node import MountInit
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import from_bytes, to_message
-from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.sensors import temperature_layout
+from mount_ros.messages.cdr import temperature
+from mount_ros.messages.force_table import from_bytes, table_message
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout, stamp_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.process import ros_context, transition
@@ -133,7 +132,7 @@ class _Player:
             path.start()
             _match(path, node)
             send_gap(gap_layout.pack(stamp, [gap.numbers[name] for name in gap_layout.names]))
-            send_table(serialised(to_message(stamp, table)))
+            send_table(table_message(stamp, table))
             send(layout.pack(stamp, (float(run.displacement[0]),)))
             transition(node.trigger_activate, node, 'mount_control')
             dialogue.begin()
@@ -231,7 +230,7 @@ def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) ->
 
     Those from before the ramp go with its first sample, the newest of them only: a subscription keeps few.
     """
-    layout = temperature_layout()
+    layout = OneNumberLayout(temperature)
     first = int(ramp.stamps[0])
     earlier = [entry for entry in ramp.temperatures if entry[0] <= first]
     due = deque([*earlier[-1:], *(entry for entry in ramp.temperatures if entry[0] > first)])

@@ -12,8 +12,7 @@ from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_message, session_text
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import Topic
 
@@ -68,8 +67,8 @@ def _gaps(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
         # One that is older than what is recorded stands at the head, where readers look for it.
         time = max(stamp + given.log_shift, first - 1)
         yield time, 2, topics.AIR_GAP, layout.pack(stamp, [gap.numbers[name] for name in layout.names])
-        table = to_message(stamp, np.stack([gap.table.current, gap.table.normal_force]))
-        yield time, 3, topics.CURRENT_FORCE_TABLE, serialised(table)
+        table = table_message(stamp, np.stack([gap.table.current, gap.table.normal_force]))
+        yield time, 3, topics.CURRENT_FORCE_TABLE, table
 
 
 def _answers(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:

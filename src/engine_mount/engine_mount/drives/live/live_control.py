@@ -15,8 +15,7 @@ from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.process import transition
 
@@ -53,7 +52,7 @@ class LiveControl:
             self._wait_for_matches()
             self._send_gap(layout.pack(stamp, [gap.numbers[name] for name in layout.names]))
             table = np.stack([gap.table.current, gap.table.normal_force])
-            self._send_table(serialised(to_message(stamp, table)))
+            self._send_table(table_message(stamp, table))
             self._send(sample)
             transition(self._node.trigger_activate, self._node, 'mount_control')
 

@@ -4,17 +4,15 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 
 from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_init.initialisation import OFF, InitialisationResult
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.cdr import accelerometer, temperature, wrench
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
-from mount_ros.messages.sensors import level_imu, temperature_layout
 from mount_ros.topics import Topic
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.plant import TRUTH
@@ -63,12 +61,12 @@ class CoreMessages:
         self._write_columns = write_columns or self._one_by_one
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
-        self._temperature = temperature_layout()
+        self._temperature = OneNumberLayout(temperature)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
-        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._acceleration = OneNumberLayout(accelerometer)
+        self._force = OneNumberLayout(wrench)
 
     def write_samples(self, samples: Samples) -> None:
         """Write all samples and empty the block."""
@@ -86,7 +84,7 @@ class CoreMessages:
         """Write what an initialisation found."""
         numbers = [getattr(result, name) for name in self._air_gap.names]
         self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
-        table = serialised(to_message(stamp, result.table))
+        table = table_message(stamp, result.table)
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
 
     def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
