@@ -1,6 +1,5 @@
 """The messages of a running graph, taken best effort: a viewer that lags must not hold up the loop."""
 
-from collections.abc import Mapping
 from functools import partial
 
 import rclpy
@@ -10,7 +9,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
-from engine_mount.view.feed.feed import Fail, FeedError, Message, Receive
+from engine_mount.view.feed import Fail, FeedError, Message, Receive
 from mount_bringup.graph.nodes import RECORDER
 from mount_recorder.collector import Collector
 from mount_ros.environment import loopback_refusal, prepare_environment
@@ -24,8 +23,6 @@ _PERIOD = 0.02  # s, chosen: less than a picture of the page
 class RunningGraph:
     """The graph of one mount in a ROS domain and namespace."""
 
-    live = True
-
     def __init__(self, domain: int, namespace: str = ''):
         """Raises `FeedError` where no process can reach another."""
         if refusal := loopback_refusal():
@@ -37,21 +34,17 @@ class RunningGraph:
             'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
         )
         self._mark = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
-        self._collector = Collector(
-            self._node, period=_PERIOD, on_failure=lambda sentence: self._on_failure(sentence)
-        )
-        self.topics: Mapping[str, Topic] = {
-            self._node.resolve_topic_name(topic.name): topic for topic in TOPICS
-        }
+        self._collector: Collector | None = None
+        self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
         self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
         self._stopped = False
 
     def start(self, receive: Receive, on_failure: Fail) -> None:
         """Begin to take messages."""
-        self._on_failure = on_failure
+        self._collector = Collector(self._node, period=_PERIOD, on_failure=on_failure)
         for topic in TOPICS:
-            qos = control_qos(topic, lockstep=False)
-            self._collector.collect(topic, partial(_hand_over, receive, topic), qos)
+            hand_over = partial(_hand_over, receive, topic)
+            self._collector.collect(topic, hand_over, control_qos(topic, lockstep=False))
         self._collector.start()
 
     def stop(self) -> None:
@@ -59,7 +52,8 @@ class RunningGraph:
         if self._stopped:
             return
         self._stopped = True
-        self._collector.stop()
+        if self._collector is not None:
+            self._collector.stop()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
