@@ -17,9 +17,9 @@ from engine_mount.drives.core import Replayed
 from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.drives.replay import LOCKSTEP, ReplayOutcome
 from engine_mount.recordings.difference import Moment
+from engine_mount.recordings.events import Switching
 from engine_mount.recordings.screen import Screen, Table
 from engine_mount.recordings.session import version_differences, versions_sentence
-from engine_mount.recordings.switching import Switching
 from mount_recorder.versions import versions
 
 _SHOWN = 8  # switchings in the printed summary

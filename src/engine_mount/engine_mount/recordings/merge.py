@@ -3,14 +3,15 @@
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag_copy import BagCopy, Messages, joined, read_messages
+from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
 from engine_mount.recordings.metadata import TopicInformation, with_step
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import session_differences
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
@@ -47,26 +48,33 @@ def merge(
     """
     if not recordings:
         raise MergeError('nothing to merge; name the recordings')
-    topics = _topics(recordings)
+    _check_types(recordings)
     if not different_sessions:
         _refuse_different_sessions(recordings)
-    parts, losses, repeated = [], [], 0
+    known = [list(recording.warnings) for recording in recordings]
+    parts, repeated = [], 0
     read: list[dict[str, int]] = [{} for _ in recordings]
-    for topic in topics.values():
+    for name in dict.fromkeys(name for recording in recordings for name in recording):
         found = []
         for recording, counts in zip(recordings, read, strict=True):
-            if topic.name in recording.topics:
-                messages, damages = read_messages(recording, topic.name)
-                counts[topic.name] = len(messages)
+            messages = read_messages(recording, name) if name in recording.topics else None
+            if messages is not None:
+                counts[name] = len(messages)
                 found.append(messages)
-                losses += damages
-        parts.append(_united(topic, found))
-        repeated += sum(map(len, found)) - len(parts[-1])
+        if found:
+            parts.append(_united(found))
+            repeated += sum(map(len, found)) - len(parts[-1])
     step = {
         'did': 'merge',
         'recordings': [recording.short_name for recording in recordings],
         'made': time_text(),
     }
+    losses = [
+        warning
+        for recording, before in zip(recordings, known, strict=True)
+        for warning in recording.warnings
+        if warning not in before
+    ]
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete(recordings, read, with_step([recording.information for recording in recordings], step))
@@ -74,7 +82,7 @@ def merge(
     return Merge(Path(out), bag.added, repeated, tuple(_holes(recordings)), tuple(losses))
 
 
-def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
+def _check_types(recordings: Sequence[Recording]) -> None:
     topics: dict[str, TopicInformation] = {}
     for recording in recordings:
         for name, topic in recording.topics.items():
@@ -86,9 +94,6 @@ def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
                 )
             if known.type_hash and topic.type_hash and known.type_hash != topic.type_hash:
                 raise MergeError(f'{name}: {known.type} has another definition in {recording.path}')
-            if topic.offered_qos and not known.offered_qos:
-                topics[name] = replace(known, offered_qos=topic.offered_qos)
-    return topics
 
 
 def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
@@ -118,25 +123,28 @@ def _sessions(recording: Recording) -> dict[bytes, str]:
     }
 
 
-def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
+def _united(parts: Sequence[Messages]) -> Messages:
     """Return the messages of all parts without those that an earlier part has as well.
 
     Each part may repeat what the others have as often as the one that has it most often.
     """
     times, counts = np.unique(
-        np.concatenate([np.unique(part.log_times) for part in parts]), return_counts=True
+        np.concatenate([np.unique(part.heads['log_time']) for part in parts]), return_counts=True
     )
     most, kept = Counter[tuple[int, int, bytes]](), []
     for part in parts:
         own = Counter[tuple[int, int, bytes]]()
         is_new = np.ones(len(part), bool)
-        for place in np.flatnonzero(np.isin(part.log_times, times[counts > 1])).tolist():
-            key = int(part.log_times[place]), int(part.publish_times[place]), part.payloads[place]
+        log_times, sent = part.heads['log_time'], part.heads['publish_time']
+        for place in np.flatnonzero(np.isin(log_times, times[counts > 1])).tolist():
+            key = int(log_times[place]), int(sent[place]), part.payloads[place]
             own[key] += 1
             is_new[place] = own[key] > most[key]
         most |= own
-        kept.append(part.chosen(np.flatnonzero(is_new)))
-    return joined(topic, kept)
+        kept.append(part.at(np.flatnonzero(is_new)))
+    payloads = Payloads([part.payloads.messages for part in kept if len(part)])
+    united = Messages(parts[0].topic, np.concatenate([part.heads for part in kept]), payloads)
+    return united.at(np.argsort(united.heads['log_time'], kind='stable'))
 
 
 def _holes(recordings: Sequence[Recording]) -> list[str]:

@@ -1,6 +1,6 @@
-"""Which files a recording consists of, and the topics in these.
+"""The files of a recording, and the topics in these.
 
-What the files declare counts more than the description beside them: there it is under checksums.
+The declarations in the files count more than the description beside them: there they are under checksums.
 """
 
 import re
@@ -9,8 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from engine_mount.recordings.definitions import Definition, definition_of
+from rosbags.convert.converter import ConverterError, convert
+from rosbags.typesys import Stores, get_typestore
+
+from engine_mount.recordings.layout import Definition, definition_of
 from engine_mount.recordings.mcap_file import McapFile
+from engine_mount.recordings.mcap_records import StorageError, StoredTopic
 from engine_mount.recordings.metadata import (
     BagInformation,
     MetadataError,
@@ -19,14 +23,11 @@ from engine_mount.recordings.metadata import (
     readable_qos,
     units_in,
 )
-from engine_mount.recordings.sqlite_file import SqliteFile
-from engine_mount.recordings.stored import StorageError, StoredFile, StoredTopic
-from engine_mount.recordings.unpacking import COMPRESSED_SUFFIXES, unpack
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_recorder.bag_writer import PIECE_RECORD
 from mount_recorder.metadata import METADATA_NAME
 
-_PIECE = re.compile(r'([^.].*?)(?:_(\d+))?\.(mcap|db3)(?:\.zstd|\.zst)?')
+_PIECE = re.compile(r'([^.].*?)(?:_(\d+))?\.(mcap|db3)')
 
 
 @dataclass(frozen=True)
@@ -48,15 +49,19 @@ def find_pieces(path: Path) -> Pieces:
     kind = 'mcap' if any(matches[file][3] == 'mcap' for file in numbers) else 'db3'
     present = [file for file in numbers if matches[file][3] == kind]
     present.sort(key=lambda file: (numbers[file], file.name))
-    information, what = _description(path)
+    information, obstacle = _description(path)
     if information is None:
         if not present:
             inner = path / 'recording'
             hint = f'; the recording of this run is {inner}' if inner.is_dir() else ''
             raise StorageError(f'{path} holds no MCAP file{hint}')
         complete = [numbers[file] for file in present] == list(range(len(present)))
-        return Pieces(tuple(present), None, (f'{what}; topics and times are those in the files',), complete)
-    if information.storage not in ('mcap', 'sqlite3'):
+        return Pieces(
+            tuple(present), None, (f'{obstacle}; topics and times are those in the files',), complete
+        )
+    if information.storage == 'sqlite3' or information.compression_mode.lower() not in ('', 'none'):
+        return Pieces((path,), information)
+    if information.storage != 'mcap':
         raise StorageError(f'{path} is stored as {information.storage}; convert it to mcap')
     listed = [path / Path(file).name for file in information.files]
     missing = [file.name for file in listed if not file.is_file()]
@@ -77,27 +82,36 @@ def find_pieces(path: Path) -> Pieces:
     return Pieces(tuple(here), information, tuple(warnings), not missing)
 
 
-def open_piece(path: Path) -> StoredFile:
-    """Open one file of a recording, unpacked where it is packed as a whole; raises `StorageError`."""
-    if path.suffix not in COMPRESSED_SUFFIXES:
-        return SqliteFile(path) if path.suffix == '.db3' else McapFile(path)
-    with tempfile.TemporaryDirectory(prefix='engine_mount_') as folder:
-        copy = Path(folder, path.stem)
+def open_piece(path: Path) -> McapFile:
+    """Open one file of a recording; raises `StorageError`.
+
+    What is no MCAP file of plain messages is read from a copy: files and folders of bags in sqlite3 and of
+    compressed ones.
+    """
+    if path.suffix in ('.zstd', '.zst'):
+        raise StorageError(f'{path} is compressed as a whole; unpack it by zstd -d first')
+    if path.suffix != '.db3' and not path.is_dir():
+        return McapFile(path)
+    folder = path if path.is_dir() else path.parent
+    logs = [log.name for log in folder.glob('*.db3-*') if log.stat().st_size]
+    if logs:
+        raise StorageError(
+            f'{path} was not closed by its writer, messages stand in {logs[0]}: close a copy by '
+            f"sqlite3 {logs[0].rpartition('-')[0]} 'PRAGMA journal_mode=DELETE' and read that"
+        )
+    with tempfile.TemporaryDirectory(prefix='engine_mount_') as copy:
+        store = get_typestore(Stores.ROS2_JAZZY)
         try:
-            unpack(path, copy)
-            file = open_piece(copy)  # it stays open
-        except StorageError as error:
-            raise StorageError(str(error).replace(str(copy), str(path))) from None
-        except OSError as error:
-            raise StorageError(
-                f'{path} cannot be unpacked: {error.strerror}; make room in {tempfile.gettempdir()}'
-            ) from None
+            convert([path], Path(copy, 'bag'), 'mcap', 9, None, 'file', store, None, (), (), (), ())
+        except ConverterError as error:
+            raise StorageError(f'{path} cannot be converted to MCAP: {error}') from None
+        file = McapFile(Path(copy, 'bag', 'bag.mcap'))  # it stays open
     file.path = path
     return file
 
 
 def _description(folder: Path) -> tuple[BagInformation | None, str]:
-    """Return the description of a recording, or None and what is wrong with it."""
+    """Return the description of a recording, or None and the obstacle."""
     if not (folder / METADATA_NAME).exists():
         return None, f'{METADATA_NAME} is missing'
     try:
@@ -114,11 +128,8 @@ class Declared:
     stored: int = 0
     topic: StoredTopic | None = None
     other_types: set[str] = field(default_factory=set)
-    places: list[tuple[StoredFile, int]] = field(default_factory=list)
-
-    def numbers_in(self, file: StoredFile) -> list[int]:
-        """Return the topic's numbers in one of the files."""
-        return [number for owner, number in self.places if owner is file]
+    places: list[tuple[McapFile, int]] = field(default_factory=list)
+    """The files that hold it, and its number in each."""
 
     def definition(self) -> tuple[Definition | None, str]:
         """Return the definition of the messages, and a sentence where that of the recording is no use."""
@@ -130,12 +141,12 @@ class Declared:
         return definition_of(topic.type, self.topic.definition, self.topic.definition_encoding)
 
 
-def declared_topics(files: Sequence[StoredFile], information: BagInformation | None) -> dict[str, Declared]:
+def declared_topics(files: Sequence[McapFile], information: BagInformation | None) -> dict[str, Declared]:
     """Return the topics by name, those of the description first and in its order."""
     described = information.topics if information else ()
     topics = {topic.name: Declared(replace(topic, message_count=0)) for topic in described}
-    for file, repeated in zip(files, repeated_topics(files), strict=True):
-        unseen = set(repeated)
+    for file in files:
+        unseen = set(repeated_topics(file)) if file is not files[0] else set()
         for number, topic in file.topics.items():
             count = file.message_counts.get(number, 0)
             repetition = int(topic.name in unseen and count > 0)
@@ -154,12 +165,8 @@ def declared_topics(files: Sequence[StoredFile], information: BagInformation | N
     return topics
 
 
-def repeated_topics(files: Sequence[StoredFile]) -> list[frozenset[str]]:
-    """Return for each file the topics that it repeats from the files before it, which are here."""
-    return [_repeated_in(file) if place else frozenset() for place, file in enumerate(files)]
-
-
-def _repeated_in(file: StoredFile) -> frozenset[str]:
+def repeated_topics(file: McapFile) -> frozenset[str]:
+    """Return the topics of which a file repeats the last message of the file before it."""
     try:
         names = plain_yaml(file.metadata.get(PIECE_RECORD, {}).get('repeated', '[]'))
         return frozenset(map(str, names))
@@ -174,12 +181,7 @@ def _information(topic: StoredTopic, known: TopicInformation | None) -> TopicInf
         type=topic.type or known.type,
         message_count=0,
         serialization_format=topic.encoding,
-        offered_qos=offers_of(topic) or known.offered_qos,
+        offered_qos=readable_qos(topic.details.get('offered_qos_profiles', '')) or known.offered_qos,
         type_hash=topic.details.get('topic_type_hash', '') or known.type_hash,
         units=units_in(topic.details) or known.units,
     )
-
-
-def offers_of(topic: StoredTopic) -> tuple:
-    """Return the quality of service of a topic's publishers, none where it is not understood."""
-    return readable_qos(topic.details.get('offered_qos_profiles', ''))

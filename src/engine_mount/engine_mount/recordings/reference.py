@@ -14,6 +14,7 @@ import yaml
 from engine_mount.recordings.bag_copy import Messages, in_log_order, read_messages
 from engine_mount.recordings.compare import Comparison, compare
 from engine_mount.recordings.difference import time_text as moment_text
+from engine_mount.recordings.metadata import readable_qos
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
@@ -149,7 +150,9 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
     for topic in (*_INPUTS, *ANSWERS):
         source = run if _has(run, topic) else before
         if source is not None and _has(source, topic):
-            parts[topic] = _renamed(read_messages(source, source.resolve(topic.name))[0], topic)
+            messages = read_messages(source, source.resolve(topic.name))
+            assert messages is not None
+            parts[topic] = replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
     for topic in (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
@@ -167,10 +170,6 @@ def _has(recording: Recording, topic: Topic) -> bool:
     return topic.name in recording and recording.topics[recording.resolve(topic.name)].message_count > 0
 
 
-def _renamed(messages: Messages, topic: Topic) -> Messages:
-    return replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
-
-
 def _check_answers(run: Recording, inputs: Recording | None) -> None:
     assert inputs is not None
     stamps = inputs[DISPLACEMENT.name].stamps
@@ -185,8 +184,7 @@ def _check_answers(run: Recording, inputs: Recording | None) -> None:
 
 def _of_the_ramp(messages: Messages, air_gap: Messages) -> Messages:
     """Return the messages up to the last air gap: the initialisation needs none behind it."""
-    last = air_gap.log_times[-1]
-    return messages.chosen(np.flatnonzero(messages.log_times <= last))
+    return messages.at(np.flatnonzero(messages.heads['log_time'] <= air_gap.heads['log_time'][-1]))
 
 
 def _without_paths(session: Messages, source: Recording | None) -> Messages:
@@ -194,7 +192,7 @@ def _without_paths(session: Messages, source: Recording | None) -> Messages:
     assert source is not None
     content = session_content(recorded_session(source))
     shortened = _shortened(content)
-    last = session.chosen(np.array([len(session) - 1]))
+    last = session.at(np.array([len(session) - 1]))
     if shortened == content:
         return last
     return replace(last, payloads=Payloads([[session_message(session_text(shortened))]]))
@@ -230,11 +228,11 @@ def _entry(run: Recording, reason: str, versions: Mapping[str, str], changes: li
 def _write(folder: Path, parts: list[Messages]) -> None:
     writer = BagWriter(folder, chunk_size=_CHUNK_SIZE)
     for part in parts:
-        writer.add_topic(part.topic.name, part.topic.type, part.topic.offered_qos)
+        offers = readable_qos(part.topic.details.get('offered_qos_profiles', ''))
+        writer.add_topic(part.topic.name, part.topic.type, offers)
     for number, place in in_log_order(parts):
-        part = parts[number]
-        times = int(part.log_times[place]), int(part.publish_times[place])
-        writer.write(part.topic.name, part.payloads[place], *times)
+        part, head = parts[number], parts[number].heads[place]
+        writer.write(part.topic.name, part.payloads[place], int(head['log_time']), int(head['publish_time']))
     writer.close()
 
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from engine_mount.recordings.alignment import ComparisonError
 from engine_mount.recordings.compare import compare
+from engine_mount.recordings.matching import ComparisonError
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.reports.report import ReportError, make_report, subjects_of

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.recordings.alignment import ComparisonError, share_stamps
+from engine_mount.recordings.matching import ComparisonError, share_stamps
 from engine_mount.recordings.recording import Recording
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.sections import overview, run_sections, signal_sections

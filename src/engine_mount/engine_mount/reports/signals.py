@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.events import recorded_marks
+from engine_mount.recordings.events import recorded_marks, switching_times
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.session import recorded_sample_rate, recorded_session
-from engine_mount.recordings.switching import switching_times
 from engine_mount.recordings.times import Times, each_once
 from engine_mount.reports.drawing.chart import Array
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS

@@ -17,9 +17,8 @@ from engine_mount.fleet.example.variations import VARIATIONS
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
 from engine_mount.fleet.what_if.one import replay_one
-from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.place import recording_hash
-from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.recording import column_parts, open_recording
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 _RECORDINGS = 3  # chosen: the plain ones of the first drives; all topics of the simulator are in them

@@ -25,8 +25,8 @@ from engine_mount.drives.inputs.taken import (
     looked_up,
     places_in,
 )
-from engine_mount.recordings.columns import ColumnPart, column_parts
-from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.recording import Recording, column_parts
+from engine_mount.recordings.series import Series
 from mount_control.settings import ControlParameters
 from mount_models.sampling import sample_time_ns
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
@@ -124,11 +124,11 @@ class Stretches:
             columns[CONTROL_TRACE] = tuple(dict.fromkeys(('displacement', 'bridged_samples', *self._quiet)))
         return columns
 
-    def _take_first(self, part: ColumnPart, displacement: '_Waiting') -> None:
+    def _take_first(self, part: Series, displacement: '_Waiting') -> None:
         if displacement.newest is None and len(part):
             self.zero = self._notes.zero = self._recording.axis_from(part.stamps, part.receive_times).zero
 
-    def _check_order(self, part: ColumnPart, displacement: '_Waiting') -> None:
+    def _check_order(self, part: Series, displacement: '_Waiting') -> None:
         stamps = part.stamps
         if displacement.newest is not None:
             stamps = np.concatenate([[displacement.newest], stamps])
@@ -190,7 +190,7 @@ class _Waiting:
         self._columns: dict[str, list[Column]] = {}
         self._cut: int | None = None
 
-    def add(self, part: ColumnPart) -> None:
+    def add(self, part: Series) -> None:
         """Take the messages that follow; raises `OutOfOrderError` for one of before the last cut."""
         stamps = part.stamps
         if not len(stamps):

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from engine_mount.recordings.alignment import alignment_sentence
-from engine_mount.recordings.audit_report import sentences as audit_sentences
 from engine_mount.recordings.difference import by_importance, quantity_text, time_text
+from engine_mount.recordings.losses import sentences as audit_sentences
+from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
 from engine_mount.reports.sections import charts
 from engine_mount.reports.sections.charts import Named

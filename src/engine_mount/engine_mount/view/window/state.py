@@ -4,8 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from engine_mount.recordings.definitions import installed_definition
-from engine_mount.recordings.layout import decode
+from engine_mount.recordings.layout import decode, installed_definition
 from engine_mount.recordings.session import SessionError, session_content, session_parameters
 from engine_mount.view.feed.feed import Message
 from mount_ros.messages.event import read_mark

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.recordings.mcap_records import HEAD
 from engine_mount.recordings.series import Payloads, Series, SeriesError
-from engine_mount.recordings.stored import HEAD
 from engine_mount.view.feed.feed import Message
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, Topic
 
