@@ -37,7 +37,6 @@ from engine_mount.recordings.times import (
     misdated,
     missing_samples,
     redated,
-    regular_rate,
     stamp_jitter,
     stamp_statistics,
 )
@@ -177,26 +176,23 @@ def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
     present = len(series)
     if not present:
         return TopicAudit(None, 0, None, remark='no message')
-    found = rate if topic is not None else regular_rate(stamps)
     why = obstacle
-    if topic is not None and topic.rate == 0.0:
+    if topic is None:
+        why = obstacle or 'no declared rate'
+    elif topic.rate == 0.0:
         why = 'latched' if topic.delivery is Delivery.LATCHED else 'irregular'
-    elif not found:
-        why = obstacle or 'stamps without a regular rate'
-    elif (share := jitter_share(stamps, found)) > MOST_JITTER:
-        limit = f'{100 * MOST_JITTER:g} %'
-        why = f'{100 * share:.3g} % of the stamps are far from the rate (limit {limit})'
-    if why or not found:
+    elif (share := jitter_share(stamps, rate)) > MOST_JITTER:
+        why = f'{100 * share:.3g} % of the stamps are beside the rate (limit {100 * MOST_JITTER:g} %)'
+    if why:
         return TopicAudit(None, present, None, remark=f'{why}: only counted')
-    jitter, worst = stamp_jitter(stamps, found)
-    remark = '' if topic is not None else f'rate of {found:.4g} Hz taken from the stamps'
+    jitter, worst = stamp_jitter(stamps, rate)
     entry = TopicAudit(
-        **asdict(stamp_statistics(stamps, found)),
+        **asdict(stamp_statistics(stamps, rate)),
         misdated=int(np.count_nonzero(wrong)) or None,
-        rate_hz=found,
+        rate_hz=rate,
         jitter_s=jitter,
         worst_jitter_s=worst,
-        remark=_misdated_remark(series.stamps, wrong) if wrong.any() else remark,
+        remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',
     )
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE):
         if len(_Mount(name.removesuffix(topic.name), topics).stamps(DISPLACEMENT)):

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
 
 import numpy as np
 import yaml
@@ -31,7 +30,6 @@ from mount_recorder.topic_groups import topic_group
 
 _SOURCES = 'sources'  # key in the record of the recorder
 
-T = TypeVar('T')
 Sources = dict[str, dict[str, list[int]]]
 """{source: {topic: counts of messages that were received, lost since, and missing before}}."""
 
@@ -57,11 +55,11 @@ def read_messages(recording: Recording, name: str) -> Messages | None:
 
     What the recording holds in memory is released, so that of a long one there is one topic at a time.
     """
-    declared = recording.stored_topic(name)
-    if declared is None:
+    stored = recording.topics[name].stored
+    if stored is None:
         return None
     series = recording[name]
-    found = Messages(declared, series.heads, series.payloads)
+    found = Messages(stored, series.heads, series.payloads)
     recording.release()
     return found.at(np.argsort(found.heads['log_time'], kind='stable'))
 
@@ -87,6 +85,8 @@ class BagCopy:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
         self._topics: dict[int, StoredTopic] = {}  # by channel
+        self.notes: list[str] = []
+        """What was not copied, in sentences."""
         create_folder(self.folder)
         self._file = McapWriter(self.folder / self._file_name, LIBRARY, LONG_CHUNK_SIZE)
         self.write = self._file.add_message
@@ -138,17 +138,22 @@ class BagCopy:
         read: Sequence[Mapping[str, int]] | None,
         custom_data: Mapping[str, str],
     ) -> None:
-        """Add what stands beside the messages of `recordings`, and their losses; write the end.
+        """Add the metadata of `recordings`, each once, and their losses; write the end.
 
         `read` are how many messages of each topic could be read of each recording; None: all that were added.
         """
         self._file.flush()
-        files = [file for recording in recordings for file in recording.files]
-        for name, values in _distinct(record for file in files for record in file.records):
-            if name not in ACCOUNTS:
-                self._file.add_metadata(name, values)
-        for attachment in _distinct(attachment for file in files for attachment in file.attachments()):
-            self._file.add_attachment(attachment)
+        copied: list[tuple[str, dict[str, str]]] = []
+        for file in (file for recording in recordings for file in recording.files):
+            for record in file.records:
+                if record[0] not in ACCOUNTS and record not in copied:
+                    copied.append(record)
+                    self._file.add_metadata(*record)
+            if file.attachments:
+                self.notes.append(
+                    f'{file.attachments} attachments are not copied: '
+                    f'mcap get attachment {file.path.name} has them'
+                )
         counts = {topic.name: 0 for topic in self._topics.values()}
         for number, topic in self._topics.items():
             counts[topic.name] += self._file.message_counts.get(number, 0)
@@ -177,14 +182,6 @@ class BagCopy:
         )
         self._file.finish(embedded_record(description))
         (self.folder / METADATA_NAME).write_text(metadata_text(description), encoding='utf-8')
-
-
-def _distinct(things: Iterable[T]) -> list[T]:
-    found: list[T] = []
-    for thing in things:
-        if thing not in found:
-            found.append(thing)
-    return found
 
 
 # Losses that recorders stated.

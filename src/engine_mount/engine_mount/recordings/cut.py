@@ -81,8 +81,7 @@ def cut(
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete([recording], [read], with_step([recording.information], step))
-    losses += [f'{name} is lost by damage' for name in recording.lost_beside]
-    return Cut(Path(out), begin, end, count, carried, tuple(losses))
+    return Cut(Path(out), begin, end, count, carried, (*losses, *bag.notes))
 
 
 def _span(recording: Recording, begin: float | None, end: float | None) -> tuple[int, int]:

@@ -76,24 +76,6 @@ def installed_definition(type_name: str) -> Definition:
     return text_definition(type_name, schema_text(type_name))
 
 
-def definition_of(type_name: str, text: bytes, encoding: str) -> tuple[Definition | None, str]:
-    """Return the definition in a recording, or the installed one and a sentence why that one is used."""
-    obstacle = ''
-    if text.strip() and encoding != 'ros2msg':
-        obstacle = f'its definition is written in {encoding!r}, not in ros2msg'
-    elif text.strip():
-        try:
-            return text_definition(type_name, text.decode()), ''
-        except (DefinitionError, UnicodeDecodeError) as error:
-            obstacle = f'the definition of {type_name} in the recording is not readable ({error})'
-    try:
-        return installed_definition(type_name), obstacle
-    except ValueError:
-        if obstacle:
-            return None, f'{obstacle}, and the type is not installed'
-        return None, f'type {type_name!r} is not installed and the recording does not define it'
-
-
 @dataclass(frozen=True)
 class Numbers:
     """A run of equal numbers in a message."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from engine_mount.recordings.mcap_records import (
@@ -55,7 +55,6 @@ class McapFile:
         self.topics: dict[int, StoredTopic] = {}
         self.records: list[tuple[str, dict[str, str]]] = []  # of metadata
         self.warnings: list[str] = []
-        self.lost_beside: list[str] = []  # names of metadata and attachments that are known to be lost
         self.message_counts: dict[int, int] = {}  # by topic: as written where proven, else as readable
         self.time_range: tuple[int, int] | None = None  # log times in ns, None without messages
         self.chunks: list[Chunk] = []
@@ -63,7 +62,8 @@ class McapFile:
         """Bytes, from and to, that are neither a chunk nor a record that is understood."""
         self._damaged: set[int] = set()  # positions of chunks
         self._undeclared = 0  # messages whose topic is not known
-        self._beside: dict[int, int] = {}  # begin and end of metadata and attachments
+        self.attachments = 0
+        """How many there are: their content is not read."""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._data_end = 0  # where the messages end, by the file's own account; 0: the end is missing
@@ -81,7 +81,16 @@ class McapFile:
             if chunk.indexes or (chunk.indexes is None and chunk.end_time > 0):
                 times = [*(self.time_range or ()), chunk.start_time, chunk.end_time]
                 self.time_range = min(times), max(times)
-        self.topics = {number: self._topic(channel) for number, channel in self._channels.items()}
+        for number, channel in self._channels.items():
+            schema = self._schemas.get(channel.schema_id)
+            self.topics[number] = StoredTopic(
+                name=channel.topic,
+                type=schema.name if schema else '',
+                encoding=channel.message_encoding,
+                definition=schema.data if schema else b'',
+                definition_encoding=schema.encoding if schema else '',
+                details=channel.metadata,
+            )
         if self._unprotected:
             what = f'{self._unprotected} of its {len(self.chunks)} chunks carry no checksum'
             self._warn(f'{what}: a damaged number in them would go unseen')
@@ -138,20 +147,6 @@ class McapFile:
                 group, size = [], 0
         yield from self._messages_in(group, topics, trusted)
 
-    def attachments(self) -> Iterator[Attachment]:
-        """Yield the attachments without the damaged ones."""
-        for begin, end in self._beside.items():
-            if self._data[begin] != Opcode.ATTACHMENT:
-                continue
-            content = self._data[begin + RECORD.size : end]
-            crc = int.from_bytes(content[-4:], 'little')
-            found = parsed(Attachment.read, content)
-            if found is not None and (not crc or zlib.crc32(content[:-4]) == crc):
-                yield found
-            elif (name := f'attachment at byte {begin}') not in self.lost_beside:
-                self.lost_beside.append(name)
-                self._warn(f'the {name} is damaged and left out')
-
     def _messages_in(
         self, chunks: list[Chunk], topics: Collection[int], trusted: bool
     ) -> Iterator[StoredMessages]:
@@ -198,10 +193,6 @@ class McapFile:
             self._walk(begin, limit)
         self._data_end = summary.begin
         self.message_counts = dict(summary.statistics.channel_message_counts)
-        for index in summary.beside:
-            if index.offset not in self._beside and index.name not in ACCOUNTS:
-                self.lost_beside.append(index.name)
-                self._warn(f'{index.name}, metadata or attachment at byte {index.offset}, is damaged')
         if self._data[-_BEGIN:] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
 
@@ -270,7 +261,7 @@ class McapFile:
                 break
             if (chunk is None) == (opcode == Opcode.CHUNK):
                 break
-            if chunk is not None and (chunk.crc or not self._use_chunk(chunk)):
+            if chunk is not None and not self._use_chunk(chunk):
                 self.chunks.append(chunk)
                 self._leave_out(chunk)
             elif opcode == Opcode.DATA_END:
@@ -281,22 +272,9 @@ class McapFile:
                     self._warn(f'the metadata at byte {position} is not readable')
                 else:
                     self.records.append((metadata.name, dict(metadata.metadata)))
-                    self._beside[position] = end
-            elif opcode == Opcode.ATTACHMENT:
-                self._beside[position] = end
+            self.attachments += opcode == Opcode.ATTACHMENT
             position = end
         return position
-
-    def _topic(self, channel: Channel) -> StoredTopic:
-        schema = self._schemas.get(channel.schema_id)
-        return StoredTopic(
-            name=channel.topic,
-            type=schema.name if schema else '',
-            encoding=channel.message_encoding,
-            definition=schema.data if schema else b'',
-            definition_encoding=schema.encoding if schema else '',
-            details=channel.metadata,
-        )
 
     def _warn(self, sentence: str) -> None:
         self.warnings.append(f'{self.path.name}: {sentence}')

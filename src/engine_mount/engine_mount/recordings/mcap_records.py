@@ -5,7 +5,6 @@ no checksum: they are used only where the checksum of the whole data section hol
 """
 
 import mmap
-import re
 import struct
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -20,7 +19,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import AttachmentIndex, Channel, ChunkIndex, Footer, MetadataIndex, Schema, Statistics
+from mcap.records import Channel, ChunkIndex, Footer, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
@@ -47,10 +46,9 @@ CRC_PLACE = 33
 _INDEX = struct.Struct('<BQHI')  # record, channel, length of the entries
 _NEVER = -1  # no checksum is that
 _LARGEST_CHUNK = 1 << 32  # bytes; more is a damaged length
-# Length and name of the compression; of chunks that are not compressed, their first byte and zeros.
+# Length and name of the compression.
 _TAG_PLACE = _CHUNK.size - 4
 _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
-_PLAIN = re.compile(rb'\x06(?=.{4}\x00{4}.{28}\x00{4})', re.DOTALL)
 FOOTER_LENGTH = 20  # bytes behind opcode and length
 # A few kilobytes of packed bytes can stand for gigabytes.
 _ALWAYS_UNPACKED = 64 << 20  # bytes, chosen: sixteen times the usual chunk
@@ -153,7 +151,6 @@ class Summary:
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
     statistics: Statistics | None = None
-    beside: list[MetadataIndex | AttachmentIndex] = field(default_factory=list)
 
     @property
     def complete(self) -> bool:
@@ -210,7 +207,6 @@ def read_summary(data: mmap.mmap) -> Summary:
         content.channels,
         sorted(known, key=lambda chunk: chunk.position),
         content.statistics,
-        [*content.metadata_indexes, *content.attachment_indexes],
     )
 
 
@@ -259,8 +255,8 @@ def chunk_at(data: mmap.mmap, position: int) -> Chunk | None:
 
 
 def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
-    """Yield every part of a file that looks like a chunk with a checksum, wherever it stands."""
-    places = {found.start() for found in _PLAIN.finditer(data)}
+    """Yield every part of a file that looks like a packed chunk with a checksum, wherever it stands."""
+    places = set[int]()
     for tag in _TAGS:
         place = data.find(tag, 0)  # without a start, from where the last read ended
         while place >= 0:

@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
-from engine_mount.recordings.metadata import TopicInformation, with_step
+from engine_mount.recordings.metadata import with_step
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import session_differences
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
-from mount_ros.topics import SESSION, Delivery
+from mount_ros.topics import SESSION
 
-_HOLE = 0.1  # s, chosen: a longer silence between two parts is told
-_TOLD = 4  # differences of sessions in a refusal
+_LISTED = 4  # differences of sessions in a refusal
 
 
 class MergeError(ValueError):
@@ -32,7 +31,6 @@ class Merge:
     folder: Path
     messages: int
     repeated: int
-    holes: tuple[str, ...]  # times of which no part tells, in sentences
     losses: tuple[str, ...]  # what of the parts could not be read, in sentences
 
 
@@ -78,49 +76,43 @@ def merge(
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete(recordings, read, with_step([recording.information for recording in recordings], step))
-    losses += [f'{name} is lost by damage' for recording in recordings for name in recording.lost_beside]
-    return Merge(Path(out), bag.added, repeated, tuple(_holes(recordings)), tuple(losses))
+    return Merge(Path(out), bag.added, repeated, (*losses, *bag.notes))
 
 
 def _check_types(recordings: Sequence[Recording]) -> None:
-    topics: dict[str, TopicInformation] = {}
+    types: dict[str, tuple[str, str]] = {}
     for recording in recordings:
         for name, topic in recording.topics.items():
-            known = topics.setdefault(name, topic)
-            if known.type != topic.type:
+            known, known_hash = types.setdefault(name, (topic.type, topic.type_hash))
+            if known != topic.type:
                 raise MergeError(
-                    f'{name} is {known.type} in one recording and {topic.type} in {recording.path}; '
+                    f'{name} is {known} in one recording and {topic.type} in {recording.path}; '
                     'they are no parts of one drive'
                 )
-            if known.type_hash and topic.type_hash and known.type_hash != topic.type_hash:
-                raise MergeError(f'{name}: {known.type} has another definition in {recording.path}')
+            if known_hash and topic.type_hash and known_hash != topic.type_hash:
+                raise MergeError(f'{name}: {known} has another definition in {recording.path}')
 
 
 def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
-    first, *others = recordings
-    known = _sessions(first)
-    for other in others:
-        sessions = _sessions(other)
-        if known.keys() & sessions.keys() or not (known or sessions):
+    """Refuse recordings of which one has no session that the first has as well."""
+    first, *others = [(recording, _sessions(recording)) for recording in recordings]
+    for other, sessions in others:
+        if first[1] & sessions or not (first[1] or sessions):
             continue
-        why = f'{(other if known else first).path} has no session that says what it is'
-        if known and sessions:
-            what = session_differences(next(iter(known.values())), next(iter(sessions.values())))
-            why = ': '.join(['their sessions differ', *(['; '.join(what[:_TOLD])] if what else [])])
+        why = f'{(other if first[1] else first[0]).path} has no session that says what it is'
+        if first[1] and sessions:
+            differences = session_differences(min(first[1]), min(sessions))
+            why = ': '.join(['their sessions differ', '; '.join(differences[:_LISTED])])
         raise MergeError(
-            f'{first.path} and {other.path} may be different drives: {why}; '
+            f'{first[0].path} and {other.path} may be different drives: {why}; '
             'merge them with --different-sessions'
         )
 
 
-def _sessions(recording: Recording) -> dict[bytes, str]:
-    """Return {message: text} of all session messages in a recording."""
+def _sessions(recording: Recording) -> set[str]:
+    """Return the texts of all session messages in a recording."""
     names = [name for name in recording if registered_topic(name, recording.topics[name].type) is SESSION]
-    return {
-        recording[name].payloads[place]: recording[name].message(place).data
-        for name in names
-        for place in range(len(recording[name]))
-    }
+    return {message.data for name in names for message in recording[name].messages()}
 
 
 def _united(parts: Sequence[Messages]) -> Messages:
@@ -145,28 +137,3 @@ def _united(parts: Sequence[Messages]) -> Messages:
     payloads = Payloads([part.payloads.messages for part in kept if len(part)])
     united = Messages(parts[0].topic, np.concatenate([part.heads for part in kept]), payloads)
     return united.at(np.argsort(united.heads['log_time'], kind='stable'))
-
-
-def _holes(recordings: Sequence[Recording]) -> list[str]:
-    """Return a sentence for each time span between the parts of which no part tells."""
-    spans = sorted(span for span in map(_streamed, recordings) if span is not None)
-    latest = np.maximum.accumulate([last for _, last in spans])
-    gaps = [(first - before) / 1e9 for (first, _), before in zip(spans[1:], latest, strict=False)]
-    return [f'between two parts {gap:.3f} s are missing' for gap in gaps if gap > _HOLE]
-
-
-def _streamed(recording: Recording) -> tuple[int, int] | None:
-    """Return first and last log time (ns) of the topic with most messages; latched ones came earlier."""
-    streams = [
-        topic
-        for topic in recording.topics.values()
-        if topic.message_count
-        and (
-            (known := registered_topic(topic.name, topic.type)) is None
-            or known.delivery is not Delivery.LATCHED
-        )
-    ]
-    if not streams:
-        return None
-    times = recording[max(streams, key=lambda topic: topic.message_count).name].receive_times
-    return int(times.min()), int(times.max())

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import yaml
 
+from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_recorder.metadata import NANOSECONDS, ROOT, VERSION, OfferedQos
 
@@ -18,17 +19,25 @@ class MetadataError(ValueError):
     """A description of a recording is not understood."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TopicInformation:
     """One topic of a recording."""
 
     name: str
     type: str
-    message_count: int
+    message_count: int = 0
     serialization_format: str = 'cdr'
     offered_qos: tuple[OfferedQos, ...] = ()
     type_hash: str = ''
-    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
+    units: Mapping[str, str] = field(default_factory=dict)
+    """By field, where the channel tells them."""
+    stored: StoredTopic | None = None
+    """As the files declare it."""
+    stored_count: int = 0
+    """Messages in the files, repetitions included; `message_count` is without these."""
+    places: list[tuple[Any, int]] = field(default_factory=list)
+    """The files that hold it, and its number in each."""
+    other_types: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)

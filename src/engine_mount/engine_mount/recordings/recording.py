@@ -4,15 +4,14 @@ import contextlib
 import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.layout import Definition
 from engine_mount.recordings.mcap_file import McapFile
-from engine_mount.recordings.mcap_records import HEAD, StorageError, StoredMessages, StoredTopic
+from engine_mount.recordings.mcap_records import HEAD, StorageError, StoredMessages
 from engine_mount.recordings.metadata import (
     ZERO_KEY,
     BagInformation,
@@ -22,8 +21,8 @@ from engine_mount.recordings.metadata import (
     read_metadata,
 )
 from engine_mount.recordings.pieces import (
-    Declared,
     declared_topics,
+    definition_of,
     find_pieces,
     open_piece,
     repeated_topics,
@@ -78,18 +77,32 @@ class Recording:
             file.warnings = self.warnings  # what is found later, while a topic is read, comes here too
         self._complete = pieces.complete and not reasons
         self.information: BagInformation | None = pieces.information or self._embedded_description()
-        self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
-        self.topics: dict[str, TopicInformation] = {
-            name: declared.information for name, declared in self._declared.items()
-        }
+        listed = self.information.topics if self.information else ()
+        self.topics: dict[str, TopicInformation] = declared_topics(self.files, listed)
         self.missing: dict[str, int] = {}
         """How many messages of a topic are known to be missing."""
         self.described_count: int | None = None
         """How many messages `metadata.yaml` lists, repetitions included, if it covers all files."""
         if pieces.information is not None and len(pieces.information.files) >= len(self.files):
-            self._compare_counts(pieces.information)
-        self._definitions: dict[str, tuple[Definition | None, str]] = {}
-        self._check_topics()
+            self.described_count = pieces.information.message_count
+            total = sum(topic.stored_count for topic in self.topics.values())
+            if self._complete and self.described_count != total:
+                lists = f'{METADATA_NAME} lists {self.described_count} messages'
+                self.warnings.append(f'{lists}, the files hold {total}')
+            for topic in () if self.proven else pieces.information.topics:
+                missing = topic.message_count - self.topics[topic.name].stored_count
+                self.missing |= {topic.name: missing} if missing > 0 else {}
+        self._definitions = {name: definition_of(topic) for name, topic in self.topics.items()}
+        for name, topic in self.topics.items():
+            definition, sentence = self._definitions[name]
+            if topic.other_types:
+                others = ', '.join(sorted(topic.other_types))
+                self.warnings.append(
+                    f'{name}: messages of {others} are left out; read are those of {topic.type}'
+                )
+            if sentence and topic.message_count:
+                remedy = 'the installed one is used' if definition else 'only its raw bytes can be read'
+                self.warnings.append(f'{name}: {sentence}; {remedy}')
 
     @property
     def mounts(self) -> list[str]:
@@ -124,18 +137,13 @@ class Recording:
         """Whether nothing is known to be missing; damage inside of a topic is known once that was read."""
         if self.missing or not self._complete or any(file.damaged for file in self.files):
             return False
-        held = sum(declared.stored for declared in self._declared.values())
+        held = sum(topic.stored_count for topic in self.topics.values())
         return all(file.whole for file in self.files) or self.described_count == held
 
     @property
     def proven(self) -> bool:
         """Whether no file is missing and checksums vouch for the account that each gives of itself."""
         return self._complete and all(file.proven for file in self.files)
-
-    @property
-    def lost_beside(self) -> list[str]:
-        """The names of attachments and metadata that are known to be lost."""
-        return [name for file in self.files for name in file.lost_beside]
 
     @property
     def time_range(self) -> tuple[int, int] | None:
@@ -195,18 +203,11 @@ class Recording:
 
     def load_times(self) -> None:
         """Read the stamps of all topics in one pass, and of setpoints the other times."""
-        setpoints = {
-            name
-            for name, topic in self.topics.items()
-            if registered_topic(name, topic.type) is CURRENT_SETPOINT
-        }
-        self._read_columns(
-            {name: (_STAMPS, _RECEIVED, _SENT) if name in setpoints else (_STAMPS,) for name in self.topics}
-        )
-
-    def stored_topic(self, name: str) -> StoredTopic | None:
-        """Return the topic of this full name as the files declare it, None where they do not."""
-        return self._declared[name].topic
+        wanted = {}
+        for name, topic in self.topics.items():
+            answers = registered_topic(name, topic.type) is CURRENT_SETPOINT
+            wanted[name] = (_STAMPS, _RECEIVED, _SENT) if answers else (_STAMPS,)
+        self._read_columns(wanted)
 
     def release(self) -> None:
         """Forget what was read of the topics: it is read again where it is needed."""
@@ -249,8 +250,6 @@ class Recording:
                 return [full_name]
         return [full_name for full_name in self.topics if full_name.endswith(f'/{name}')]
 
-    # Opening.
-
     def _embedded_description(self) -> BagInformation | None:
         text = self.files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
         try:
@@ -259,37 +258,14 @@ class Recording:
             self.warnings.append(f'{self.files[0].path.name}: {error}')
             return None
 
-    def _compare_counts(self, information: BagInformation) -> None:
-        """Compare how many messages the description and the files have."""
-        held = {name: declared.stored for name, declared in self._declared.items()}
-        described, total = information.message_count, sum(held.values())
-        self.described_count = described
-        if self._complete and described != total:
-            self.warnings.append(f'{METADATA_NAME} lists {described} messages, the files hold {total}')
-        if not self.proven:
-            for topic in information.topics:
-                if topic.message_count > held.get(topic.name, 0):
-                    self.missing[topic.name] = topic.message_count - held.get(topic.name, 0)
-
-    def _check_topics(self) -> None:
-        for name, declared in self._declared.items():
-            definition, sentence = self._definitions[name] = declared.definition()
-            if declared.other_types:
-                others = ', '.join(sorted(declared.other_types))
-                kept = declared.information.type
-                self.warnings.append(f'{name}: messages of {others} are left out; read are those of {kept}')
-            if sentence and declared.information.message_count:
-                what = 'the installed one is used' if definition else 'only its raw bytes can be read'
-                self.warnings.append(f'{name}: {sentence}; {what}')
-
-    # Reading.
-
     def _read_columns(self, wanted: Mapping[str, Iterable[str]]) -> None:
         """Read columns and times that are not in memory; a column that not every message has is left out."""
         found: dict[str, dict[str, list[np.ndarray]]] = {}
         for topic, names in wanted.items():
             name = self.resolve(topic)
-            series = self._series.setdefault(name, self._make_series(name, partial(self._read_one, name)))
+            series = self._series.setdefault(
+                name, self._make_series(name, lambda name=name: self._read([name])[name])
+            )
             if not series.loaded and not series.known >= set(names):
                 series.count, series.known = 0, series.known | set(names)
                 found[name] = {column: [] for column in names}
@@ -318,18 +294,16 @@ class Recording:
 
     def _read(self, names: Sequence[str]) -> dict[str, Messages]:
         """Return bytes and heads of all messages of topics."""
-        payloads: dict[str, list] = {name: [] for name in names}
-        heads: dict[str, list[np.ndarray]] = {name: [np.empty(0, HEAD)] for name in names}
+        blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}
         for name, block in self._blocks(names):
-            payloads[name].append(block.payloads())
-            heads[name].append(block.heads)
-        found = {name: (Payloads(payloads.pop(name)), np.concatenate(heads.pop(name))) for name in names}
-        for name, (messages, _) in found.items():
-            self._note_damage(name, len(messages))
+            blocks[name].append(block)
+        found = {}
+        for name in names:
+            own = blocks.pop(name)
+            heads = np.concatenate([np.empty(0, HEAD), *(block.heads for block in own)])
+            found[name] = Payloads([block.payloads() for block in own]), heads
+            self._note_damage(name, len(heads))
         return found
-
-    def _read_one(self, name: str) -> Messages:
-        return self._read([name])[name]
 
     def _make_series(self, name: str, messages: Any) -> Series:
         definition, sentence = self._definitions[name]
@@ -351,7 +325,7 @@ class Recording:
 
     def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
         """Yield the messages of topics, block by block and topic by topic."""
-        places = {place: name for name in names for place in self._declared[name].places}
+        places = {place: name for name in names for place in self.topics[name].places}
         for file, block, _ in self.stored_blocks(places):
             topics: dict[str, list[int]] = {}
             for (owner, number), name in places.items():

@@ -36,21 +36,13 @@ class Recovery:
     kept_seconds: float  # from the first to the last message
     kept_bytes: int
     lost_bytes: int
-    all_messages: bool
-    lost_beside: tuple[str, ...]  # names of attachments and metadata
+    complete: bool  # nothing of the file is lost
     lost_before: int
     notes: tuple[str, ...]
 
-    @property
-    def complete(self) -> bool:
-        """Whether nothing of the file is lost."""
-        return self.all_messages and not self.lost_beside
-
     def __str__(self) -> str:
         kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s, {_size(self.kept_bytes)}'
-        losses = [] if self.all_messages else [self._lost_text()]
-        losses += [', '.join(self.lost_beside)] if self.lost_beside else []
-        lost = f'lost {"; and ".join(losses)}' if losses else 'nothing of the file is missing'
+        lost = 'nothing of the file is missing' if self.complete else f'lost {self._lost_text()}'
         if self.lost_before:
             lost += f', but {self.lost_before} messages never reached it, as its recorder says'
         return f'{kept}; {lost}'
@@ -100,10 +92,9 @@ def recover(
         kept_seconds=bag.seconds,
         kept_bytes=sum(file.path.stat().st_size for file in recording.files) - lost_bytes,
         lost_bytes=lost_bytes,
-        all_messages=complete,
-        lost_beside=tuple(recording.lost_beside),
+        complete=complete,
         lost_before=sum(row.get('lost', 0) for rows in statements for row in rows.values()),
-        notes=tuple(recording.warnings),
+        notes=(*recording.warnings, *bag.notes),
     )
 
 

@@ -25,12 +25,9 @@ Times = NDArray[np.int64]
 
 NO_TIMES: Times = np.empty(0, np.int64)
 _NANOSECONDS = 1_000_000_000
-_LEAST_SAMPLES = 10
-_MOSTLY = 0.9  # share, chosen
 _JITTER = 0.25  # periods, chosen: steps so far from whole ones are no clock's drift
 MOST_JITTER = 0.01
 """Share of the stamps, chosen: of more that are beside the rate, losses cannot be counted."""
-_MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
 _OTHER_CLOCK = 86_400.0  # s, chosen: what is so far off is of another clock
 _AROUND = 5  # samples, chosen: before and behind; so many stamps in a row may be misdated
@@ -179,22 +176,6 @@ def stamp_jitter(stamps: Times, rate: float) -> tuple[float, float]:
     deviation = (lengths - np.median(steps)) / _NANOSECONDS
     square = math.fsum((counts * deviation**2).tolist()) / steps.size
     return math.sqrt(square), float(np.abs(deviation).max())
-
-
-def regular_rate(stamps: Times) -> float | None:
-    """Return the rate (Hz) of samples without a declared one, None where their stamps (ns) show none.
-
-    Regular are at least 10 samples of which nearly none is repeated, where most steps are one period and
-    nearly all are within a quarter of a period of whole ones.
-    """
-    steps = np.diff(distinct(stamps))
-    if steps.size + 1 < _LEAST_SAMPLES or steps.size + 1 < _MOSTLY * len(stamps):
-        return None
-    period = float(np.median(steps))
-    periods = np.rint(steps / period)
-    fitting = np.abs(steps - periods * period) <= 0.25 * period
-    single = np.mean(periods == 1)
-    return _NANOSECONDS / period if np.mean(fitting) >= _MOSTLY and single >= _MOST else None
 
 
 class TimeAxis:
