@@ -35,8 +35,8 @@ class TopicInformation:
     """As the files declare it."""
     stored_count: int = 0
     """Messages in the files, repetitions included; `message_count` is without these."""
-    places: list[tuple[Any, int]] = field(default_factory=list)
-    """The files that hold it, and its number in each."""
+    places: dict[Any, list[int]] = field(default_factory=dict)
+    """The files that hold it, and its numbers in each."""
     other_types: set[str] = field(default_factory=set)
 
 

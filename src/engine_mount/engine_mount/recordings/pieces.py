@@ -135,7 +135,7 @@ def declared_topics(
             elif stored.type not in ('', topic.type):
                 topic.other_types.add(stored.type)
                 continue
-            topic.places.append((file, number))
+            topic.places.setdefault(file, []).append(number)
             topic.stored_count += count
             topic.message_count += count - (count > 0 and stored.name in repeated)
             repeated -= {stored.name} if count else set()

@@ -28,7 +28,7 @@ from engine_mount.recordings.pieces import (
     repeated_topics,
 )
 from engine_mount.recordings.series import Messages, Payloads, Series, SeriesError
-from engine_mount.recordings.times import TimeAxis, Times, anchors
+from engine_mount.recordings.times import TimeAxis, anchors
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, JOINT_STATE
@@ -160,19 +160,16 @@ class Recording:
     @cached_property
     def time_axis(self) -> TimeAxis:
         """The time axis shown to users."""
+        zeros = [zero for step in origin(self.information) if isinstance(zero := step.get(ZERO_KEY), int)]
         for name in anchors({name: topic.type for name, topic in self.topics.items() if topic.message_count}):
             self._read_columns({name: (_STAMPS, _RECEIVED)})
             with contextlib.suppress(SeriesError):  # of a foreign topic
                 series = self[name]
                 if len(series.stamps):
-                    return self.axis_from(series.stamps, series.receive_times)
-        only = np.array([self.time_range[0] if self.time_range else 0])
-        return self.axis_from(only, only)
-
-    def axis_from(self, stamps: Times, received: Times) -> TimeAxis:
-        """Return the time axis by these samples of its topic alone, at least one (ns)."""
-        zeros = [step.get(ZERO_KEY) for step in origin(self.information)]
-        return TimeAxis(stamps, received, [zero for zero in zeros if isinstance(zero, int)])
+                    break
+        else:
+            return TimeAxis(*[np.array([self.time_range[0] if self.time_range else 0])] * 2, zeros)
+        return TimeAxis(series.stamps, series.receive_times, zeros)
 
     def __contains__(self, name: str) -> bool:
         return len(self._candidates(name)) == 1
@@ -219,13 +216,25 @@ class Recording:
         Only these are in memory. Raises `ReadingError`.
         """
         counts = {self.resolve(name): 0 for name in names}
-        for name, block in self._blocks(list(counts)):
-            counts[name] += len(block)
-            for begin in range(0, len(block), size or len(block)):
-                part = block.at(slice(begin, begin + size if size else None))
-                yield self._make_series(name, (Payloads([part.payloads()]), part.heads))
-        for name, count in counts.items():
-            self._note_damage(name, count)
+        places = {
+            file: [n for name in counts for n in self.topics[name].places.get(file, ())]
+            for file in self.files
+        }
+        for file, block, _ in self.stored_blocks(places):
+            for name in counts:
+                numbers = self.topics[name].places.get(file)
+                own = block.of(numbers) if numbers else ()
+                counts[name] += len(own)
+                for begin in range(0, len(own), size or len(own) or 1):
+                    part = own.at(slice(begin, begin + size if size else None))
+                    yield self._make_series(name, (Payloads([part.payloads()]), part.heads))
+        for name, present in counts.items():
+            expected = self.topics[name].message_count
+            if self.missing.get(name, 0) < expected - present:
+                self.warnings.append(
+                    f'{name}: {expected - present} of {expected} messages are lost by damage'
+                )
+                self.missing[name] = expected - present
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -292,18 +301,13 @@ class Recording:
                 elif parts:
                     self._series[name].columns[column] = values
 
-    def _read(self, names: Sequence[str]) -> dict[str, Messages]:
+    def _read(self, names: Iterable[str]) -> dict[str, Messages]:
         """Return bytes and heads of all messages of topics."""
-        blocks: dict[str, list[StoredMessages]] = {name: [] for name in names}
-        for name, block in self._blocks(names):
-            blocks[name].append(block)
-        found = {}
-        for name in names:
-            own = blocks.pop(name)
-            heads = np.concatenate([np.empty(0, HEAD), *(block.heads for block in own)])
-            found[name] = Payloads([block.payloads() for block in own]), heads
-            self._note_damage(name, len(heads))
-        return found
+        found: dict[str, tuple[list, list]] = {name: ([], [np.empty(0, HEAD)]) for name in names}
+        for part in self.parts(found):
+            found[part.topic][0].append(part.payloads.messages)
+            found[part.topic][1].append(part.heads)
+        return {name: (Payloads(raw), np.concatenate(heads)) for name, (raw, heads) in found.items()}
 
     def _make_series(self, name: str, messages: Any) -> Series:
         definition, sentence = self._definitions[name]
@@ -317,42 +321,20 @@ class Recording:
             units=self.topics[name].units,
         )
 
-    def _note_damage(self, name: str, present: int) -> None:
-        expected = self.topics[name].message_count
-        if present < expected and self.missing.get(name, 0) < expected - present:
-            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
-            self.missing[name] = expected - present
-
-    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
-        """Yield the messages of topics, block by block and topic by topic."""
-        places = {place: name for name in names for place in self.topics[name].places}
-        for file, block, _ in self.stored_blocks(places):
-            topics: dict[str, list[int]] = {}
-            for (owner, number), name in places.items():
-                if owner is file:
-                    topics.setdefault(name, []).append(number)
-            for name, numbers in topics.items():
-                found = block if len(topics) == 1 else block.of(numbers)
-                if len(found):
-                    yield name, found
-
     def stored_blocks(
-        self, places: Iterable[tuple[McapFile, int]]
+        self, places: Mapping[McapFile, Sequence[int]]
     ) -> Iterator[tuple[McapFile, StoredMessages, int]]:
-        """Yield the messages of topics, given as file and number, in the order of the files.
+        """Yield the messages of topics, given by their numbers in each file, in the order of the files.
 
         Messages that a file repeats of the one before are left out; how many stands beside each block.
         """
         last: dict[str, tuple[bytes, int]] = {}
         watched = frozenset().union(*map(repeated_topics, self.files))
-        by_file: dict[McapFile, list[int]] = {}
-        for file, number in places:
-            by_file.setdefault(file, []).append(number)
-        for file in filter(by_file.get, self.files):
+        for file in filter(places.get, self.files):
             repeated = set(repeated_topics(file))
-            for block in file.blocks(by_file[file]):
+            for block in file.blocks(places[file]):
                 is_new = np.ones(len(block), bool)
-                for number in by_file[file]:
+                for number in places[file]:
                     name = file.topics[number].name
                     own = np.flatnonzero((block.heads['topic'] == number) & (name in watched))
                     if len(own):
@@ -361,16 +343,3 @@ class Recording:
                         last[name] = block.message(own[-1])
                 left_out = int(np.count_nonzero(~is_new))
                 yield file, block.at(np.flatnonzero(is_new)) if left_out else block, left_out
-
-
-def column_parts(
-    recording: Recording, columns: Mapping[str, tuple[str, ...]], size: int = 1 << 13
-) -> Iterator[Series]:
-    """Yield columns of topics, {topic: names}, in the order of the files, at most `size` messages each.
-
-    Those that the messages have stand in `columns` of the yielded series.
-    """
-    wanted = {recording.resolve(topic): names for topic, names in columns.items()}
-    for series in recording.parts(wanted, size):
-        series.columns = {name: series[name] for name in wanted[series.topic] if name in series.names}
-        yield series

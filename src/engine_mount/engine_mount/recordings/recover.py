@@ -62,11 +62,16 @@ def recover(
     Raises `ReadingError` where nothing can be opened, `RecoveryError` where no message is left.
     """
     recording = open_recording(path)
-    places = [(file, number) for file in recording.files for number in file.topics]
     with BagCopy(out) as bag:
-        channels = {(file, number): bag.channel_of(file.topics[number]) for file, number in places}
+        channels = {
+            (file, number): bag.channel_of(topic)
+            for file in recording.files
+            for number, topic in file.topics.items()
+        }
         stored = 0  # in the files, repetitions included
-        for file, block, repeated in recording.stored_blocks(places):
+        for file, block, repeated in recording.stored_blocks(
+            {file: list(file.topics) for file in recording.files}
+        ):
             stored += len(block) + repeated
             heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
             for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
