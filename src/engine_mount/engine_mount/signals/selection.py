@@ -122,8 +122,12 @@ def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
         return found(wanted, there, uri)
     except SignalError:
         name, _, unit = wanted.rpartition(':')
-        if name in {text for one in there for text in (one.name, one.header)}:
+        if name not in {text for one in there for text in (one.name, one.header)}:
+            raise
+        try:
             unit_of(unit)
+        except SignalError as error:
+            raise SignalError(f'{uri}, column {name!r}: {error}') from None
         raise
 
 

@@ -45,7 +45,10 @@ def times_of(
     if choice.column:
         return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
     others = [one for one in measured.columns.values() if one is not column]
-    titled = sorted(filter(is_time, others), key=lambda one: _group(one) != _group(column))
+    titled = sorted(
+        filter(is_time, others),
+        key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
+    )
     rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
     found = next(iter([*titled, *rising]), None)
     if choice.rate is not None:
@@ -92,8 +95,8 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: f
         return column.time, ()  # dates, which are no numbers
     if bad.size or raw.size < 2:
         raise SignalError(
-            f'{where}: {bad.size} of {raw.size} times are no numbers (the first: number {bad[:1]}); at least 2 '
-            'are needed: remove these samples, or say the rate with --rate HZ'
+            f'{where}: {bad.size} of {raw.size} times are no numbers (the first: number {bad[:1]}); at least '
+            '2 are needed: remove these samples, or say the rate with --rate HZ'
         )
     unit, notes = _unit(where, column, said, slowest)
     origin = float(raw[0]) * unit.factor

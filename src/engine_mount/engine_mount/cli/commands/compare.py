@@ -82,7 +82,7 @@ def _told(
     if json_file is not None:
         write_json(comparison.figures(), json_file)
     if figure is not None:
-        from engine_mount.reports.compare_picture import draw_comparison
+        from engine_mount.reports.pictures import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

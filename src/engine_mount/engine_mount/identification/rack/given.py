@@ -9,7 +9,7 @@ from typing import Any
 from engine_mount.identification.rack.columns import RackRecordingError
 from engine_mount.recordings.place import open_run, recording_hash, recording_place
 from engine_mount.recordings.recording import Recording
-from engine_mount.signals.loading import is_recording
+from engine_mount.signals.formats.bag import is_recording
 from mount_ros.topics import COIL_RIPPLE
 
 FEWEST = 8  # chosen: fewer points are no measurement
