@@ -161,7 +161,7 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
-    from engine_mount.reports.drive.telling import tell_drive, tell_snapshots
+    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.amounts import checked_recorder, recorder_options
     from engine_mount.settings.options import settings_of_options
@@ -214,9 +214,9 @@ def drive(
         raise typer.BadParameter(str(error)) from None
     recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
     if recorded.snapshot:
-        told = tell_snapshots(driven.folder, recorded, driven.figures, screen)
+        told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
     else:
-        told = tell_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     if json_file is not None:
         write_json(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []

@@ -81,8 +81,7 @@ def record(
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
     from engine_mount.recordings.audit import audit
-    from engine_mount.recordings.audit_report import sentences
-    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.losses import losses, sentences
     from engine_mount.recordings.recording import open_recording
 
     recording = open_recording(folder)

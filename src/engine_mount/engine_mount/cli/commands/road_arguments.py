@@ -8,7 +8,7 @@ import typer
 
 if TYPE_CHECKING:
     from engine_mount.drives.external_excitation import ExternalExcitation
-    from engine_mount.signals.roads.profile import RoadProfile
+    from engine_mount.signals.roads.iso8608 import RoadProfile
 
 Lateral = Annotated[
     float, typer.Option(metavar='M', help='road: track of an OpenCRG file, m left of its reference line')
@@ -32,7 +32,7 @@ Repeat = Annotated[bool, typer.Option('--repeat', help='road: drive it forth and
 
 def road_of_options(road: str, lateral: float, column: str, distance: str) -> 'RoadProfile':
     """Return the road that the options name."""
-    from engine_mount.signals.roads.reading import road_profile
+    from engine_mount.signals.roads.table import road_profile
 
     spacing = _number(distance)
     return road_profile(
@@ -57,9 +57,8 @@ def road_excitation(
 ) -> 'ExternalExcitation':
     """Return the road that the options name as excitation: at their speed, for `duration` s (0: once)."""
     from engine_mount.drives.external_excitation import ExternalExcitation
-    from engine_mount.signals.roads.driving import wheel_height
+    from engine_mount.signals.roads.driving import speed_of, wheel_height
     from engine_mount.signals.roads.iso8608 import unevenness
-    from engine_mount.signals.roads.speed import speed_of
 
     if not speed:
         raise typer.BadParameter(
