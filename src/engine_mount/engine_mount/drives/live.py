@@ -113,7 +113,7 @@ def _play_to_control(
     ignored = dict.fromkeys((topics.CURRENT_SETPOINT, topics.CONTROL_TRACE), lambda raw: None)
     player = ControlPlayer(context, parameters, namespace, lockstep=False)
     for run in given.controls:
-        times = (run.stamps - given.zero) * 1e-9
+        times = given.seconds(run.stamps)
         part = slice(int(np.searchsorted(times, begin)), None)
         if not len(times[part]):
             continue
