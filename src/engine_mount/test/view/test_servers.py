@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from engine_mount.view.feed import FeedError, RecordedFeed
 from engine_mount.view.foxglove_server import FoxgloveServer
 from engine_mount.view.model import Model
-from engine_mount.view.view import ViewOrder, running_model, serve_view
+from engine_mount.view.view import open_feed, running_model, serve_view
 from engine_mount.view.web import Web
 
 LIMIT = 30.0  # s
@@ -131,12 +131,12 @@ def test_a_model_that_fails_says_so_and_ends_the_view(drive):
 
 def test_a_recording_that_cannot_be_played_on_ends_the_view_and_says_why(drive, free_port, monkeypatch):
     monkeypatch.setattr(RecordedFeed, 'message', lambda feed, number: 1 / 0)
-    order = ViewOrder(drive, port=free_port, foxglove_port=0, beside=False)
     ctrl_c = threading.Timer(LIMIT, os.kill, (os.getpid(), signal.SIGINT))  # ends a view that does not end
     ctrl_c.start()
     try:
-        with pytest.raises(FeedError, match=r'has ended: .* was not played to its end: ZeroDivisionError'):
-            serve_view(order, lambda line: None)
+        ended = r'has ended: .* was not played to its end: ZeroDivisionError'
+        with open_feed(drive) as feed, pytest.raises(FeedError, match=ended):
+            serve_view(feed, lambda line: None, port=free_port, beside=False)
     finally:
         ctrl_c.cancel()
 

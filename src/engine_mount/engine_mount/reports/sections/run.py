@@ -7,18 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine_mount.recordings.alignment import alignment_sentence
+from engine_mount.recordings.audit_report import as_table
 from engine_mount.recordings.audit_report import sentences as audit_sentences
-from engine_mount.recordings.difference import SignalDifference, by_importance, quantity_text
+from engine_mount.recordings.difference import signal_table
 from engine_mount.recordings.session import session_values
 from engine_mount.reports.drawing.chart import DASHED, Array, Chart, Curve, Panel, Span
 from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
 from engine_mount.reports.sections.motion import TIME_LABEL
-from engine_mount.reports.sections.section import Cell, Section, Table, moment
+from engine_mount.reports.sections.section import Section, Table, moment
 from engine_mount.reports.sections.subject import Signal, Subject, Tracking, shared_sentences
 
 _COVERING = 0.95  # chosen: this share of the longest counts as all
 _AT_LIMIT = 0.999  # chosen: this share of the limit counts as at the limit
-_ROWS = 25  # of the table of differences
 _FOLDED = 20  # parameters, chosen: more are shown on demand
 _BEFORE, _AFTER = 0.4, 0.6  # s, chosen: shown round the largest force
 HEAD_OF_SESSION = ('scenario', 'mode', 'started')
@@ -140,26 +140,13 @@ def tracking(subjects: Sequence[Subject]) -> Section:
 def losses(subjects: Sequence[Subject]) -> Section:
     """Return what is missing of each topic, and the faults."""
     words, tables = [], []
-    head = (
-        'topic', 'expected', 'present', 'lost', 'twice', 'longest gap (ms)', 'jitter (µs)', 'remark',
-    )  # fmt: skip
     for subject in subjects:
-        words.append(f'{subject.prefix}{audit_sentences(subject.audits, subject.losses)[-1]}')
+        words += [f'{subject.prefix}{each}' for each in audit_sentences(subject.audits, subject.losses)]
         if subject.losses.faults:
             faults = [(moment(fault.time), fault.node, fault.sentence) for fault in subject.losses.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{subject.prefix}faults'))
-        rows = [
-            (
-                name,
-                *map(_text, (entry.expected, entry.present, entry.lost, entry.duplicated)),
-                _digits(1e3 * entry.longest_gap_s, 1, ''),
-                _digits(1e6 * entry.jitter_s, 1, ''),
-                entry.remark,
-            )
-            for name, entry in subject.audits.items()
-        ]
-        marked = frozenset(place for place, entry in enumerate(subject.audits.values()) if not entry.sound)
-        tables.append(Table(head, rows, subject.prefix.removesuffix(': '), marked))
+        found = as_table(subject.audits)
+        tables.append(Table(found.heads, found.rows, subject.prefix.removesuffix(': '), found.marked))
     return Section('losses', 'Losses and faults', words, None, tables)
 
 
@@ -172,24 +159,9 @@ def differences(subjects: Sequence[Subject]) -> Section | None:
         f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment_sentence(comparison.alignments)}.',
         *(f'- {sentence}' for sentence in comparison.sentences()),
     ]
-    ordered = by_importance(comparison.signals)
-    rows: list[Sequence[Cell]] = [
-        (
-            signal.name,
-            f'{signal.differing} of {signal.samples}',
-            '' if signal.first is None else moment(signal.first.time),
-            'unknown'
-            if (most := signal.largest) is None
-            else quantity_text(abs(most.difference), signal.unit),
-            '' if most is None else moment(most.time),
-            quantity_text(signal.rms, signal.unit),
-        )
-        for signal in ordered[:_ROWS]
-    ]
-    if len(ordered) > _ROWS:
-        words.append(f'{len(ordered) - _ROWS} more signals differ than the table holds.')
-    head = ('signal', 'samples that differ', 'first', 'largest', 'at', 'rms')
-    return Section('differences', 'Differences', words, None, [Table(head, rows)] if rows else [])
+    found = signal_table(comparison.signals)
+    tables = [Table(found.heads, found.rows)] if found.rows else []
+    return Section('differences', 'Differences', words, None, tables)
 
 
 def parameters(subjects: Sequence[Subject]) -> Section:
@@ -215,12 +187,6 @@ def parameters(subjects: Sequence[Subject]) -> Section:
         tables.append(Table(head, rows, title, marked, group is others and len(group) > _FOLDED))
     tables = [table for table in tables if table.rows]
     return Section('parameters', 'Parameters and versions', words, None, tables)
-
-
-def _largest(signal: SignalDifference) -> tuple[Cell, Cell]:
-    if signal.largest is None:
-        return 'unknown', ''
-    return quantity_text(abs(signal.largest.difference), signal.unit), moment(signal.largest.time)
 
 
 def _current(subject: Subject) -> tuple[Signal | None, str]:
@@ -264,9 +230,5 @@ def _value(values: Mapping[str, Any], name: str) -> str:
     return f'{value:g}' if isinstance(value, float) else str(value)
 
 
-def _digits(value: float, digits: int, unknown: str = 'not known') -> str:
-    return unknown if math.isnan(value) else f'{value:.{digits}f}'
-
-
-def _text(value: int | None) -> str:
-    return '' if value is None else str(value)
+def _digits(value: float, digits: int) -> str:
+    return 'not known' if math.isnan(value) else f'{value:.{digits}f}'
