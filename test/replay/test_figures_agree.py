@@ -103,15 +103,15 @@ def good(tmp_path_factory) -> Told:
 @pytest.fixture(scope='module')
 def bad(tmp_path_factory) -> Told:
     """The same drive, of which the recording was spoiled before anybody looked at it."""
-    record = driving.record_drive
+    drive = driving.drive
 
-    def record_and_spoil(order, console):
-        folder, run, complaints = record(order, console)
-        spoiled(folder.recording)
-        return folder, run, complaints
+    def drive_and_spoil(**options):
+        driven = drive(**options)
+        spoiled(driven.recording)
+        return driven
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driving, 'record_drive', record_and_spoil)
+        patch.setattr(driving, 'drive', drive_and_spoil)
         return told(tmp_path_factory.mktemp('bad') / 'run')
 
 

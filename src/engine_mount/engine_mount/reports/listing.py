@@ -4,7 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import audit
@@ -24,9 +24,8 @@ from engine_mount.recordings.session import (
 )
 from engine_mount.settings.changes import changed_parameters
 from engine_mount.settings.run_folder import RunFolder
-from engine_mount.signals.sources.local import local_path
-from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.sources.stores import is_local, outline
+from engine_mount.signals.sources.stores import entries
+from engine_mount.signals.sources.uris import inside, is_local, local_path
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
@@ -57,9 +56,8 @@ class Description(NamedTuple):
 def list_recordings(folders: Sequence[Path | str]) -> list[Figures]:
     """Return the recordings in `folders`, and those that these are themselves, the newest first.
 
-    A folder is a path or a URI; of what lies in a store only the ends are read. `sound` is None where no
-    summary of a run says whether anything was lost or went wrong. Raises `SourceError` where a store does not
-    say what is there.
+    A folder is a path or a URI; in a store only names and sizes are read. `sound` is None where no summary of
+    a run says whether anything was lost or went wrong. Raises `SourceError` where a store cannot be listed.
     """
     found = [one for folder in folders for one in _recordings_at(str(folder))]
     return sorted(found, key=lambda one: _seconds(one['started']), reverse=True)
@@ -153,14 +151,33 @@ def _recordings_at(folder: str) -> Iterator[Figures]:
     if is_local(folder):
         yield from map(summarise_recording, _places(local_path(folder)))
         return
-    from engine_mount.signals.sources.outlines import recordings_at
+    for uri, size in _stored(folder).items():
+        verdict = f'{size / 1e6:.1f} MB, not read: engine-mount info fetches it'
+        yield {'recording': uri, **_UNKNOWN, 'verdict': verdict, 'sound': None}
 
-    for uri in recordings_at(folder):
-        try:
-            with outline(uri) as path:
-                yield {**summarise_recording(path), 'recording': uri}
-        except SourceError as error:
-            yield {'recording': uri, **_UNKNOWN, 'verdict': str(error), 'sound': False}
+
+def _stored(folder: str) -> dict[str, int]:
+    """Return the recordings and runs that a place in a store is or directly holds, with their bytes."""
+    root = folder.rstrip('/')
+    files = {entry.uri[len(root) :].strip('/'): entry.size for entry in entries(folder)}
+    if '' in files:
+        return {folder: files['']}
+    found: dict[str, int] = {}
+    for name, size in files.items():
+        first, _, rest = name.partition('/')
+        found[first if rest else ''] = found.get(first if rest else '', 0) + size
+    recorded = {PurePosixPath(name).parent.as_posix() for name in files if _is_recorded(name)}
+    if recorded & {'.', 'recording'}:
+        return {folder: sum(files.values())}
+    return {
+        inside(folder, name): size
+        for name, size in sorted(found.items())
+        if recorded & {name, f'{name}/recording'}
+    }
+
+
+def _is_recorded(name: str) -> bool:
+    return name.endswith('.mcap') or PurePosixPath(name).name == METADATA_NAME
 
 
 def _places(folder: Path) -> Iterator[Path]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.signals.quantities import Quantity
 from engine_mount.signals.signal import FloatArray
-from engine_mount.signals.units.quantities import Quantity
 from mount_ros import topics
 from mount_ros.messages.cdr import accelerometer
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
