@@ -20,7 +20,7 @@ from engine_mount.reports.sections.periodic import (
     rms_per_band,
     whole_periods,
 )
-from engine_mount.reports.sections.run import coil_load, share_at_limit
+from engine_mount.reports.sections.run import coil_load
 from engine_mount.reports.sections.section import GOOD, LOOK, UNKNOWN
 from engine_mount.reports.sections.subject import QUANTITIES, Run, Signal, Subject
 
@@ -115,7 +115,6 @@ def test_the_heat_of_a_coil_is_that_of_the_rms_current():
     assert load.rms_current == pytest.approx(np.sqrt(3.0))
     assert load.mean_heat == pytest.approx(7.5)
     assert load.energy == pytest.approx(30.0)
-    assert share_at_limit(TIME, current, 3.0) == pytest.approx(0.25)
 
 
 def test_unknown_current_is_neither_load_nor_time():
@@ -124,7 +123,6 @@ def test_unknown_current_is_neither_load_nor_time():
     assert load.rms_current == pytest.approx(2.0)
     unknown = np.full(len(TIME), np.nan)
     assert np.isnan(coil_load(TIME, unknown, 1.0).rms_current)
-    assert np.isnan(share_at_limit(TIME, unknown, 3.0))
 
 
 def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy_and_their_difference_below():

@@ -19,8 +19,8 @@ Examples:
 
 `engine-mount view --host 0.0.0.0` - from a phone in the same network: with the token that is printed
 
-The page shows beside the mount that is driven what the hydromount, the mount without damping and the other
-policies would do on the same acceleration of the chassis. It needs nothing from the internet.
+The page shows beside the mount that is driven what the hydromount and the mount without damping would do
+on the same acceleration of the chassis. It needs nothing from the internet.
 """
 
 STATUS_EPILOG = """Exit code: 0; 1 with `--once` when no node of the graph tells anything within 3 s.
@@ -50,9 +50,7 @@ def view(
     ] = '127.0.0.1',
     port: Annotated[int, typer.Option(help='of the page')] = 8137,
     foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
-    beside: Annotated[
-        bool, typer.Option('--beside/--no-beside', help='simulate other mounts and policies beside')
-    ] = True,
+    beside: Annotated[bool, typer.Option('--beside/--no-beside', help='simulate other mounts beside')] = True,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:

@@ -63,20 +63,16 @@ def _cells(subject: Subject) -> dict[str, Cell]:
 
 
 def _friction_cells(subject: Subject) -> dict[str, Cell]:
-    names = ('peak current', 'damping switched on', 'friction force error')
-    if reason := subject.run.without_friction:
-        return dict.fromkeys(names, f'not applicable: {reason}')
-    figures, setpoint = subject.figures, subject['setpoint']
-    peak, switched, error = (
-        figures[name] for name in ('peak_current_a', 'damping_switched_on', 'tracking_error_rms')
-    )
-    current: Cell = 'not recorded' if peak is None else quantity_text(peak, 'A')
-    if peak is not None and setpoint is not None and (setpoint.values == peak).any():
-        current = Link(str(current), 'traces', float(setpoint.time[np.argmax(setpoint.values == peak)]))
-    percent = f'{100.0 * (error or 0.0):.1f} % rms of the peak wanted force'
-    switchings: Cell = 'not recorded' if switched is None else Link(_times(switched), 'switching')
-    followed: Cell = 'not known' if error is None else Link(percent, 'tracking')
-    return dict(zip(names, (current, switchings, followed), strict=True))
+    figures, cells = subject.figures, {}
+    for name, figure, section, text in (
+        ('peak current', 'peak_current_a', 'traces', lambda value: quantity_text(value, 'A')),
+        ('damping switched on', 'damping_switched_on', 'switching', _times),
+        ('friction force error', 'tracking_error_rms', 'tracking', _percent),
+    ):
+        known: Cell = 'not known' if figures[figure] is None else Link(text(figures[figure]), section)
+        reason = subject.run.without_friction
+        cells[name] = f'not applicable: {reason}' if reason else known
+    return cells
 
 
 def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
@@ -156,3 +152,7 @@ def _change(value: float, reference: float) -> str:
 
 def _times(count: int) -> str:
     return 'once' if count == 1 else f'{count} times'
+
+
+def _percent(share: float) -> str:
+    return f'{100.0 * share:.1f} % rms of the peak wanted force'
