@@ -35,7 +35,7 @@ def compare(
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
     json_file: JsonFile = None,
     figure: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='draw the most important differences (PNG)')
+        Path | None, typer.Option(metavar='FILE', help='draw both and their difference (PNG)')
     ] = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
