@@ -101,19 +101,19 @@ def select_rows(
     columns = [measured.column(choice.column) for choice in mapping.columns.values()]
     base = times_of(measured, columns[0], mapping.time, slowest)[0] if timed else columns[0].time
     inside = np.full(columns[0].values.size, True)
-    rows = {}
-    for name, column in zip(mapping.columns, columns, strict=True):
+    together = [_at_times_of(columns[0], column, name_of(uri), inside) for column in columns]
+    rows = {} if base is None or not timed else {'time': base.times[inside]}
+    for (name, choice), column, values in zip(mapping.columns.items(), columns, together, strict=True):
         where = f'{name_of(uri)}, column {column.name!r}'
-        at_first = replace(column, values=_at_times_of(columns[0], column, where, inside))
-        bad = np.flatnonzero(inside & ~np.isfinite(at_first.values))
+        bad = np.flatnonzero(inside & ~np.isfinite(values))
         if bad.size:
             raise SignalError(
-                f'{where}: row {bad[0] + 1} is {column.values[bad[0]]} ({bad.size} '
-                f'such of {column.values.size}); leave these rows out'
+                f'{where}: row {bad[0] + 1} is {values[bad[0]]} ({bad.size} such of {values.size}); leave '
+                'these rows out'
             )
-        rows[name], _ = _in_si(where, at_first, known[name], mapping.columns[name], mapping.option)
-    times = {'time': base.times[inside]} if base is not None and timed else {}
-    return {**times, **{name: values[inside] for name, values in rows.items()}}
+        column = replace(column, values=values[inside])
+        rows[name], _ = _in_si(where, column, known[name], choice, mapping.option)
+    return rows
 
 
 def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
@@ -167,7 +167,7 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
     for one in there:
         before, _, unit = one.header.lower().partition(f'{wanted.name}_')
         if not before and is_unit(unit, wanted.dimension) and not fitting:
-            fitting.append(ColumnChoice(one.name, unit))
+            fitting.append(ColumnChoice(one.name, unit_of(unit, wanted.dimension).symbol))
     if len(fitting) > 1:
         names = ', '.join(choice.column for choice in fitting)
         raise SignalError(f'{wanted.name} may be each of the columns {names}; name one')
@@ -236,7 +236,7 @@ def _at_times_of(
     if column.time is first.time or column.time is None or first.time is None:
         if column.values.size != first.values.size:
             raise SignalError(
-                f'{where} has {column.values.size} samples, {first.name} has '
+                f'{where}: {column.name} has {column.values.size} samples, {first.name} has '
                 f'{first.values.size}, and no times tell which belong together; give columns of one length'
             )
         return column.values
@@ -247,6 +247,7 @@ def _at_times_of(
         inside &= (at >= own[0] - _SAME_TIME) & (at <= own[-1] + _SAME_TIME)
     if not (own.size and inside.any()):
         raise SignalError(
-            f'{where}, and {first.name} have no time in common; give columns that were sampled together'
+            f'{where}: {column.name} and {first.name} have no time in common; give columns that were sampled '
+            'together'
         )
     return np.interp(at, own, column.values[known])
