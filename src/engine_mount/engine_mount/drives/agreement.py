@@ -10,15 +10,14 @@ from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
 from engine_mount.drives.inputs.consumed_samples import Times
 from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.difference import (
+    EXACT,
     Column,
     Moment,
-    Quantity,
     SignalDifference,
     signal_difference,
     signal_sentences,
 )
-from engine_mount.recordings.switching import Switching, paired_switchings, switching_times
-from engine_mount.recordings.tolerances import EXACT
+from engine_mount.recordings.events import Switching, paired_switchings, switching_times
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 
 # Where a recording begins in the middle of control: what the controller remembered is not in it. The
@@ -68,7 +67,7 @@ class Agreement:
                 f'equal to the recorded setpoints to the last bit ({count} setpoints, '
                 f'{steps} steps with all their intermediates)'
             ]
-        told = signal_sentences(self.differing, _NAMES[1])
+        told = signal_sentences(self.differing)
         if self.setpoints.differing:
             told.insert(0, f'{self.setpoints.differing} of {count} setpoints differ')
         if self.unanswered:
@@ -96,7 +95,6 @@ def agreement(given: ReplayInput, replayed: Replayed) -> Agreement | None:
         time,
         recorded.currents[places[judged]],
         currents[judged],
-        given.sample_time,
     )
     samples = np.concatenate([part.stamps for part in given.parts])
     return Agreement(
@@ -165,18 +163,16 @@ def _intermediates(
     places, known = _matched(given.answers.trace_stamps, stamps)
     time = _seconds(given, stamps[known])
     return tuple(
-        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known], given.sample_time)
+        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known])
         for name, values in given.answers.traces.items()
         if name in (traces.dtype.names or ())  # another policy traces something else
     )
 
 
-def _judged(
-    topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
-) -> SignalDifference:
+def _judged(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
     unit = topic.unit(signal)
-    column = Column(Quantity('', topic.name, signal, '' if unit == '1' else unit), time, a, b)
-    return signal_difference(column, EXACT, None, sample_time)
+    column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
+    return signal_difference(column, EXACT)
 
 
 def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:

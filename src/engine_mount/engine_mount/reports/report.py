@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.recordings.alignment import ComparisonError, share_stamps
 from engine_mount.recordings.compare import compare
+from engine_mount.recordings.matching import ComparisonError, share_stamps
 from engine_mount.recordings.place import open_run
 from engine_mount.recordings.recording import Recording
 from engine_mount.reports.drawing.page import page

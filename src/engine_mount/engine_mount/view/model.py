@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.layout import LayoutError
+from engine_mount.recordings.mcap_records import HEAD
 from engine_mount.recordings.series import Payloads, Series, SeriesError
-from engine_mount.recordings.stored import HEAD
 from engine_mount.reports.drawing.chart import Chart, Curve, Panel, level_lines
 from engine_mount.reports.drawing.detail import browser_chart
 from engine_mount.reports.drawing.style import COLOUR_OF

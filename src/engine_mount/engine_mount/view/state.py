@@ -5,8 +5,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from engine_mount.recordings.definitions import installed_definition
-from engine_mount.recordings.layout import decode
+from engine_mount.recordings.layout import decode, installed_definition
 from engine_mount.recordings.session import SessionError, session_content, session_parameters
 from engine_mount.view.feed import Message
 from mount_ros.messages.event import read_mark

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -81,13 +81,6 @@ def height_column(columns: Sequence[str]) -> str:
     if len(columns) > 1:
         raise typer.BadParameter('--column is given once for a road: the column of its height')
     return columns[0] if columns else ''
-
-
-def given_without_road(**options: Any) -> None:
-    """Refuse options that say something of a road where there is none."""
-    for name, value in options.items():
-        if value not in (None, '', False, 0.0):
-            raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
 
 
 def _number(text: str) -> float:

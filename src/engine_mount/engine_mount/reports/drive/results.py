@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.audit_report import as_table, sentences
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.losses import as_table, losses, sentences
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends

@@ -9,10 +9,10 @@ import numpy as np
 
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, control_spans
+from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
-from engine_mount.recordings.switching import switching_times
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.recordings.alignment import alignment_sentence
-from engine_mount.recordings.audit_report import sentences as audit_sentences
 from engine_mount.recordings.difference import SignalDifference, by_importance, quantity_text
+from engine_mount.recordings.losses import sentences as audit_sentences
+from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
 from engine_mount.reports.drawing.chart import DASHED, Array, Chart, Curve, Panel, Span
 from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS

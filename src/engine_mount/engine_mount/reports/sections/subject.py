@@ -11,7 +11,7 @@ import numpy as np
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, audit, control_spans
 from engine_mount.recordings.compare import Comparison
-from engine_mount.recordings.events import recorded_marks
+from engine_mount.recordings.events import recorded_marks, switching_times
 from engine_mount.recordings.losses import Losses, losses
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import SeriesError
@@ -22,7 +22,6 @@ from engine_mount.recordings.session import (
     session_content,
     session_parameters,
 )
-from engine_mount.recordings.switching import switching_times
 from engine_mount.recordings.times import Times, each_once
 from engine_mount.reports.drawing.chart import Array, Curve
 from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
