@@ -1,7 +1,7 @@
 """A recorded or measured signal that shakes the simulated car, written as the plain file that it reads."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,26 +12,22 @@ from engine_mount.recordings.place import recording_hash
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.provenance import told_columns, told_mapping, told_source
-from engine_mount.signals.importing.topics import recorded_as
-from engine_mount.signals.signal import Signal
-from engine_mount.signals.units.columns import read_chosen, stated_with
-from engine_mount.signals.units.mapping import (
-    ColumnChoice,
-    MappingError,
-    checked_scale,
-    mapping_in_file,
-    with_options,
-)
-from engine_mount.signals.units.mapping import Mapping as ColumnMapping
-from engine_mount.signals.units.quantities import quantity
-from engine_mount.signals.units.signals import chosen_signals
+from engine_mount.signals.importing.channels import recorded_as
+from engine_mount.signals.importing.provenance import told_mapping, told_provenance
+from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
+from engine_mount.signals.mapping import Mapping as ColumnMapping
+from engine_mount.signals.quantities import QUANTITIES
+from engine_mount.signals.roads.driving import Road, wheel_height
+from engine_mount.signals.selection import select
+from engine_mount.signals.signal import Signal, SignalError
 
 FOLDER = 'given'
 """In the folder of a run: the files that its simulator reads."""
 _ACCELERATION = 'acceleration'
-_OWN = recorded_as(quantity(_ACCELERATION))
+_QUANTITY = {_ACCELERATION: QUANTITIES[_ACCELERATION]}
+_OWN = recorded_as(QUANTITIES[_ACCELERATION])
 _OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
 
 
@@ -40,14 +36,13 @@ class ExternalExcitation:
     """A signal in a foreign file: `parameter` of mount_sim names its plain copy, which `write` makes.
 
     `write` takes a folder and returns the path of the file in it. `origin` is plain data for the session,
-    `settings` are further parameters of mount_sim, `notes` sentences.
+    `notes` are sentences.
     """
 
     parameter: str
     write: Callable[[Path], Path]
     origin: Mapping[str, Any]
     notes: Sequence[str] = ()
-    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def scenario(self) -> str:
@@ -56,7 +51,7 @@ class ExternalExcitation:
 
     def parameters(self, folder: Path) -> dict[str, Any]:
         """Write the file into `folder` and return the parameters of mount_sim that name it."""
-        return {**self.settings, self.parameter: str(self.write(folder).absolute())}
+        return {self.parameter: str(self.write(folder).absolute())}
 
     def provenance(self, file: str) -> dict[str, Any]:
         """Return what the session says of it: origin, and name and hash of the written `file`.
@@ -77,30 +72,54 @@ def recorded_acceleration(
     mapping_file: Path | None = None,
     stated: Stated | None = None,
 ) -> ExternalExcitation:
-    """Return the acceleration that `columns` (`COLUMN[:UNIT]`) choose in `file`, a path or URI.
+    """Return the acceleration that `columns` (`COLUMN[:UNIT]`) choose in `file`, a path or URI, in m/s^2.
 
-    One column where a mapping file names none; of a recording of this project none is needed. The samples
-    stay in the unit of the file, so that the simulation does not depend on who reads them. Raises
-    `MappingError`, `UnitError`, `SignalError` or `SourceError`, also where the unit may be another one.
+    One column where a mapping file names none; of a recording of this project none is needed. Raises
+    `SignalError` or `SourceError`, also for values that could be in another unit.
     """
     mapping = mapping_in_file(mapping_file) if mapping_file else ColumnMapping()
-    mapping = with_options(mapping, columns, time, rate, default=_ACCELERATION)
-    choice = mapping.columns.get(_ACCELERATION) or _own_column(file, stated_with(mapping, stated))
-    if scale is not None:
-        choice = replace(choice, scale=checked_scale(scale, '--scale'))
-    mapping = replace(mapping, columns={_ACCELERATION: choice}, others={})
-    measured = read_chosen(file, mapping, stated)
-    chosen = chosen_signals(measured, mapping)
-    signal = chosen[_ACCELERATION].signal
+    mapping = mapping.of(_QUANTITY)
+    mapping = with_options(
+        mapping, columns, time, rate, default=_ACCELERATION, known=_QUANTITY, stated=stated
+    )
+    if not mapping.columns:
+        there = headings(file, mapping.stated)
+        if not any(heading.name == _OWN_COLUMN for heading in there):
+            raise SignalError(
+                f'{file}: say which column is the acceleration, upwards, with --column COLUMN:UNIT; there '
+                f'are {listed(there)}'
+            )
+        mapping = mapping.only({_ACCELERATION: ColumnChoice(_OWN_COLUMN)})
+    mapping = with_options(mapping, scale=scale)
+    selection = select(file, mapping)
+    signal = selection.signals[_ACCELERATION]
     evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
     origin = {
-        **told_source(measured),
+        **told_provenance(selection.provenance),
         'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
-        'columns': told_columns(chosen),
+        'columns': selection.columns,
     }
-    notes = (*measured.notes, *signal.notes)
-    scaled = {'recorded.scale': chosen[_ACCELERATION].factor}
-    return ExternalExcitation('recorded.file', partial(_write, signal), origin, notes, scaled)
+    return ExternalExcitation(
+        'recorded.file', partial(_write, signal), origin, (*selection.notes, *signal.notes)
+    )
+
+
+def measured_road(
+    road: Road, *, duration: float = 0.0, contact_length: float | None = None, repeat: bool = False
+) -> ExternalExcitation:
+    """Return a road at its speed as excitation for `duration` s (0: once).
+
+    With `repeat` it is driven forth and back. The tyre stands on `contact_length` m (None: 0.1). Raises
+    `SignalError`, also for a road without a speed.
+    """
+    if road.speed is None:
+        raise SignalError('a road needs a speed: --speed 60/3.6 (m/s), or a file of the speed over time')
+    over = wheel_height(
+        road.profile, road.speed, contact_length=contact_length, duration=duration, repeat=repeat
+    )
+    sentences = (*road.unevenness.sentences(), *over.notes)
+    notes = tuple(f'{road.profile.name}: {sentence}' for sentence in sentences)
+    return ExternalExcitation('road.file', over.write, over.told, notes)
 
 
 def _write(signal: Signal, folder: Path) -> Path:
@@ -111,14 +130,3 @@ def _write(signal: Signal, folder: Path) -> Path:
     np.save(folder / f'{name}_value.npy', signal.values)
     np.save(folder / f'{name}_t.npy', signal.times)
     return folder / f'{name}_value.npy'
-
-
-def _own_column(file: str, stated: Stated | None) -> ColumnChoice:
-    """Return the column of an acceleration that this project recorded; raises `MappingError`."""
-    there = headings(file, stated)
-    if any(heading.name == _OWN_COLUMN for heading in there):
-        return ColumnChoice(_OWN_COLUMN)
-    raise MappingError(
-        f'{file}: say which column is the acceleration, upwards, with --column COLUMN:UNIT; there are '
-        + ', '.join(f'{one.name} [{one.unit}]' if one.unit else one.name for one in there)
-    )

@@ -223,7 +223,9 @@ class Recording:
         for file, block, _ in self.stored_blocks(places):
             for name in counts:
                 numbers = self.topics[name].places.get(file)
-                own = block.of(numbers) if numbers else ()
+                if not numbers:
+                    continue
+                own = block.of(numbers)
                 counts[name] += len(own)
                 for begin in range(0, len(own), size or len(own) or 1):
                     part = own.at(slice(begin, begin + size if size else None))

@@ -16,7 +16,7 @@ def driven(tmp_path, file, columns, **more):
     """Return the acceleration (m/s^2) that drives the car, and the excitation."""
     brought = recorded_acceleration(str(file), columns, **more)
     even = recorded_signal(RecordedScenario(str(brought.write(tmp_path / 'given'))))
-    return acceleration_at(even, brought.settings['recorded.scale'], 1e-3)[:], brought
+    return acceleration_at(even, 1e-3)[:], brought
 
 
 def test_it_is_to_the_bit_what_the_simulator_reads_by_itself(tmp_path):
@@ -25,7 +25,7 @@ def test_it_is_to_the_bit_what_the_simulator_reads_by_itself(tmp_path):
     rows = np.column_stack([times, np.random.default_rng(4).standard_normal(500)])
     np.savetxt(file, rows, '%.17g', delimiter=',', header='t,az', comments='')
     found, brought = driven(tmp_path, file, ['az'], scale=-1.0)
-    by_itself = acceleration_at(recorded_signal(RecordedScenario(str(file), 'az')), -1.0, 1e-3)[:]
+    by_itself = acceleration_at(recorded_signal(RecordedScenario(str(file), 'az', scale=-1.0)), 1e-3)[:]
     assert found.tobytes() == by_itself.tobytes()
     assert brought.origin['file'] == 'drive.csv'
 

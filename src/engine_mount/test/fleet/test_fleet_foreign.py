@@ -93,7 +93,7 @@ def test_each_file_is_read_by_its_mapping_and_what_is_wrong_is_a_row(drives, sai
     assert gap['duration_s'] == pytest.approx(4.398)
     assert gap['peak_displacement_m'] is None
     assert (
-        'no column that rack.yaml, car.yaml names; its columns are t, Kraft'
+        'no column that rack.yaml, car.yaml names; its columns are t [s], Kraft [N]'
         in found['car/other.csv']['reason']
     )
     assert found['car/garbage.mf4']['kind'] == 'unreadable'

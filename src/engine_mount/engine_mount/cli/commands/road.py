@@ -11,7 +11,6 @@ from engine_mount.cli.commands.road_arguments import (
     HeightColumn,
     Lateral,
     SpeedText,
-    road_of_options,
 )
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import note, terminal
@@ -59,26 +58,23 @@ def show(
 
     With `--speed` also which frequencies it holds at that speed.
     """
+    from engine_mount import road
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.roads.iso8608 import unevenness
-    from engine_mount.signals.roads.speed import speed_of
-    from engine_mount.signals.roads.telling import as_figures, as_rows
 
     console = terminal()
-    profile = road_of_options(file, lateral, column, distance)
-    found, driven = unevenness(profile), speed_of(speed) if speed else None
-    TerminalScreen(console).table(Table(profile.name, 'll', as_rows(profile, found, driven)))
-    for sentence in profile.notes:
+    found = road(file, lateral=lateral, column=column, distance=distance, speed=speed)
+    TerminalScreen(console).table(Table(found.profile.name, 'll', found.rows()))
+    for sentence in found.profile.notes:
         note(console, sentence)
     if figure is not None:
         from engine_mount.reports.road_picture import draw_road
 
-        draw_road(profile, found, figure)
+        draw_road(found.profile, found.unevenness, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
     if json_file is not None:
-        write_json(as_figures(profile, found), json_file)
+        write_json(found.figures, json_file)
 
 
 @app.command(cls=Command, epilog=_INVERT_EPILOG)
@@ -104,18 +100,17 @@ def invert(
     acceleration cannot tell is said here and in the file.
     """
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.roads.inverting import UNKNOWN, inverted
-    from engine_mount.signals.roads.speed import speed_of
-    from engine_mount.signals.units.columns import read_chosen
-    from engine_mount.signals.units.mapping import Mapping, with_options
-    from engine_mount.signals.units.signals import signals
+    from engine_mount.signals.mapping import Mapping, with_options
+    from engine_mount.signals.roads.driving import speed_of
+    from engine_mount.signals.roads.inversion import UNKNOWN, inverted
+    from engine_mount.signals.selection import select
 
     if not column:
         raise typer.BadParameter('name the acceleration: --column NAME:UNIT, as in --column az:m/s^2')
     console = terminal()
     mapping = with_options(Mapping(), [column], time, rate, scale, 'acceleration')
     driven = speed_of(speed)
-    signal = signals(read_chosen(file, mapping), mapping)['acceleration']
+    signal = select(file, mapping).signals['acceleration']
     road = inverted(signal, driven)
     road.write(out, Path(file).name)
     for sentence in (*signal.notes, *road.notes, *(f'not known: {word}' for word in UNKNOWN)):

@@ -135,7 +135,7 @@ def _shaken(recording: Recording, start: float) -> Excitation:
     series = recording[SIM_CHASSIS_ACCELERATION.name]
     times = (series.stamps - series.stamps[0]) * 1e-9
     signal = signal_of(SIM_CHASSIS_ACCELERATION.name, times, series[_VERTICAL])
-    values = acceleration_at(evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE), 1.0, STEP_TIME)
+    values = acceleration_at(evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE), STEP_TIME)
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, start)
 
 
