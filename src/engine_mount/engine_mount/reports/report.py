@@ -80,8 +80,8 @@ def report(
     path: str | Path | Sequence[str | Path],
     *,
     compare_with: str | Path | None = None,
-    out: Path | None = None,
-    pictures: Path | None = None,
+    out: str | Path | None = None,
+    pictures: str | Path | None = None,
     on_step: OnStep = lambda share, what: None,
 ) -> Report:
     """Return the report of the recordings or runs at `path`, and how the one to `compare_with` differs.
@@ -105,6 +105,7 @@ def report(
     try:
         if out is not None:
             on_step(0.6, 'writing the page')
+            out = Path(out)
             out.parent.mkdir(parents=True, exist_ok=True)
             made.write_page(out)
         drawn = (
@@ -115,7 +116,7 @@ def report(
     except OSError as error:
         file = error.filename or out
         raise ReportError(f'{file} cannot be written: {error.strerror}; choose another --out') from None
-    return replace(made, page=out, pictures=drawn)
+    return replace(made, page=None if out is None else Path(out), pictures=drawn)
 
 
 def default_page(path: Path) -> Path:
