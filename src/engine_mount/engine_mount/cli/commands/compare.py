@@ -57,9 +57,9 @@ def _compare(
     a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
+    from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.compare import compare as compare_recordings
-    from engine_mount.recordings.difference import Tolerances, signal_table
+    from engine_mount.recordings.difference import signal_table
     from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
@@ -67,7 +67,7 @@ def _compare(
     console = terminal()
     say = functools.partial(console.print, soft_wrap=True)
     recordings = open_run(local(a, console)), open_run(local(b, console))
-    comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
+    comparison = compare_recordings(*recordings, tolerances, common=common)
     say(f'A {comparison.name_a}, B {comparison.name_b}')
     for sentence in comparison.sentences():
         say(f'- {sentence}')
