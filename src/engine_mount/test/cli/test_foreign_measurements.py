@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from engine_mount.cli.calibration.given import columns_of
+from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.friction.channels import said
 from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.friction.recording import IdentificationError
 from engine_mount.identification.rack.columns import RackRecordingError
 from engine_mount.identification.rack.force_points import read_force
 from engine_mount.identification.rack.given import GivenValues

@@ -8,7 +8,8 @@ from geometry_msgs.msg import WrenchStamped
 
 from engine_mount.cli.command import main
 from engine_mount.drives.loop.run import run_core
-from engine_mount.identification.drift.law import DriftError, fitted_drift
+from engine_mount.identification.drift import fit_line
+from engine_mount.identification.fitting import IdentificationError
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import serialised
 from mount_ros.messages.force_table import to_message
@@ -159,12 +160,12 @@ def test_recordings_without_load_cells_leave_friction_to_the_others(drives, on_r
 @pytest.mark.parametrize(
     ('count', 'hours', 'sentence'),
     [
-        (1, HOURS[:1], '1 recording tells no drift; at least 2'),
+        (1, HOURS[:1], '1 recording shows no drift; at least 2'),
         (3, (5.0, 5.0, 5.0), 'all 3 recordings are from one time'),
-        (2, None, 'does not tell when it began'),
+        (2, None, 'holds no time at which it began'),
     ],
 )
-def test_what_tells_no_drift_is_refused(drives, count, hours, sentence, tmp_path, capsys):
+def test_what_shows_no_drift_is_refused(drives, count, hours, sentence, tmp_path, capsys):
     told = [] if hours is None else hours_of(drives[:count], hours)
     assert drift(*drives[:count], *told, '--json', tmp_path / 'd.json') == 1
     assert sentence in capsys.readouterr().err.replace('\n', ' ')
@@ -179,12 +180,10 @@ def test_hours_of_some_recordings_only_are_refused(drives, capsys):
 def test_the_stated_deviation_of_the_slope_is_the_scatter_of_repeated_slopes():
     random = np.random.default_rng(0)
     hours, stds = np.array([0.0, 1.0, 2.0, 5.0, 9.0]), np.array([1.0, 2.0, 1.0, 3.0, 1.0])
-    fits = [
-        fitted_drift(hours, 3.0 - 0.5 * hours + stds * random.standard_normal(5), stds) for _ in range(400)
-    ]
+    fits = [fit_line(hours, 3.0 - 0.5 * hours + stds * random.standard_normal(5), stds) for _ in range(400)]
     slopes = np.array([fit.slope for fit in fits])
     assert slopes.mean() == pytest.approx(-0.5, abs=0.03)
-    exact = fitted_drift(hours, 3.0 - 0.5 * hours, stds)
+    exact = fit_line(hours, 3.0 - 0.5 * hours, stds)
     assert exact.ratio == 1.0
     assert slopes.std() == pytest.approx(exact.slope_std, rel=0.1)
 
@@ -192,20 +191,20 @@ def test_the_stated_deviation_of_the_slope_is_the_scatter_of_repeated_slopes():
 def test_values_that_scatter_more_than_stated_are_less_sure():
     hours = np.arange(6.0)
     values = np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])
-    stated, wide = (fitted_drift(hours, values, np.full(6, std)) for std in (0.01, 10.0))
-    assert stated.slope_std == pytest.approx(fitted_drift(hours, values).slope_std)
+    stated, wide = (fit_line(hours, values, np.full(6, std)) for std in (0.01, 10.0))
+    assert stated.slope_std == pytest.approx(fit_line(hours, values).slope_std)
     assert wide.slope_std == pytest.approx(10.0 / np.sqrt(17.5))
 
 
 def test_without_stated_deviations_the_scatter_of_the_values_tells_that_of_the_slope():
     random = np.random.default_rng(1)
     hours = np.array(RACK_HOURS)
-    fits = [fitted_drift(hours, 0.8 - 4e-4 * hours + 4e-3 * random.standard_normal(6)) for _ in range(400)]
+    fits = [fit_line(hours, 0.8 - 4e-4 * hours + 4e-3 * random.standard_normal(6)) for _ in range(400)]
     slopes, stated = np.array([(fit.slope, fit.slope_std) for fit in fits]).T
     assert slopes.mean() == pytest.approx(-4e-4, abs=5e-6)
     assert np.sqrt(np.mean(stated**2)) == pytest.approx(slopes.std(), rel=0.1)
 
 
 def test_a_deviation_of_zero_is_refused():
-    with pytest.raises(DriftError, match='must be above 0'):
-        fitted_drift([0.0, 1.0], [1.0, 2.0], [0.1, 0.0])
+    with pytest.raises(IdentificationError, match='must be above 0'):
+        fit_line([0.0, 1.0], [1.0, 2.0], [0.1, 0.0])

@@ -30,7 +30,7 @@ def read_damper(path: Path, said: Said, clamp: str) -> FrictionRecording:
     """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
     Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `said` may name others, by name
-    or number. The zero of its cell is not known; the loop tells it (`looks/force_zero.py`).
+    or number. The zero of its cell is not known; the loop tells it (`look.subtract_zero`).
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
     tightens itself while it slides: the taut end then carries the friction force, with a factor that depends
@@ -66,11 +66,11 @@ def read_damper(path: Path, said: Said, clamp: str) -> FrictionRecording:
         force,
         np.tile(normal, (time.size, 1)) if measured is None else measured,
         columns.get(DESIRED),
-        notes=tuple(notes),
         coefficient_range=COEFFICIENT_RANGE if measured is not None or clamp == 'sliding' else (0.0, np.inf),
     )
     return replace(
         recording,
+        notes=tuple(notes),
         zero_from='law',
         direction_spread=DIRECTION_SPREAD if measured is not None or clamp == 'sliding' else _BAND_SPREAD,
     )

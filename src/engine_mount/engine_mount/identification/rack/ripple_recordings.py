@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.identification.actuator.points import gap_groups
-from engine_mount.identification.coil.gap_point import RippleRecording
+from engine_mount.identification.coil.points import RippleRecording
 from engine_mount.identification.rack.columns import (
     CURRENT,
     CURRENT_RATE,
