@@ -1,27 +1,31 @@
 """Whether a replay gives the recorded answers: matched by stamps, then judged as any two recordings are."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
-from engine_mount.drives.inputs.input import ReplayInput, Times
+from engine_mount.drives.inputs.consumed_samples import Times
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.difference import (
+    EXACT,
     Column,
-    Quantity,
+    Moment,
     SignalDifference,
     signal_difference,
     signal_sentences,
 )
-from engine_mount.recordings.switching import Switching, paired_switchings, switching_times
-from engine_mount.recordings.tolerances import EXACT
+from engine_mount.recordings.events import Switching, paired_switchings, switching_times
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 
 # Where a recording begins in the middle of control: what the controller remembered is not in it. The
 # band-pass forgets by e^-25 in 1 s, the friction deflection slowly; measured after 3 s: within 0.06 uA.
 SETTLING = 3.0  # s, chosen
 SETTLED = 1e-6  # A, chosen
+SHOWN = 8
+"""Switchings that a summary names one by one."""
 _ACTIVE = 'damping_active'
 _NAMES = ('the recording', 'the replay')
 
@@ -63,7 +67,7 @@ class Agreement:
                 f'equal to the recorded setpoints to the last bit ({count} setpoints, '
                 f'{steps} steps with all their intermediates)'
             ]
-        told = signal_sentences(self.differing, _NAMES[1])
+        told = signal_sentences(self.differing)
         if self.setpoints.differing:
             told.insert(0, f'{self.setpoints.differing} of {count} setpoints differ')
         if self.unanswered:
@@ -91,7 +95,6 @@ def agreement(given: ReplayInput, replayed: Replayed) -> Agreement | None:
         time,
         recorded.currents[places[judged]],
         currents[judged],
-        given.sample_time,
     )
     samples = np.concatenate([part.stamps for part in given.parts])
     return Agreement(
@@ -128,6 +131,24 @@ def switching_changes(recorded: Switching, replayed: Switching, sample_time: flo
     return [change.sentence(*_NAMES) for change in changes if change.alone or change.moved]
 
 
+def switching_text(times: Switching) -> str:
+    """Return when damping was switched, in words."""
+    if not times.on:
+        return 'never on'
+    pairs = [(on, next((off for off in times.off if off > on), None)) for on in times.on]
+    shown = [f'{on:.3f} s to {f"{off:.3f} s" if off is not None else "the end"}' for on, off in pairs]
+    more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
+    return 'on from ' + ', '.join(shown[:SHOWN]) + more
+
+
+def moment_figures(moment: Moment | None) -> dict[str, float | None] | None:
+    """Return a difference as JSON has it: time in s, currents in A, unknown is None."""
+    if moment is None:
+        return None
+    recorded, replayed = (None if math.isnan(value) else value for value in (moment.a, moment.b))
+    return {'time_s': moment.time, 'recorded_a': recorded, 'replayed_a': replayed}
+
+
 def _intermediates(
     given: ReplayInput, answered: list, settled: list[NDArray[np.bool_]]
 ) -> tuple[SignalDifference, ...]:
@@ -142,18 +163,16 @@ def _intermediates(
     places, known = _matched(given.answers.trace_stamps, stamps)
     time = _seconds(given, stamps[known])
     return tuple(
-        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known], given.sample_time)
+        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known])
         for name, values in given.answers.traces.items()
         if name in (traces.dtype.names or ())  # another policy traces something else
     )
 
 
-def _judged(
-    topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
-) -> SignalDifference:
+def _judged(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
     unit = topic.unit(signal)
-    column = Column(Quantity('', topic.name, signal, '' if unit == '1' else unit), time, a, b)
-    return signal_difference(column, EXACT, None, sample_time)
+    column = Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b)
+    return signal_difference(column, EXACT)
 
 
 def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Files of others in a fleet: which mapping is theirs, and the recording that is made of one for a while."""
+"""Foreign files in a fleet: which mapping is theirs, and the recording that is made of one for a while."""
 
 import contextlib
 import hashlib
@@ -12,21 +12,21 @@ from typing import Any
 from engine_mount.recordings.place import open_run
 from engine_mount.recordings.recording import Recording
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.measured import Heading
+from engine_mount.signals.formats.measured import Heading, listed
 from engine_mount.signals.formats.reading import headings, is_foreign
 from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.importing.reading import part_in, told_by_titles
-from engine_mount.signals.units.columns import stated_with
-from engine_mount.signals.units.mapping import ColumnChoice, Mapping, MappingError, mapping_in_file
+from engine_mount.signals.mapping import ColumnChoice, Mapping, mapping_in_file, with_options
+from engine_mount.signals.signal import SignalError
 
 ACCELERATION = 'acceleration'
-_OPTIONS = '{quantity}: {{column: {column}, unit: {unit}}} into its mapping file (--map)'
+_OPTION = '{quantity}: {{column: {column}, unit: {unit}}} into its mapping file (--map)'
 """How a mapping file says a column, for remedies."""
 
 
 @dataclass(frozen=True)
 class Said:
-    """What is said of files of others: mappings by the names of their files, and the DBC of CAN logs."""
+    """What is said of foreign files: mappings by the names of their files, and the DBC of CAN logs."""
 
     mappings: tuple[tuple[str, Mapping], ...] = ()
     dbc: Path | None = None
@@ -41,13 +41,13 @@ class Said:
         """What makes two of them the same, as plain data; {} where nothing is said."""
         if not self.mappings and self.dbc is None:
             return {}
-        dbc = None if self.dbc is None else str(self.dbc)
-        return {
+        plain = {
             'mapping_files': [name for name, _ in self.mappings],
             'mappings': [asdict(mapping) for _, mapping in self.mappings],
-            'dbc': dbc,
-            'dbc_sha256': None if self.dbc is None else hashlib.sha256(self.dbc.read_bytes()).hexdigest(),
+            'dbc': self.dbc,
+            'dbc_sha256': self.dbc and hashlib.sha256(self.dbc.read_bytes()).hexdigest(),
         }
+        return dict(json.loads(json.dumps(plain, default=str)))
 
     @property
     def mark(self) -> str:
@@ -59,25 +59,21 @@ NOTHING_SAID = Said()
 
 
 def said_in(mapping_files: Sequence[Path], dbc: Path | None = None) -> Said:
-    """Return what mapping files and a DBC say; raises `MappingError`, or `OSError` for a DBC not there."""
-    mappings = ((str(file.absolute()), mapping_in_file(file)) for file in mapping_files)
-    said = Said(
-        tuple((name, replace(mapping, options=_OPTIONS)) for name, mapping in mappings),
-        None if dbc is None else dbc.absolute(),
-    )
-    if said.dbc is not None:
-        said.dbc.open('rb').close()
-    return said
+    """Return what mapping files and a DBC say; raises `SignalError`, or `OSError` for a DBC not there."""
+    if dbc is not None:
+        dbc = dbc.absolute()
+        dbc.open('rb').close()
+    found = {str(file.absolute()): mapping_in_file(file) for file in mapping_files}
+    return Said(tuple((file, _complete(mapping, dbc)) for file, mapping in found.items()), dbc)
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """A file of others with its mapping; `file` is where that was read, '' where titles told it."""
+    """A foreign file with its mapping; `file` is where that was read, '' where titles told it."""
 
     path: Path
     file: str
     mapping: Mapping
-    stated: Stated
 
     @property
     def told(self) -> dict[str, str]:
@@ -87,24 +83,18 @@ class Mapped:
 
     def motion(self) -> dict[str, ColumnChoice]:
         """Return the columns of the displacement, or of engine and chassis; {} where it is not mapped."""
-        for names in ((DISPLACEMENT,), (ENGINE, CHASSIS)):
-            if all(name in self.mapping.columns for name in names):
-                return self.of(*names)
-        return {}
+        both = self.of(ENGINE, CHASSIS)
+        return self.of(DISPLACEMENT) or (both if len(both) > 1 else {})
 
     def of(self, *names: str) -> dict[str, ColumnChoice]:
         """Return the columns of these quantities that are mapped."""
         return {name: self.mapping.columns[name] for name in names if name in self.mapping.columns}
 
-    def alone(self, columns: dict[str, ColumnChoice]) -> Mapping:
-        """Return the mapping with these columns and no others."""
-        return replace(self.mapping, columns=columns, others={})
-
 
 def own_recording(path: Path, said: Said) -> Recording | None:
     """Return the recording of this project at `path`, None for what is read by a mapping.
 
-    That is a file of others, or a bag with what a mapping file names and without the displacement of a mount.
+    That is a foreign file, or a bag with what a mapping file names and without the displacement of a mount.
     Raises `ReadingError` for a recording of which nothing is readable.
     """
     if is_foreign(path):
@@ -124,15 +114,11 @@ def columns_in(path: Path, said: Said) -> tuple[Heading, ...]:
 
     Raises a `ValueError`.
     """
-    dialects = dict.fromkeys(stated_with(mapping, Stated(dbc=said.dbc)) for _, mapping in said.mappings)
-    refused: ValueError | None = None
-    for stated in dialects or (Stated(dbc=said.dbc),):
-        try:
+    *others, last = dict.fromkeys(mapping.stated for _, mapping in said.mappings) or (Stated(dbc=said.dbc),)
+    for stated in others:
+        with contextlib.suppress(ValueError):
             return headings(path, stated)
-        except ValueError as error:
-            refused = refused or error
-    assert refused is not None
-    raise refused
+    return headings(path, last)
 
 
 def mapped_in(path: Path, said: Said) -> Mapped:
@@ -141,26 +127,19 @@ def mapped_in(path: Path, said: Said) -> Mapped:
     Without mapping files its titles and units tell. Raises a `ValueError` where nothing is told.
     """
     there = columns_in(path, said)
-    found = [
-        Mapped(path, file, part_in(mapping, there, path.name), stated_with(mapping, Stated(dbc=said.dbc)))
-        for file, mapping in said.mappings
-    ]
-    if not found:
-        mapping = told_by_titles({path.name: there}, Mapping(options=_OPTIONS))
-        return Mapped(path, '', mapping, Stated(dbc=said.dbc))
+    if not said.mappings:
+        return Mapped(path, '', told_by_titles({path.name: there}, _complete(Mapping(), said.dbc)))
+    found = [Mapped(path, file, part_in(mapping, there)) for file, mapping in said.mappings]
     most = max(found, key=lambda one: len(one.mapping.columns))
     if not most.mapping.columns:
         files = ', '.join(Path(file).name for file, _ in said.mappings)
-        raise MappingError(
-            f'{path.name} has no column that {files} names; its columns are '
-            + ', '.join(heading.name for heading in there)
-        )
+        raise SignalError(f'{path.name} has no column that {files} names; its columns are {listed(there)}')
     return most
 
 
 @contextlib.contextmanager
 def as_recording(mapped: Mapped, *, closed_loop: bool) -> Iterator[Path]:
-    """Give what a replay needs of a file of others as a recording, for as long as the block lasts.
+    """Give what a replay needs of a foreign file as a recording, for as long as the block lasts.
 
     That is the displacement, in a closed loop the acceleration of the chassis. Raises a `ValueError`.
     """
@@ -175,16 +154,18 @@ def as_recording(mapped: Mapped, *, closed_loop: bool) -> Iterator[Path]:
             else 'displacement (nor as engine_displacement and chassis_displacement), which setpoints answer'
         )
         there = ', '.join(mapped.mapping.columns)
-        raise MappingError(f'{name}: no column is mapped as {wanted}; mapped are {there}')
+        raise SignalError(f'{name}: no column is mapped as {wanted}; mapped are {there}')
     with tempfile.TemporaryDirectory(prefix='engine_mount_fleet_') as folder:
-        order = ImportOrder(
-            [str(mapped.path)], Path(folder) / 'recording', mapped.alone(columns), stated=mapped.stated
-        )
+        order = ImportOrder([str(mapped.path)], Path(folder) / 'recording', mapped.mapping.only(columns))
         imported = import_recording(order)
         if len(imported.recordings) > 1:
             gap = next(note for note in imported.notes if note.startswith('a gap of'))
-            raise MappingError(
+            raise SignalError(
                 f'{name}: {gap.partition(":")[0]}; engine-mount import makes recordings of its '
                 f'{len(imported.recordings)} parts'
             )
         yield imported.recordings[0]
+
+
+def _complete(mapping: Mapping, dbc: Path | None) -> Mapping:
+    return with_options(replace(mapping, option=_OPTION), stated=Stated(dbc=dbc))

@@ -7,7 +7,7 @@ and `specimen(name)`.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from engine_mount.identification.actuator.calibration import ActuatorCalibration
     from engine_mount.identification.coil.inductance import InductanceCalibration
-    from engine_mount.identification.rack.given import GivenValues
-    from engine_mount.signals.units.mapping import ColumnChoice
+    from engine_mount.identification.rack import FileValues
+    from engine_mount.signals.mapping import Mapping
 
 Place = str | os.PathLike[str]
 Progress = Callable[[float, str], None]
@@ -28,31 +28,40 @@ def _silent(share: float, what: str) -> None:
     pass
 
 
+def _mapping(columns: Mapping | dict[str, str] | None) -> Mapping:
+    from engine_mount.identification.rack import RACK
+    from engine_mount.signals.mapping import Mapping, with_options
+
+    if isinstance(columns, Mapping):
+        return columns
+    texts = [f'{name}={text}' for name, text in (columns or {}).items()]
+    return with_options(Mapping(), texts, known=RACK)
+
+
 def actuator(
     files: Sequence[Place],
     *,
-    columns: Mapping[str, ColumnChoice] | None = None,
-    values: GivenValues | None = None,
+    columns: Mapping | dict[str, str] | None = None,
+    values: FileValues | None = None,
     orders: tuple[int, int, int, int, int] = (4, 4, 4, 2, 4),
     base: Place = '',
     progress: Progress = _silent,
 ) -> ActuatorCalibration:
     """Return the force law, Eqs (3) and (4), fitted to measured points of gap, current and force.
 
-    `columns` names the columns of gap, current and force, `values` the gaps of single files; `orders` are the
-    numbers of coefficients of a1 .. a5. `base` is the specimen file that gives all other values, the shipped
-    one without. Raises `LawRefusedError` for outliers, too few gaps or currents, and a law that is not
-    positive, rising with the current and falling with the gap within the measured range; and the readers'
-    errors.
+    `columns` is {quantity: 'COLUMN:UNIT'} for gap, current and force, `values` holds the gaps of single
+    files; `orders` are the numbers of coefficients of a1 .. a5. `base` is the specimen file that
+    gives all other values, the shipped one without. Raises `LawRefusedError` for outliers, too few gaps or
+    currents, and a law that is not positive, rising with the current and falling with the gap within the
+    measured range; and the readers' errors.
     """
     from engine_mount.identification.actuator.calibration import ActuatorCalibration
     from engine_mount.identification.actuator.fit import fit_force_law
-    from engine_mount.identification.rack.force_points import read_force
-    from engine_mount.identification.rack.given import GivenValues
+    from engine_mount.identification.rack import FileValues, read_force
     from mount_models.specimen import chosen_specimen
 
     starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]
-    points = read_force(paths, columns or {}, values or GivenValues({}, {}))
+    points = read_force(paths, _mapping(columns), values or FileValues())
     floor = _FLOOR * float(points.force.max())
     fit = fit_force_law(points.gap, points.current, points.force, orders, floor, progress)
     return ActuatorCalibration(fit, starting, paths)
@@ -61,8 +70,8 @@ def actuator(
 def inductance(
     files: Sequence[Place],
     *,
-    columns: Mapping[str, ColumnChoice] | None = None,
-    values: GivenValues | None = None,
+    columns: Mapping | dict[str, str] | None = None,
+    values: FileValues | None = None,
     rest_current: float | None = None,
     crossing_inductance: float | None = None,
     turns_area: float | None = None,
@@ -80,8 +89,7 @@ def inductance(
     (degC) only judge. Raises `LawRefusedError` and the readers' errors.
     """
     from engine_mount.identification.coil.inductance import calibrate_inductance
-    from engine_mount.identification.rack.given import GivenValues
-    from engine_mount.identification.rack.ripple_recordings import read_ripple
+    from engine_mount.identification.rack import FileValues, read_ripple
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen
 
@@ -93,7 +101,7 @@ def inductance(
         turns_area=turns_area or starting.turns_area,
         bridge=starting.bridge._replace(link_voltage=supply or starting.bridge.link_voltage),
     )
-    recordings = read_ripple(paths, columns or {}, values or GivenValues({}, {}), starting.turns_area)
+    recordings = read_ripple(paths, _mapping(columns), values or FileValues(), starting.turns_area)
     chosen = CONDUCTIVITY_COEFFICIENT if coefficient is None else coefficient
     return calibrate_inductance(recordings, starting, paths, chosen, held_out)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from engine_mount.identification.drift import DriftResult
-    from engine_mount.identification.friction.channels import Said
     from engine_mount.identification.friction.result import FrictionIdentification
+    from engine_mount.signals import mapping
 
 Place = str | os.PathLike[str]
 
@@ -26,7 +26,7 @@ def friction(
     step: str = 'auto',
     clamp: str = 'sliding',
     zero: str = '',
-    columns: Said | None = None,
+    columns: mapping.Mapping | dict[str, str] | None = None,
     seed: int = 0,
     base: Place = '',
     progress: Callable[[float, str], None] = lambda share, law: None,
@@ -36,12 +36,16 @@ def friction(
     Laws are fitted to `train` and judged by `held_out`; or trained on each of `files` and tried on each other
     one, of one file on its halves. `step` is auto, or only ramp (step 1), sawtooth or ladder; `clamp` is the
     normal force of a damper's JSON (sliding, rest, none), `zero` the source of the zero of the force (law,
-    rest, recorded; '' for the default of each kind of file). `base` is the specimen file that gives all other
-    values, the shipped one without. Raises `IdentificationError` and the readers' errors.
+    rest, recorded; '' for the default of each kind of file). `columns` is
+    {quantity: 'COLUMN:UNIT'}. `base` is the specimen file that gives all other values, the shipped one
+    without. Raises `IdentificationError` and the readers' errors.
     """
+    from engine_mount.identification.friction.files import friction_mapping
     from engine_mount.identification.friction.identification import identify_friction
     from mount_models.specimen import chosen_specimen
 
+    if isinstance(columns, dict):
+        columns = friction_mapping([f'{name}={text}' for name, text in columns.items()])
     paths = ([Path(place) for place in places] for places in (train, held_out, files))
     return identify_friction(chosen_specimen(str(base)), *paths, step, clamp, zero, columns, seed, progress)
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import yaml
 
+from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_recorder.metadata import NANOSECONDS, ROOT, VERSION, OfferedQos
 
@@ -18,33 +19,38 @@ class MetadataError(ValueError):
     """A description of a recording is not understood."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TopicInformation:
     """One topic of a recording."""
 
     name: str
     type: str
-    message_count: int
+    message_count: int = 0
     serialization_format: str = 'cdr'
     offered_qos: tuple[OfferedQos, ...] = ()
     type_hash: str = ''
-    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
+    units: Mapping[str, str] = field(default_factory=dict)
+    """By field, where the channel tells them."""
+    stored: StoredTopic | None = None
+    """As the files declare it."""
+    stored_count: int = 0
+    """Messages in the files, repetitions included; `message_count` is without these."""
+    places: dict[Any, list[int]] = field(default_factory=dict)
+    """The files that hold it, and its numbers in each."""
+    other_types: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
 class BagInformation:
-    """A whole recording; times in ns."""
+    """A whole recording."""
 
     topics: tuple[TopicInformation, ...]
     files: tuple[str, ...]  # their names
-    starting_time: int
-    duration: int
     message_count: int
     ros_distro: str = ''
     custom_data: Mapping[str, str] = field(default_factory=dict)
     version: int = VERSION
     storage: str = 'mcap'
-    compression_format: str = ''
     compression_mode: str = ''
 
 
@@ -59,20 +65,15 @@ def read_metadata(text: str) -> BagInformation:
 
 
 def _bag(document: Any) -> BagInformation:
-    optional = {
-        name: _checked(document.get(name) or '', str)
-        for name in ('ros_distro', 'compression_format', 'compression_mode')
-    }
     return BagInformation(
         topics=tuple(_topic(entry) for entry in document['topics_with_message_count'] or ()),
         files=tuple(_checked(path, str) for path in document['relative_file_paths']),
-        starting_time=_checked(document['starting_time']['nanoseconds_since_epoch'], int),
-        duration=_checked(document['duration']['nanoseconds'], int),
         message_count=_count(document),
+        ros_distro=_checked(document.get('ros_distro') or '', str),
         custom_data={name: str(value) for name, value in (document.get('custom_data') or {}).items()},
         version=_checked(document['version'], int),
         storage=_checked(document['storage_identifier'], str),
-        **optional,
+        compression_mode=_checked(document.get('compression_mode') or '', str),
     )
 
 
@@ -112,19 +113,6 @@ _POLICIES = {
 _DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 
 
-class QosError(ValueError):
-    """The quality of service in a bag is not understood."""
-
-
-def read_qos(source: Any) -> tuple[OfferedQos, ...]:
-    """Return the offers in `source`: YAML text or the list that it holds; raises `QosError`."""
-    try:
-        return _offers_in(source) if isinstance(source, str) else _offers(source)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise QosError(f'offered quality of service not understood: {reason}') from None
-
-
 # The topics of a recording, and of many recordings, have the same few texts.
 @functools.lru_cache(maxsize=64)
 def _offers_in(text: str) -> tuple[OfferedQos, ...]:
@@ -148,18 +136,17 @@ def _offer(document: Any) -> OfferedQos:
 
 
 def _word(value: Any, words: list[str]) -> str:
-    if not isinstance(value, int):
-        return str(value)
-    if not 0 <= value < len(words):
-        raise ValueError(f'policy {value} is none of {", ".join(words)}')
-    return words[value]
+    return dict(enumerate(words))[value] if isinstance(value, int) else str(value)
 
 
 def readable_qos(source: Any) -> tuple[OfferedQos, ...]:
-    """Return the offers in `source`, none where they are not understood: no message needs them."""
+    """Return the offers in `source`, YAML text or the list that it holds.
+
+    None where they are not understood: no message needs them.
+    """
     try:
-        return read_qos(source)
-    except QosError:
+        return _offers_in(source) if isinstance(source, str) else _offers(source)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError):
         return ()
 
 

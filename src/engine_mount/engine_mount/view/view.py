@@ -7,8 +7,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.view.feed.feed import Feed, FeedError, Message, Receive
-from engine_mount.view.window.model import Model
+from engine_mount.view.feed import Feed, FeedError, Message, Receive, RecordedFeed
+from engine_mount.view.model import Model
 from mount_bringup.graph.shutdown import ending_signals
 
 PAGE_PORT, FOXGLOVE_PORT = 8137, 8765
@@ -29,36 +29,35 @@ class ViewOrder:
     beside: bool = True
 
 
-def open_feed(order: ViewOrder) -> Feed:
-    """Return the feed that is ordered; raises `FeedError` or `ReadingError`."""
+@contextmanager
+def open_feed(order: ViewOrder) -> Iterator[Feed]:
+    """Give the feed that is ordered; raises `FeedError` or `ReadingError`."""
+    feed: Feed
     if order.recording is not None:
-        from engine_mount.view.feed.recorded import Recorded
+        feed = RecordedFeed(order.recording, order.rate, order.begin, order.namespace)
+    else:
+        from engine_mount.view.running_graph import RunningGraph
 
-        return Recorded(order.recording, order.rate, order.begin, order.namespace)
-    from engine_mount.view.feed.running_graph import RunningGraph
-
-    return RunningGraph(order.domain, order.namespace)
-
-
-@contextmanager
-def model_of(order: ViewOrder) -> Iterator[tuple[Feed, Model]]:
-    """Give feed and model at work."""
-    feed = open_feed(order)
-    with ExitStack() as stack:
-        stack.callback(feed.stop)
-        yield feed, stack.enter_context(_at_work(feed, order, (), lambda: None))
+        feed = RunningGraph(order.domain, order.namespace)
+    try:
+        yield feed
+    finally:
+        feed.stop()
 
 
 @contextmanager
-def _at_work(
-    feed: Feed, order: ViewOrder, others: Sequence[Receive], on_failure: Callable[[], None]
+def running_model(
+    feed: Feed,
+    *,
+    beside: bool,
+    receivers: Sequence[Receive] = (),
+    on_failure: Callable[[], None] = lambda: None,
 ) -> Iterator[Model]:
-    """Give the model of a feed that has begun; `others` get every message too."""
-    model = Model(feed, beside=order.beside, on_failure=on_failure)
-    receivers = (model.take, *others)
+    """Give the model of a feed that has begun; `receivers` get every message too."""
+    model = Model(feed, beside=beside, on_failure=on_failure)
 
     def receive(message: Message) -> None:
-        for take in receivers:
+        for take in (model.take, *receivers):
             take(message)
 
     feed.start(receive, model.fail)
@@ -73,20 +72,21 @@ def _at_work(
 def serve_view(order: ViewOrder, say: Callable[[str], None]) -> None:
     """Serve page and Foxglove until Ctrl-C; `say` takes where to look. Raises `FeedError`, also amid it."""
     from engine_mount.view.foxglove_server import FoxgloveServer
-    from engine_mount.view.page.web import Web
+    from engine_mount.view.web import Web
 
     ending = threading.Event()
     with ExitStack() as stack:
         stack.enter_context(ending_signals(ending.set))
-        feed = open_feed(order)
-        stack.callback(feed.stop)
-        others = []
+        feed = stack.enter_context(open_feed(order))
+        receivers = []
         if order.foxglove_port:
             server = FoxgloveServer(feed.topics, order.host, order.foxglove_port)
             stack.callback(server.stop)
-            others.append(server.take)
+            server.start()
+            receivers.append(server.take)
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
-        model = stack.enter_context(_at_work(feed, order, others, ending.set))
+        look = running_model(feed, beside=order.beside, receivers=receivers, on_failure=ending.set)
+        model = stack.enter_context(look)
         page = Web(model, feed.title, feed.mark, order.host, order.port)
         stack.callback(page.stop)
         page.start()
@@ -98,7 +98,7 @@ def serve_view(order: ViewOrder, say: Callable[[str], None]) -> None:
 
 
 def wait_for_state(model: Model, limit: float) -> None:
-    """Return when a node has told its state, or `limit` s have passed."""
+    """Return when the state of a node is known, or `limit` s have passed."""
     end = time.monotonic() + limit
     while not model.state.nodes and time.monotonic() < end:
         time.sleep(0.05)

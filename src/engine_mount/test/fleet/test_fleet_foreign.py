@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine_mount.drives.inputs.foreign import foreign_order
-from engine_mount.drives.replay import ReplayOrder, parsed_changes, replay_without_output
+from engine_mount.drives.replay import parsed_changes, replay
 from engine_mount.fleet import before_and_after as pictures
 from engine_mount.fleet.catalogue.index import indexed
 from engine_mount.fleet.catalogue.places import places
@@ -93,7 +93,7 @@ def test_each_file_is_read_by_its_mapping_and_what_is_wrong_is_a_row(drives, sai
     assert gap['duration_s'] == pytest.approx(4.398)
     assert gap['peak_displacement_m'] is None
     assert (
-        'no column that rack.yaml, car.yaml names; its columns are t, Kraft'
+        'no column that rack.yaml, car.yaml names; its columns are t [s], Kraft [N]'
         in found['car/other.csv']['reason']
     )
     assert found['car/garbage.mf4']['kind'] == 'unreadable'
@@ -152,8 +152,8 @@ def test_setpoints_are_those_of_a_replay_with_the_same_mapping(drives, said, tmp
     assert (row['reason'], row['as_recorded'], row['recorded_with']) == ('', None, '')
     foreign = foreign_order(['displacement=Weg'])
     for changes, column in (({}, 'peak_current_a'), (CHANGES, 'peak_current_changed_a')):
-        order = ReplayOrder(drives / 'rack' / 'good.csv', changes=changes, foreign=foreign)
-        setpoints = replay_without_output(order).replayed.runs[0].setpoints
+        outcome = replay(drives / 'rack' / 'good.csv', changes, foreign=foreign)
+        setpoints = outcome.replayed.runs[0].setpoints
         assert row[column] == pytest.approx(setpoints.max(), abs=1e-9)
     assert row['peak_current_a'] > row['peak_current_changed_a'] == 0.7
     assert rows['run/recording']['as_recorded'] is True

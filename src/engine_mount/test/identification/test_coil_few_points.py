@@ -9,17 +9,17 @@ from engine_mount.identification.coil.curves import calibrate_gap_curves
 from engine_mount.identification.coil.inductance import calibrate_inductance
 from engine_mount.identification.coil.points import InductanceTable, RippleRecording, measured_point
 from engine_mount.identification.coil.unique_region import unique_region
-from engine_mount.identification.rack.columns import RackRecordingError
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.identification.fitting import IdentificationError
+from engine_mount.identification.rack import FileValues, read_ripple
 from engine_mount.recordings.screen import Screen
+from engine_mount.signals.mapping import Mapping
 from mount_models.coil.gap import evaluate
 from mount_models.quantity import LawRefusedError
 from mount_models.specimen import default_specimen
 
 GAPS = np.linspace(280e-6, 540e-6, 9)
 CURRENTS = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.1, 1.3, 1.5, 1.75, 2.0, 2.5])
-NOTHING = GivenValues({}, {}, 20.0)
+NOTHING = FileValues(celsius_of_others=20.0)
 
 
 def inductance(current, gap, celsius=20.0, initial=0.0):
@@ -116,7 +116,7 @@ def written(file, celsius=(20.0,), drift=0.0):
 
 def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path, capsys):
     file = written(tmp_path / 'all.csv', (20.0, 80.0))
-    recordings = read_ripple([file], {}, NOTHING, 0.1)
+    recordings = read_ripple([file], Mapping(), NOTHING, 0.1)
     assert len(recordings) == 2 * GAPS.size
     assert {round(each.celsius) for each in recordings} == {20, 80}
     for each in recordings:
@@ -133,5 +133,5 @@ def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path,
 
 def test_a_temperature_that_runs_is_refused_still(tmp_path):
     file = written(tmp_path / 'runs.csv', drift=2.0)
-    with pytest.raises(RackRecordingError, match=r'coil temperature ran from 20\.0 to 42\.0 degC'):
-        read_ripple([file], {}, NOTHING, 0.1)
+    with pytest.raises(IdentificationError, match=r'coil temperature ran from 20\.0 to 42\.0 degC'):
+        read_ripple([file], Mapping(), NOTHING, 0.1)

@@ -32,8 +32,7 @@ def audit(
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.audit import audit as audited
-    from engine_mount.recordings.audit_report import as_json, as_table, latency_sentences, sentences
-    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.losses import as_json, as_table, latency_sentences, losses, sentences
     from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
 

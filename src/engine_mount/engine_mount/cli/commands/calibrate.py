@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import columns_of, given_ripple, orders_of, per_file, positive
+from engine_mount.cli.calibration.given import given_ripple, orders_of, per_file, positive, rack_mapping
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -106,19 +106,18 @@ def actuator(
     and falling with the gap within the measured range. Then no file is written.
     """
     from engine_mount.identification import calibrate
-    from engine_mount.identification.rack.given import GivenValues
+    from engine_mount.identification.rack import FileValues
     from engine_mount.identification.specimen import check_targets
-    from engine_mount.signals.units.columns import stated_with
 
     console = terminal()
     check_targets(out, json_file, figure)
-    places, mapping = [local(file, console) for file in files], mapping_of(map_file)
-    given = per_file(gaps or [], places, '--gap', 1e-6)
-    values = GivenValues(given, {}, None, stated_with(mapping, stated(dbc, decimal, delimiter)))
-    chosen, numbers = columns_of(columns or [], mapping), orders_of(orders)
+    places = [local(file, console) for file in files]
+    mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
+    values = FileValues(per_file(gaps or [], places, '--gap', 1e-6))
+    numbers = orders_of(orders)
     with progress() as bar:
         result = calibrate.actuator(
-            places, columns=chosen, values=values, orders=numbers, base=base or '', progress=bar
+            places, columns=mapping, values=values, orders=numbers, base=base or '', progress=bar
         )
     publish(result, json_file, figure, out, name)
 
@@ -166,13 +165,12 @@ def inductance(
     """
     from engine_mount.identification import calibrate
     from engine_mount.identification.specimen import check_targets
-    from engine_mount.signals.units.columns import stated_with
 
     console = terminal()
     check_targets(out, json_file, figure)
-    places, mapping = [local(file, console) for file in files], mapping_of(map_file)
-    told = stated_with(mapping, stated(dbc, decimal, delimiter))
-    values = given_ripple(places, gaps or [], temperatures or [], told)
+    places = [local(file, console) for file in files]
+    mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
+    values = given_ripple(places, gaps or [], temperatures or [])
     level = positive(crossing_inductance, '--crossing-inductance', 'mH')
     options = {
         'rest_current': positive(rest_current, '--rest-current', 'A'),
@@ -182,7 +180,7 @@ def inductance(
     }
     with progress():
         result = calibrate.inductance(
-            places, columns=columns_of(columns or [], mapping), values=values, coefficient=coefficient,
+            places, columns=mapping, values=values, coefficient=coefficient,
             held_out=held_out or (), base=base or '', **options,
         )  # fmt: skip
     publish(result, json_file, figure, out, name)

@@ -57,11 +57,10 @@ def _told(
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.alignment import alignment_sentence
     from engine_mount.recordings.compare import compare as compare_recordings
-    from engine_mount.recordings.difference import signal_table
+    from engine_mount.recordings.difference import Tolerances, signal_table
+    from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.place import open_run
-    from engine_mount.recordings.tolerances import Tolerances
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
@@ -82,7 +81,7 @@ def _told(
     if json_file is not None:
         write_json(comparison.figures(), json_file)
     if figure is not None:
-        from engine_mount.reports.compare_picture import draw_comparison
+        from engine_mount.reports.pictures import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

@@ -18,7 +18,7 @@ from engine_mount.cli.commands.options import (
     mapping_of,
     stated,
 )
-from engine_mount.cli.completion.values import recordings
+from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import terminal
@@ -107,13 +107,13 @@ def friction(
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
     from engine_mount.identification import identify
-    from engine_mount.identification.friction.channels import said
+    from engine_mount.identification.friction.files import friction_mapping
     from engine_mount.identification.specimen import check_targets
-    from engine_mount.signals.units.mapping import with_options
+    from engine_mount.signals.mapping import with_options
 
     check_targets(out, json_file, figure)
     mapping = with_options(mapping_of(map_file), (), time, rate)
-    columns = said(channel or [], mapping, stated(dbc, decimal, delimiter))
+    columns = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
     console = terminal()
     training, unseen, files = (
         [local(place, console) for place in places or []] for places in (train, held_out, file)

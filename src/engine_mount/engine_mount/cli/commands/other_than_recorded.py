@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from engine_mount.cli.completion.values import setting
+from engine_mount.cli.completion import setting
 
 OtherThanRecorded = Annotated[
     list[str] | None,
@@ -12,7 +12,7 @@ OtherThanRecorded = Annotated[
         '--set',
         metavar='[NODE.]NAME=VALUE',
         help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
-        autocompletion=setting('mount_control', 'mount_init'),
+        autocompletion=setting,
     ),
 ]
 
@@ -27,6 +27,4 @@ def changes_of(settings: list[str]) -> dict[str, dict[str, Any]]:
         given = settings_of_options(settings)
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    return parsed_changes(
-        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
-    )
+    return parsed_changes(given)

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
-from engine_mount.cli.completion.values import named
+from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split, option
+from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
@@ -36,18 +36,14 @@ def record(
     out: NewFolder = None,
     split: Split = None,
     snapshot: Snapshot = '',
-    snapshot_after: Annotated[
-        str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
-    ] = '10s',
-    duration: Annotated[
-        float | None, typer.Option(metavar='S', help='length, s; default: until Ctrl-C')
-    ] = None,
+    snapshot_after: Annotated[str, option('snapshot: and with so much after an event', 'DURATION')] = '10s',
+    duration: Annotated[float | None, option('length, s; default: until Ctrl-C', 'S')] = None,
     on_full: Annotated[
         str,
-        typer.Option(
-            metavar='WORD',
-            help='full disk: stop, or continue without recording until the end is asked for',
-            autocompletion=named('on_full'),
+        option(
+            'full disk: stop, or continue without recording until the end is asked for',
+            'WORD',
+            named('on_full'),
         ),
     ] = 'stop',
     domain: Domain = None,
@@ -55,26 +51,24 @@ def record(
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.record import RecordOrder
     from engine_mount.drives.record import record as run_record
-    from engine_mount.drives.recorder_options import checked_recorder, recorder_options
+    from engine_mount.settings.amounts import checked_recorder, recorder_options
     from engine_mount.settings.run_folder import new_place
     from mount_bringup.graph.domain import chosen_domain
-    from mount_recorder.parameters import RecorderParameters
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
     options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
-    order = RecordOrder(
-        out=out if out is not None else new_place('record'),
-        topics=tuple(topics or ()),
-        parameters=checked_recorder(RecorderParameters(), options),
+    console = terminal()
+    outcome = run_record(
+        out if out is not None else new_place('record'),
+        checked_recorder(options),
+        TerminalScreen(console),
+        topics=topics or (),
+        duration=duration,
         domain=chosen_domain(domain),
         namespace=namespace,
-        duration=duration,
     )
-    console = terminal()
-    outcome = run_record(order, TerminalScreen(console))
     if outcome.failure:
         _print('note', outcome.failure, console)
     sound = [_told(folder, console) for folder in outcome.folders]
@@ -87,8 +81,7 @@ def record(
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
     from engine_mount.recordings.audit import audit
-    from engine_mount.recordings.audit_report import sentences
-    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.losses import losses, sentences
     from engine_mount.recordings.recording import open_recording
 
     recording = open_recording(folder)

@@ -1,10 +1,8 @@
 """`engine-mount replay`: a recorded displacement through the same controller again."""
 
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from engine_mount.cli.commands.options import (
     RATE,
@@ -16,11 +14,13 @@ from engine_mount.cli.commands.options import (
     MapFile,
     NewFolder,
     TimeColumn,
+    flag,
+    option,
     recording_argument,
     stated,
 )
 from engine_mount.cli.commands.other_than_recorded import OtherThanRecorded, changes_of
-from engine_mount.cli.completion.values import listed, named
+from engine_mount.cli.completion import named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import terminal
 
@@ -48,19 +48,15 @@ def replay(
             instead='folder of a run or recording, MCAP file, or its URI; with --map any file of signals'
         ),
     ],
-    core: Annotated[
-        bool, typer.Option('--core', help='through the controller as function calls; the default')
-    ] = False,
+    core: Annotated[bool, flag('--core', 'through the controller as function calls; the default')] = False,
     lockstep: Annotated[
-        bool, typer.Option('--lockstep', help='through the real nodes over topics, sample by sample')
+        bool, flag('--lockstep', 'through the real nodes over topics, sample by sample')
     ] = False,
     live: Annotated[
-        bool, typer.Option('--live', help='publish the recorded topics by the wall clock, to look at')
+        bool, flag('--live', 'publish the recorded topics by the wall clock, to look at')
     ] = False,
     settings: OtherThanRecorded = None,
-    table: Annotated[
-        str, typer.Option(help='current-force table of another RECORDING, or "default": calculated')
-    ] = '',
+    table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     maps: Annotated[
         list[str] | None,
         typer.Option(
@@ -76,74 +72,53 @@ def replay(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Annotated[
-        float | None,
-        typer.Option(help='foreign recording: factor to m, or on what --map names with a unit'),
+        float | None, option('foreign recording: factor to m, or on what --map names with a unit')
     ] = None,
     offset: Annotated[
         str,
-        typer.Option(
-            metavar='M',
-            help='foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean',
+        option(
+            'foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean', 'M'
         ),
     ] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[
-        str,
-        typer.Option(
-            metavar='NAME', help='which of several mounts, such as left', autocompletion=named('place')
-        ),
-    ] = '',
-    rate: Annotated[float | None, typer.Option(help=f'live: factor on the speed of time; {RATE}')] = None,
+    mount: Annotated[str, option('which of several mounts, such as left', 'NAME', named('place'))] = '',
+    rate: Annotated[float | None, option(f'live: factor on the speed of time; {RATE}')] = None,
     start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
-    topic_names: Annotated[
-        str,
-        typer.Option(
-            '--topics',
-            metavar='NAME,...',
-            help='live: names, or all',
-            autocompletion=listed('topic'),
-        ),
-    ] = '',
     with_control: Annotated[
-        bool,
-        typer.Option('--with-control', help='live: mount_control answers, not the recording'),
+        bool, flag('--with-control', 'live: mount_control answers, not the recording')
     ] = False,
     domain: Domain = None,
-    namespace: Annotated[str, typer.Option(help='live: namespace of the published topics')] = '',
+    namespace: Annotated[str, option('live: namespace of the published topics')] = '',
 ) -> None:
     """Replay a recorded displacement through the same controller and tell whether its answers are the same.
 
     Equal is to the last bit; parameters and tables can be other than recorded.
     """
-    from mount_bringup.graph.domain import chosen_domain
-
     if core + lockstep + live > 1:
         raise typer.BadParameter('choose one of --core, --lockstep and --live')
     console = terminal()
     changes = changes_of(settings or [])
     if live:
         from engine_mount.cli.screen import TerminalScreen
-        from engine_mount.drives.live.live import LiveOrder, play_live
+        from engine_mount.drives.live import play_live
+        from mount_bringup.graph.domain import chosen_domain
 
         if maps or map_file or table or out or json_file:
             raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
-        order = LiveOrder(
-            local(recording, console),
-            1.0 if rate is None else rate,
-            start,
-            topic_names,
-            with_control,
-            changes,
-            chosen_domain(domain),
-            namespace,
-            mount,
-        )
-        play_live(order, TerminalScreen(console))
+        play_live(
+            local(recording, console), TerminalScreen(console), mount=mount,
+            rate=1.0 if rate is None else rate, begin=start, with_control=with_control,
+            changes=changes, domain=chosen_domain(domain), namespace=namespace,
+        )  # fmt: skip
         return
-    if start or topic_names or with_control or namespace:
-        raise typer.BadParameter('--from, --topics, --with-control and --namespace go with --live')
-    from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder
+    if start or with_control or namespace:
+        raise typer.BadParameter('--from, --with-control and --namespace go with --live')
+    from engine_mount.cli.screen import TerminalScreen, progress_bar
+    from engine_mount.drives.replay import replay as run_replay
+    from engine_mount.recordings.screen import Table
+    from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.run_folder import new_place
 
     foreign = None
     if maps or map_file:
@@ -155,31 +130,23 @@ def replay(
         )  # fmt: skip
     elif rate is not None or scale is not None or offset or time:
         raise typer.BadParameter('--scale, --offset, --time and --rate go with --map or --map-file')
-    mode = LOCKSTEP if lockstep else CORE
+    mode = 'lock-step' if lockstep else 'core'
     place, table = local(recording, console), table and str(local(table, console))
-    order = ReplayOrder(place, mode, changes, table, foreign, out, chosen_domain(domain), mount)
-    _replay(order, json_file, console)
-
-
-def _replay(
-    order: Any,
-    json_file: Path | None,
-    console: Console,
-) -> None:
-    from engine_mount.cli.screen import TerminalScreen, progress_bar
-    from engine_mount.drives.replay import replay as run_replay
-    from engine_mount.drives.summary import print_replay, replay_figures
-    from engine_mount.reports.json_file import write_json
-
     with progress_bar(console, transient=True) as progress:
-        task = progress.add_task(f'replaying ({order.mode})', total=1.0)
-        outcome = run_replay(order, lambda share: progress.update(task, completed=share))
-    figures = replay_figures(outcome)
-    print_replay(outcome, figures, TerminalScreen(console))
-    assert outcome.folder is not None
-    write_json(figures, outcome.folder.summary)
+        task = progress.add_task(f'replaying ({mode})', total=1.0)
+        replayed = run_replay(
+            place, changes, lockstep=lockstep, table=table, foreign=foreign, mount=mount,
+            out=out or new_place(f'replay_{mode}'), domain=domain,
+            progress=lambda share: progress.update(task, completed=share),
+        )  # fmt: skip
+    figures, screen = replayed.figures, TerminalScreen(console)
+    screen.table(Table(f'replay of {figures["source"]}, {mode}', 'll', replayed.rows()))
+    for sentence in figures['notes']:
+        screen.note(sentence)
+    assert replayed.folder is not None
+    write_json(figures, replayed.folder.summary)
     if json_file is not None:
         write_json(figures, json_file)
-    console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
-    if not outcome.held:
+    console.print(f'recording  {replayed.recording}', soft_wrap=True)
+    if not replayed.held:
         raise typer.Exit(1)

@@ -77,22 +77,25 @@ def status(
     from rich.live import Live
 
     from engine_mount.reports.json_file import write_json
-    from engine_mount.view.feed.feed import FeedError
+    from engine_mount.view.feed import FeedError
     from engine_mount.view.screen import status_screen
-    from engine_mount.view.view import ViewOrder, model_of, wait_for_state
-    from engine_mount.view.window.told import told_state
+    from engine_mount.view.view import ViewOrder, open_feed, running_model, wait_for_state
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
 
     console = terminal()
-    order = ViewOrder(domain=chosen_domain(domain), namespace=namespace, beside=not once)
+    order = ViewOrder(domain=chosen_domain(domain), namespace=namespace)
     ending = threading.Event()
-    with ending_signals(ending.set), model_of(order) as (feed, model):
+    with (
+        ending_signals(ending.set),
+        open_feed(order) as feed,
+        running_model(feed, beside=not once) as model,
+    ):
         if once or json_file is not None:
             wait_for_state(model, _ONCE_LIMIT)
             console.print(status_screen(model, feed.title))
             if json_file is not None:
-                write_json(told_state(model), json_file)
+                write_json(model.state_json(), json_file)
             if not model.state.nodes:
                 raise typer.Exit(1)
             return

@@ -15,10 +15,9 @@ from engine_mount.fleet.catalogue.rows import Row, Rows, named, place_of, reason
 from engine_mount.fleet.foreign import ACCELERATION, Mapped, Said, columns_in, mapped_in
 from engine_mount.signals.importing.channels import channels_of
 from engine_mount.signals.importing.joined import DATED
-from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.importing.reading import read_files
+from engine_mount.signals.quantities import QUANTITIES
 from engine_mount.signals.signal import SECOND, Signal
-from engine_mount.signals.units.quantities import quantity
 from mount_models.sampling import SAMPLE_RATE
 
 _SPEED = 'speed'
@@ -50,7 +49,7 @@ def _figures(mapped: Mapped, reasons: list[str]) -> Iterator[Figures]:
         if not columns:
             continue
         try:
-            (read,) = read_files([str(mapped.path)], mapped.alone(columns), mapped.stated)
+            (read,) = read_files([str(mapped.path)], mapped.mapping.only(columns))
             yield _times(next(iter(read.signals.values())))
             yield _of(read.signals)
         except ValueError as error:
@@ -73,9 +72,7 @@ def _of(signals: Mapping[str, Signal]) -> Figures:
     if _SPEED in signals:
         speed = signals[_SPEED]
         return {'distance_m': float(np.trapezoid(np.abs(speed.values), speed.times))}
-    channels, _ = channels_of(
-        signals, {name: quantity(name) for name in (DISPLACEMENT, ENGINE, CHASSIS, ACCELERATION)}
-    )
+    channels, _ = channels_of(signals, QUANTITIES)
     values = channels[0].values
     if ACCELERATION in signals:
         return {'rms_acceleration_m_s2': float(np.std(values))}

@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
-from engine_mount.signals.sources.local import local_path
 from engine_mount.signals.sources.source import Entry
 from engine_mount.signals.sources.stores import entries
-from engine_mount.signals.sources.uris import is_uri, scheme_of
+from engine_mount.signals.sources.uris import is_uri, local_path, scheme_of
 from mount_recorder.metadata import METADATA_NAME
 
 _RECORDED = re.compile(r'(?P<stem>.+?)\.(mcap|db3)(\.(zstd|lz4|zst))?')

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from engine_mount.recordings.events import switching_places
 from engine_mount.recordings.series import Series, SeriesError
-from engine_mount.recordings.switching import switching_places
 
 TRACE_COLUMNS = ('damping_active', 'velocity', 'friction_coefficient', 'normal_force')
 _BLOCK = 1 << 13  # samples whose power is summed together, chosen

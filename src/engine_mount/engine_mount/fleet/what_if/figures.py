@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
-from engine_mount.recordings.switching import Switching, paired_switchings, switching_times
+from engine_mount.recordings.events import Switching, paired_switchings, switching_times
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.interpolation import interpolated
 from mount_models.arithmetic.record import record_type

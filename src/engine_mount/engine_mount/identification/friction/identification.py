@@ -8,7 +8,6 @@ from pathlib import Path
 
 from engine_mount.identification.fitting import IdentificationError, Progress, silent
 from engine_mount.identification.friction.cases import case_of
-from engine_mount.identification.friction.channels import Said
 from engine_mount.identification.friction.coefficients import VARIANTS, fit_coefficients
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.ladder import Rung, fit_ladder, law_error
@@ -20,6 +19,7 @@ from engine_mount.identification.friction.result import FrictionIdentification, 
 from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
 from engine_mount.identification.friction.validation import pooled_error, validate
 from engine_mount.recordings.place import recording_hash
+from engine_mount.signals.mapping import Mapping
 from mount_models.specimen import Specimen, friction_contact
 
 STEPS = ('auto', RAMP, SAWTOOTH, 'ladder')
@@ -33,14 +33,14 @@ def identify_friction(
     step: str = 'auto',
     clamp: str = 'sliding',
     zero: str = '',
-    selection: Said | None = None,
+    mapping: Mapping | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> FrictionIdentification:
     """Return what the recordings show; see `engine_mount.identification.identify.friction`."""
     _check_order(train, held_out, files, step)
     result = FrictionIdentification(base)
-    read = functools.partial(_read, result, step=step, clamp=clamp, zero=zero, selection=selection)
+    read = functools.partial(_read, result, step=step, clamp=clamp, zero=zero, mapping=mapping)
     if len(files) == 1:
         (recording,) = read(files, 'first half train, second half held out')
         _try_halves(result, recording, progress, seed)
@@ -96,12 +96,12 @@ def _read(
     step: str,
     clamp: str,
     zero: str,
-    selection: Said | None,
+    mapping: Mapping | None,
 ) -> list[tuple[FrictionRecording, str]]:
     """Return the recordings with their kinds; hash, first look, cases and notes go into `result`."""
     recordings = []
     for path in paths:
-        recording = read_recording(path, selection, clamp)
+        recording = read_recording(path, mapping, clamp)
         kind = kind_of_motion(recording)
         # a ramp among sawtooths gives their contact
         if part == 'train' and kind != step and step in (RAMP, SAWTOOTH) and (step, kind) != (SAWTOOTH, RAMP):

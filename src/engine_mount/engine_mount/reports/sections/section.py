@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from engine_mount.recordings.difference import time_text
 from engine_mount.reports.drawing.chart import Chart
 
 GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
@@ -57,3 +58,8 @@ class Section:
     commands: Sequence[str] = ()  # of the shell, shown as they are typed
     half: bool = False
     is_listed: bool = True  # at the top of the page
+
+
+def moment(time: float) -> Link:
+    """Return a time (s) that links to the traces there."""
+    return Link(time_text(time), 'traces', time)

@@ -1,0 +1,133 @@
+"""The last verdicts of the nodes, what was measured once, and what has happened."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from engine_mount.recordings.layout import decode, installed_definition
+from engine_mount.recordings.session import SessionError, session_content, session_parameters
+from engine_mount.view.feed import Message
+from mount_ros.messages.event import read_mark
+from mount_ros.messages.verdicts import verdicts_in
+from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, DIAGNOSTICS, EVENT, SESSION
+
+_EVENTS = 12  # chosen: the last ones
+_SILENT = 3_000_000_000  # ns, chosen: a node without diagnostics for so long is not there
+_LEVELS = ('ok', 'warning', 'error')
+_FIGURES = {
+    'wear reserve': ('mount_init', 'wear_reserve_um', ' µm'),
+    'coil temperature': None,
+    'policy': ('mount_control', 'policy', ''),
+    'samples': ('mount_driver', 'samples', ''),
+    **{
+        f'CAN {name.replace("_", " ")}': ('mount_driver', name, '')
+        for name in (
+            *('lost', 'corrupt', 'late', 'resent', 'wrong_sequence', 'error_frames', 'refused'),
+            'setpoint_timeouts',
+        )
+    },
+    'bridged': ('mount_control', 'bridged', ''),
+    'recorded messages': ('mount_recorder', 'kept', ''),
+    'not recorded': ('mount_recorder', 'lost', ''),
+}
+"""{name: (node, figure of its diagnostics, unit)}."""
+
+
+class NodeState(NamedTuple):
+    """The last verdict of a node: level as in `diagnostic_msgs`, a sentence, figures, and when (ns)."""
+
+    level: int
+    sentence: str
+    figures: dict[str, str]
+    received: int
+
+
+class Event(NamedTuple):
+    """Something that happened: time of its stamp (ns), one word, one sentence."""
+
+    time: int
+    kind: str
+    text: str
+
+
+@dataclass
+class GraphState:
+    """Everything about the graph that is no trace; `take` keeps it up to date."""
+
+    namespace: str = ''
+    nodes: dict[str, NodeState] = field(default_factory=dict)
+    gap: dict[str, float] = field(default_factory=dict)
+    coil_celsius: float = math.nan
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    scenario: str = ''
+    events: deque[Event] = field(default_factory=lambda: deque(maxlen=_EVENTS))
+
+    def take(self, message: Message) -> None:
+        """Take a message of a topic that tells of state, and no other."""
+        if message.topic is DIAGNOSTICS:
+            self._take_diagnostics(message)
+        elif message.topic is AIR_GAP:
+            content = decoded(message)
+            self.gap = dict(zip(content.name, map(float, content.position), strict=False))
+        elif message.topic is COIL_TEMPERATURE:
+            self.coil_celsius = float(decoded(message).temperature)
+        elif message.topic is EVENT:
+            self.events.append(Event(*read_mark(decoded(message).data, message.received)[:3]))
+        elif message.topic is SESSION:
+            try:
+                content = session_content(decoded(message).data)
+            except SessionError:
+                return
+            self.parameters = session_parameters(content)
+            self.scenario = str(content.get('scenario', ''))
+
+    def values(self) -> dict[str, str]:
+        """Return the figures beside the charts, by name, with units."""
+        found = {
+            f'{name} gap': f'{1e6 * self.gap[key]:.1f} ± {1e6 * self.gap.get(f"{key}_std", math.nan):.1f} µm'
+            for name, key in (('rest', 'rest_gap'), ('contact', 'contact_gap'))
+            if key in self.gap
+        }
+        for name, source in _FIGURES.items():
+            if source is None:
+                if not math.isnan(self.coil_celsius):
+                    found[name] = f'{self.coil_celsius:.1f} °C'
+            elif source[0] in self.nodes and (text := self.nodes[source[0]].figures.get(source[1])):
+                found[name] = f'{text}{source[2]}'
+        return found
+
+    def as_json(self, now: int, zero: int | None) -> dict[str, Any]:
+        """Return all of it, at `now` on the clock of the messages (ns); times in s from the stamp `zero`."""
+        nodes = []
+        for name, node in sorted(self.nodes.items()):
+            silent = now - node.received > _SILENT
+            level = 'silent' if silent else _LEVELS[min(node.level, 2)]
+            sentence = 'says nothing any more' if silent else node.sentence
+            state = node.figures.get('state', '')
+            nodes.append({'name': name, 'level': level, 'sentence': sentence, 'state': state})
+        events = [
+            {
+                'time': 0.0 if zero is None else round((event.time - zero) * 1e-9, 3),
+                'kind': event.kind,
+                'text': event.text,
+            }
+            for event in reversed(self.events)
+        ]
+        values = [{'name': name, 'value': value} for name, value in self.values().items()]
+        return {'scenario': self.scenario, 'nodes': nodes, 'values': values, 'events': events}
+
+    def _take_diagnostics(self, message: Message) -> None:
+        for verdict in verdicts_in(decoded(message)):
+            space, _, name = verdict.node.rpartition('/')
+            if space != self.namespace.strip('/'):
+                continue  # /diagnostics belongs to all mounts of the car
+            before = self.nodes.get(name)
+            self.nodes[name] = NodeState(verdict.level, verdict.sentence, verdict.figures, message.received)
+            if verdict.level and (before is None or before.sentence != verdict.sentence):
+                self.events.append(Event(message.received, name, verdict.sentence))
+
+
+def decoded(message: Message) -> Any:
+    """Return the fields of a message; raises `LayoutError` for bytes that are no such message."""
+    return decode(message.raw, installed_definition(message.topic.type))
