@@ -1,4 +1,4 @@
-"""Wear and other drift over many recordings: contact gap, offset current and friction by straight lines.
+"""Wear and other drift over many recordings: contact gap and offset current by straight lines.
 
 Noise model: each value has the standard deviation that came with it, independent of the others. Where the
 values scatter more about the line than that explains, all are taken as that much less sure (Birge ratio);
@@ -16,17 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from engine_mount.identification.fitting import FloatArray, IdentificationError
-from engine_mount.identification.friction.files import read_recording
 from engine_mount.recordings.place import open_run
-from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.recordings.session import recorded_session, session_content
 from mount_models.specimen import Specimen
 from mount_ros.topics import AIR_GAP, CURRENT_FORCE_TABLE
 
 FEWEST = 2
-_RACK_TOPICS = ('displacement', 'sim/mount_force', 'sim/clamp_force')
-_SLIDING = 0.5  # of the highest speed: pads slide there (chosen)
 
 
 @dataclass(frozen=True)
@@ -55,9 +51,9 @@ class Line:
 
 @dataclass(frozen=True)
 class State:
-    """One recording: at `hours` gap and its deviation (m), offset current (A), friction (1).
+    """One recording: at `hours` gap and its deviation (m), offset current (A).
 
-    `pressed` (m) is by how much the highest clamping force compresses the pads. NaN is unknown.
+    `pressed` (m) is by how much the highest clamping force compresses the pads.
     """
 
     recording: str
@@ -65,7 +61,6 @@ class State:
     contact_gap: float
     contact_gap_std: float
     offset_current: float
-    friction: float
     pressed: float
 
 
@@ -89,14 +84,14 @@ class DriftResult:
         names = {'contact_gap': 'm', 'contact_gap_std': 'm', 'offset_current': 'a'}
         result: dict[str, Any] = {
             'recordings': [
-                {'recording': state.recording, 'hours': state.hours, 'friction': _known(state.friction)}
+                {'recording': state.recording, 'hours': state.hours}
                 | {f'{name}_{unit}': getattr(state, name) for name, unit in names.items()}
                 for state in self.states
             ]
         }
-        for name, unit in (('contact_gap', 'm'), ('offset_current', 'a'), ('friction', '1')):
-            line = self.lines.get(name)
-            result[name] = line and {
+        for name, unit in (('contact_gap', 'm'), ('offset_current', 'a')):
+            line = self.lines[name]
+            result[name] = {
                 f'per_hour_{unit}': line.slope,
                 f'per_hour_std_{unit}': _known(line.slope_std),
                 f'mean_{unit}': line.level,
@@ -112,7 +107,7 @@ class DriftResult:
 
     def report(self, screen: Screen) -> None:
         """Show wear and drift per hour, and the travel left."""
-        units = {'contact_gap': (1e6, 'um/h'), 'offset_current': (1e3, 'mA/h'), 'friction': (1.0, '1/h')}
+        units = {'contact_gap': (1e6, 'um/h'), 'offset_current': (1e3, 'mA/h')}
         for name, line in self.lines.items():
             factor, unit = units[name]
             std = 'unknown' if math.isnan(line.slope_std) else f'{factor * line.slope_std:.2g}'
@@ -155,9 +150,6 @@ def identify_drift(
         'contact_gap': gap,
         'offset_current': fit_line(times, [state.offset_current for state in states]),
     }
-    known = [(state.hours, state.friction) for state in states if math.isfinite(state.friction)]
-    if len({time for time, _ in known}) >= FEWEST:
-        lines['friction'] = fit_line(*np.array(known).T)
     limit = specimen.force_law.gap_low + states[-1].pressed
     left = float(gap.at(times[-1])) - limit
     wears = gap.slope < -2.0 * gap.slope_std
@@ -199,7 +191,7 @@ def fit_line(hours: npt.ArrayLike, values: npt.ArrayLike, stds: npt.ArrayLike | 
 def _state(path: Path, specimen: Specimen, hours: float) -> State:
     recording = open_run(path)
     for topic in (AIR_GAP, CURRENT_FORCE_TABLE):
-        if not _holds(recording, topic.name):
+        if topic.name not in recording or not len(recording[topic.name]):
             raise IdentificationError(
                 f'{path} holds no {topic.name}; give recordings of whole drives, in which the initialisation '
                 'ended well'
@@ -213,7 +205,7 @@ def _state(path: Path, specimen: Specimen, hours: float) -> State:
             )
     highest = float(max(recording[CURRENT_FORCE_TABLE.name].message(-1).data))
     pressed = highest / specimen.pad_stiffness
-    return State(path.name, hours, **numbers, friction=_friction(recording, path), pressed=pressed)
+    return State(path.name, hours, **numbers, pressed=pressed)
 
 
 def _session_start(path: Path) -> float:
@@ -225,20 +217,6 @@ def _session_start(path: Path) -> float:
         raise IdentificationError(
             f'{path} holds no time at which it began ({error}); give the hours of all by --hours FILE=H'
         ) from None
-
-
-def _friction(recording: Recording, path: Path) -> float:
-    """Return the median of |F_F| / F_N while sliding, where a rack's load cells are recorded; else NaN."""
-    if not all(_holds(recording, topic) for topic in _RACK_TOPICS):
-        return math.nan
-    rack = read_recording(path)
-    speed = np.abs(np.gradient(rack.displacement, rack.dt))
-    sliding = speed > _SLIDING * np.percentile(speed, 99)
-    return float(np.median(np.abs(rack.force[sliding]) / rack.normal_force[sliding, 0]))
-
-
-def _holds(recording: Recording, topic: str) -> bool:
-    return topic in recording and len(recording[topic]) > 0
 
 
 def _known(value: float) -> float | None:

@@ -96,28 +96,26 @@ def draw_drift(result: Any, file: Path) -> None:
     """Write points with their deviations, lines with one standard deviation, and the limit (PNG)."""
     hours = np.array([state.hours for state in result.states])
     grid = np.linspace(hours.min(), hours.max(), 100)
-    limit = 1e6 * result.limit
 
-    def panel(axes: Axes, name: str, label: str, factor: float) -> None:
-        line = result.lines[name]
-        middle, spread = factor * line.at(grid), factor * line.std_at(grid)
-        axes.fill_between(grid, middle - spread, middle + spread, color=_BLUE, alpha=0.15, linewidth=0)
-        axes.plot(grid, middle, color=_BLUE, linewidth=1.0)
-        values = [factor * getattr(state, name) for state in result.states]
-        gap = name == 'contact_gap'
-        stds = [1e6 * state.contact_gap_std for state in result.states] if gap else None
-        axes.errorbar(hours, values, yerr=stds, fmt='o', color=_GREY, markersize=4, capsize=3)
-        if gap:
-            axes.axhline(limit, color=_RED, linewidth=1.0, linestyle='--', label='range of the law ends')
-        _label(axes, x='time (h)', y=label)
+    def line(name: str, factor: float, label: str) -> Panel:
+        def panel(axes: Axes) -> None:
+            middle, spread = (factor * of(grid) for of in (result.lines[name].at, result.lines[name].std_at))
+            axes.fill_between(grid, middle - spread, middle + spread, color=_BLUE, alpha=0.15, linewidth=0)
+            axes.plot(grid, middle, color=_BLUE, linewidth=1.0)
+            stds = [factor * getattr(state, f'{name}_std', 0.0) for state in result.states]
+            values = [factor * getattr(state, name) for state in result.states]
+            axes.errorbar(hours, values, yerr=stds, fmt='o', color=_GREY, markersize=4, capsize=3)
+            if name == 'contact_gap':
+                axes.axhline(1e6 * result.limit, color=_RED, linestyle='--', label='range of the law ends')
+            _label(axes, x='time (h)', y=label)
 
-    labels = {
-        'contact_gap': ('contact gap (µm)', 1e6),
-        'offset_current': ('offset current (mA)', 1e3),
-        'friction': ('|F_F| / F_N', 1.0),
-    }
-    panels = [lambda axes, row=(name, *labels[name]): panel(axes, *row) for name in result.lines]
-    _draw(file, panels, 1, (9.0, 3.0 * len(panels)))
+        return panel
+
+    panels = [
+        line('contact_gap', 1e6, 'contact gap (µm)'),
+        line('offset_current', 1e3, 'offset current (mA)'),
+    ]
+    _draw(file, panels, 1, (9.0, 6.0))
 
 
 def draw_friction(result: Any, file: Path) -> None:

@@ -160,8 +160,7 @@ def drift(
     """Show wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
 
     A line through the contact gaps of all recordings, weighted by the deviations that the initialisations
-    stated; where gaps scatter more than that, by as much less sure. Offset current and, where a rack's load
-    cells are recorded, friction likewise from their scatter.
+    stated; where gaps scatter more than that, by as much less sure. Offset current likewise from its scatter.
     """
     from engine_mount.identification import identify
     from engine_mount.identification.specimen import check_targets
