@@ -14,7 +14,7 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import Heading, listed
 from engine_mount.signals.formats.reading import headings, is_foreign
-from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
+from engine_mount.signals.importing.channels import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.importing.reading import part_in, told_by_titles
 from engine_mount.signals.mapping import ColumnChoice, Mapping, mapping_in_file, with_options
 from engine_mount.signals.signal import SignalError

@@ -14,7 +14,7 @@ from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.catalogue.rows import Row, Rows, named, place_of, reason_of, unreadable
 from engine_mount.fleet.foreign import ACCELERATION, Mapped, Said, columns_in, mapped_in
 from engine_mount.signals.importing.channels import channels_of
-from engine_mount.signals.importing.joined import DATED
+from engine_mount.signals.importing.parts import DATED
 from engine_mount.signals.importing.reading import read_files
 from engine_mount.signals.quantities import QUANTITIES
 from engine_mount.signals.signal import SECOND, Signal
