@@ -25,9 +25,13 @@ from engine_mount.experiments.harness.rack_recording import (
 )
 from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
+from engine_mount.identification.friction.ramp_hold import (
+    Relaxation,
+    contact_of_response,
+    fit_relaxation,
+    printed_formulas,
+)
 from engine_mount.identification.friction.recording import FloatArray, FrictionRecording
-from engine_mount.identification.friction.steps.ramp_response import contact_of_response, printed_formulas
-from engine_mount.identification.friction.steps.relaxation import Relaxation, fit_relaxation
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, flattened

@@ -29,12 +29,12 @@ from engine_mount.experiments.harness.rack_recording import (
 from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.recording import FloatArray, FrictionRecording
-from engine_mount.identification.friction.steps.sawtooth import (
+from engine_mount.identification.friction.sawtooth import (
     StrokeLine,
     deflection_from_force,
+    slip_regions,
     stroke_lines,
 )
-from engine_mount.identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW, simplified_response
