@@ -17,7 +17,7 @@ from engine_mount.experiments import (
     ramp_and_hold,
     sawtooth,
 )
-from engine_mount.experiments.harness.contract import Experiment, Holds, Order, Outcome, Statement
+from engine_mount.experiments.harness.experiment import Claim, Experiment, Holds, Outcome
 from engine_mount.experiments.registry import NAMES, experiment_named
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
@@ -37,8 +37,7 @@ SHORT_SAWTOOTH = {
 
 
 def run(module, folder, **settings) -> Outcome:
-    order = Order(folder, {module.NAME: settings})
-    return module.EXPERIMENT.run(order, lambda share, what: None)
+    return module.EXPERIMENT.run(module.EXPERIMENT.order(folder, {module.NAME: settings}))
 
 
 def command(*arguments):
@@ -49,7 +48,7 @@ def check(outcome):
     json.dumps(outcome.figures, allow_nan=False)
     assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
     assert outcome.pictures
-    assert outcome.statements
+    assert outcome.claims
 
 
 # Contract and command.
@@ -120,11 +119,11 @@ def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_pat
     picture = tmp_path / 'a.png'
     picture.write_bytes(PNG)
     told = [
-        Statement('Fig. 1', 'it is so', 'it was not', Holds.NO),
-        Statement('Fig. 2', 'so too', 'it was', Holds.YES),
+        Claim('Fig. 1', 'it is so', 'it was not', Holds.NO),
+        Claim('Fig. 2', 'so too', 'it was', Holds.YES),
     ]
     experiment = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), run)
-    page.write_page([(experiment, Outcome({}, [picture], [], told))], tmp_path / 'docs' / 'page.md')
+    page.write_page([Outcome(experiment, {}, told, [picture])], tmp_path / 'docs' / 'page.md')
     text = (tmp_path / 'docs' / 'page.md').read_text()
     assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
     assert '| Fig. 1 | it is so | it was not | no |' in text
@@ -141,7 +140,7 @@ def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):
 
 def test_sliding_pads_are_told(tmp_path):
     outcome = run(ramp_and_hold, tmp_path, normal_force=60.0, hold_time=2.0)
-    microslip = outcome.statements[0]
+    microslip = outcome.claims[0]
     assert 'microslip' in microslip.paper
     assert microslip.holds is Holds.NO
 
@@ -175,8 +174,8 @@ def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
 def test_other_pads_change_what_holds(tmp_path):
     light = {**SHORT_SAWTOOTH, 'lowest_normal_force': 40.0, 'highest_normal_force': 40.0, 'force_noise': 0.1}
     law = 1
-    printed = run(sawtooth, tmp_path / 'printed', **light).statements[law]
-    negative = run(sawtooth, tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}).statements[law]
+    printed = run(sawtooth, tmp_path / 'printed', **light).claims[law]
+    negative = run(sawtooth, tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}).claims[law]
     assert (printed.reference, printed.holds) == ('Sec. 4, Eq (12)', Holds.PARTLY)
     assert negative.holds is Holds.YES
 

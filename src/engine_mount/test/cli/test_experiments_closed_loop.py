@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from engine_mount.experiments import bench, motorway_gap, page, sensitivity, sweep
-from engine_mount.experiments.harness.contract import Experiment, ExperimentError, Holds, Order, Outcome
-from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
-from engine_mount.experiments.harness.measures import sweep_parameters
+from engine_mount.experiments.harness.closed_loop import Case, run_case, run_cases
+from engine_mount.experiments.harness.experiment import Experiment, ExperimentError, Holds, Outcome, holds_if
+from engine_mount.experiments.harness.measures import peak_and_rms, sweep_parameters
 from engine_mount.experiments.registry import NAMES, experiment_named
 from engine_mount.experiments.sweep import defined_peak
 from engine_mount.recordings.recording import open_recording
@@ -23,12 +23,8 @@ pytestmark = pytest.mark.slow
 PNG = b'\x89PNG'
 
 
-def quiet(share, what):
-    pass
-
-
 def run(module, folder, nodes=None, **settings) -> Outcome:
-    return module.EXPERIMENT.run(Order(folder, {module.NAME: settings, **(nodes or {})}), quiet)
+    return module.EXPERIMENT.run(module.EXPERIMENT.order(folder, {module.NAME: settings, **(nodes or {})}))
 
 
 def check(outcome):
@@ -36,7 +32,7 @@ def check(outcome):
     assert outcome.pictures
     assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
     assert all('sim/truth' in open_recording(place) for place in outcome.recordings)
-    assert outcome.statements
+    assert outcome.claims
 
 
 @pytest.fixture(scope='module')
@@ -166,11 +162,11 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
         'electronics.ripple_noise': 0.0,
     }
     paper = {'policy': 'switched_viscous'}
-    job = Job(('rack',), {'mount_sim': quiet_bench, 'mount_control': paper})
+    case = Case({'mount_sim': quiet_bench, 'mount_control': paper}, sensitivity.rack_harmonics)
     found = []
     for step in (5e-5, 2.5e-5):
         monkeypatch.setattr('mount_sim.excitation.building.STEP_TIME', step)
-        found.append(np.array(run_job(job)[1]['harmonics_n'])[[0, 2, 4, 6]])
+        found.append(np.array(run_case(case)['harmonics_n'])[[0, 2, 4, 6]])
     assert not np.array_equal(*found)
     assert found[1] == pytest.approx(found[0], rel=0.005)
 
@@ -217,12 +213,12 @@ def test_damping_comes_and_goes_at_its_frequencies(swept):
 def test_only_the_hydromount_shows_a_resonance_peak(swept):
     assert swept.figures['runs'][sweep.FRICTION]['defined_peak'] is None
     assert swept.figures['runs'][sweep.HYDRO]['defined_peak'][0] == 9.5
-    assert [statement.holds for statement in swept.statements[:2]] == [Holds.YES, Holds.YES]
+    assert [statement.holds for statement in swept.claims[:2]] == [Holds.YES, Holds.YES]
 
 
 def test_bands_that_the_sweep_does_not_reach_are_unknown(swept):
     assert swept.figures['runs'][sweep.FRICTION]['isolation_rms'] == [None, None, None]
-    assert swept.statements[-1].holds is Holds.NOT_COMPARABLE
+    assert swept.claims[-1].holds is Holds.NOT_COMPARABLE
 
 
 def test_a_resonance_peak_is_a_local_maximum_well_above_the_switch_on_level():
@@ -256,7 +252,7 @@ def test_a_gap_that_does_not_reach_the_level_is_told_as_such(tmp_path):
     )  # fmt: skip
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['gaps']['1 mm']['on_delay_s'] is None
-    assert '1 mm: never' in outcome.statements[0].found
+    assert '1 mm: never' in outcome.claims[0].found
 
 
 # Sensitivity.
@@ -272,17 +268,17 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
         'last_frequency': 14.5,
         'workers': 2,
     }
-    order = Order(tmp_path, {sensitivity.NAME: settings})
-    outcome = sensitivity.EXPERIMENT.run(order, lambda share, what: told.append(what))
+    order = sensitivity.EXPERIMENT.order(tmp_path, {sensitivity.NAME: settings})
+    outcome = sensitivity.EXPERIMENT.run(order.shown_on(lambda share, what: told.append(what)))
     check(outcome)
-    assert '11 of 11 runs' in told
+    assert 'sensitivity: 11 of 11 runs' in told
     ratios = np.array(outcome.figures['peak_ratio'])[:, 0, 0, 0]
     assert ratios[1] == pytest.approx(0.72, rel=0.03)
     assert ratios[0] > 1.3
     text = outcome.pages[0].read_text()
     assert '| displacement, V0 = 0.06 m/s, R_d = 1e+08, F_i = 0 N | 1.78 | 1.78 | yes |' in text
     assert 'at V0 = 0.12 m/s it wins whatever the rest; at V0 = 0.06 m/s it loses whatever the rest' in text
-    assert [statement.holds for statement in outcome.statements] == [
+    assert [statement.holds for statement in outcome.claims] == [
         Holds.PARTLY,
         Holds.NOT_COMPARABLE,
         Holds.PARTLY,
@@ -298,23 +294,23 @@ def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
 
 
 def test_what_fails_in_a_process_ends_the_grid_with_its_reason():
-    job = Job(('wrong',), {'mount_sim': {'scenario': 'nowhere'}})
+    order = sensitivity.EXPERIMENT.order(Path(), {sensitivity.NAME: {'workers': 1}})
     with pytest.raises(ValueError, match='nowhere'):
-        run_all([job], 1, lambda done: None, run_job)
+        run_cases(order, {'wrong': Case({'mount_sim': {'scenario': 'nowhere'}}, peak_and_rms)})
 
 
 def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):
     sim = {**sweep_parameters(0.12, 14.5), 'mount': 'hydro'}
-    _, found = run_job(Job(('hydro',), {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}))
-    assert found['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
+    case = Case({'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}, peak_and_rms)
+    assert run_case(case)['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
 
 
 @pytest.mark.parametrize(
-    ('share', 'holds'),
-    [(1.0, Holds.YES), (0.5, Holds.PARTLY), (0.0, Holds.NO), (float('nan'), Holds.NOT_COMPARABLE)],
+    ('answers', 'holds'),
+    [([True], Holds.YES), ([True, False], Holds.PARTLY), ([False], Holds.NO), ([], Holds.NOT_COMPARABLE)],
 )
-def test_a_claim_holds_where_it_came_out_in_all_combinations(share, holds):
-    assert sensitivity.verdict(share) is holds
+def test_a_claim_holds_where_it_came_out_in_all_combinations(answers, holds):
+    assert holds_if(answers) is holds
 
 
 # Contract.
@@ -330,6 +326,6 @@ def test_an_experiments_own_page_goes_beside_the_page(tmp_path):
     own.parent.mkdir()
     own.write_text('own')
     known = Experiment('name', 'title', 'Fig. 1', 'summary', SimpleNamespace(), lambda order, tell: None)
-    page.write_page([(known, Outcome({}, pages=[own]))], tmp_path / 'docs' / 'page.md')
+    page.write_page([Outcome(known, {}, [], pages=[own])], tmp_path / 'docs' / 'page.md')
     assert (tmp_path / 'docs' / 'own.md').read_text() == 'own'
     assert '[own.md](own.md)' in (tmp_path / 'docs' / 'page.md').read_text()

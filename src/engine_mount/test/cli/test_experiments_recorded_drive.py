@@ -10,14 +10,14 @@ from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
 from engine_mount.experiments import page, recorded_drive
-from engine_mount.experiments.harness.contract import ExperimentError, Holds, Order
+from engine_mount.experiments.harness.experiment import ExperimentError, Holds
+from engine_mount.experiments.harness.measures import rms_in_bands
 from engine_mount.experiments.recorded_drive import (
     BANDS,
     ELASTOMER,
     FRICTION,
     HYDRO,
     near,
-    rms_in_bands,
     rms_in_bands_within,
 )
 from engine_mount.experiments.registry import experiments_named
@@ -36,8 +36,8 @@ needs_i280 = pytest.mark.skipif(
 
 
 def run(folder, file, **settings):
-    order = Order(folder, {recorded_drive.NAME: {'file': str(file), **settings}})
-    return recorded_drive.EXPERIMENT.run(order, lambda share, what: None)
+    given = {recorded_drive.NAME: {'file': str(file), **settings}}
+    return recorded_drive.EXPERIMENT.run(recorded_drive.EXPERIMENT.order(folder, given))
 
 
 @pytest.fixture(scope='module')
@@ -94,7 +94,7 @@ def test_a_drive_without_damping_says_so(tmp_path):
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['times_on'] == 0
     assert 'Damping was never on' in outcome.pages[0].read_text()
-    assert outcome.statements[1].holds is Holds.NOT_COMPARABLE
+    assert outcome.claims[1].holds is Holds.NOT_COMPARABLE
 
 
 @pytest.mark.parametrize(('frequency', 'band'), [(3.0, 0), (8.0, 1), (20.0, 2)])
@@ -143,7 +143,7 @@ def test_all_are_those_that_need_nothing_and_those_asked_for_by_name():
 
 
 def test_alone_its_own_page_is_the_page(driven, tmp_path):
-    page.write_page([(recorded_drive.EXPERIMENT, driven)], tmp_path / 'page.md')
+    page.write_page([driven], tmp_path / 'page.md')
     assert (tmp_path / 'page.md').read_text() == driven.pages[0].read_text()
     assert (tmp_path / 'figures' / driven.pictures[0].name).exists()
 

@@ -8,7 +8,6 @@ import pytest
 from engine_mount.experiments.harness.fixed_gaps import (
     RIG_CURRENTS,
     RIG_GAPS,
-    RigNoise,
     measure_actuator,
 )
 from mount_models.actuator.law import checked_force
@@ -74,10 +73,10 @@ def test_the_rig_measures_force_and_inductance_of_the_simulated_actuator(measure
 
 
 def test_noise_of_the_rig_is_seeded_and_of_the_stated_size(measured):
-    noise = RigNoise(force=0.5, inductance_ratio=0.01, seed=7)
-    one, two = (measure_actuator(MAGNET, COIL, noise=noise) for _ in range(2))
+    noise = {'force_noise': 0.5, 'ratio_noise': 0.01}
+    one, two = (measure_actuator(MAGNET, COIL, **noise, seed=7) for _ in range(2))
     assert (one.force == two.force).all()
     assert np.std(one.force - measured.force) == pytest.approx(0.5, rel=0.05)
     assert np.std(one.inductance / measured.inductance - 1.0) == pytest.approx(0.01, rel=0.05)
-    other = measure_actuator(MAGNET, COIL, noise=RigNoise(0.5, 0.01, seed=8))
+    other = measure_actuator(MAGNET, COIL, **noise, seed=8)
     assert not (one.force == other.force).any()

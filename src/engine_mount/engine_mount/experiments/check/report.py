@@ -12,7 +12,7 @@ import numpy as np
 
 from engine_mount.experiments.check.run import GRAPH, MODES, CheckOrder, Result, Shown
 from engine_mount.experiments.check.suite import CLOCK, MEASURES, RACK, Limit, Manoeuvre
-from engine_mount.experiments.harness.contract import Values
+from engine_mount.experiments.harness.experiment import Values
 from engine_mount.recordings.screen import Screen
 from engine_mount.recordings.screen import Table as ScreenTable
 from engine_mount.reports.drawing.chart import Array, Chart, Curve, Panel, Span

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.drives.drive import DriveOrder, record_drive
-from engine_mount.drives.loop.run import run_core_into
 from engine_mount.drives.preflight import preflight
 from engine_mount.experiments.check.suite import BANDS, RACK, Manoeuvre
-from engine_mount.experiments.harness.contract import Settings, Values
-from engine_mount.experiments.harness.many_runs import TruthOnly
+from engine_mount.experiments.harness.closed_loop import truth_of_run
+from engine_mount.experiments.harness.experiment import Settings, Values
 from engine_mount.experiments.harness.measures import first_extremum, rms_in_bands
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.audit import audit
@@ -267,10 +266,8 @@ def at_samples(truth: Truth, count: int) -> Truth:
 
 def _alone(parameters: Settings, mount: str) -> Beside:
     """Return another mount on the same excitation: no bus, no recording, the same plant."""
-    truth = TruthOnly(_FIELDS)
-    sim = {**parameters['mount_sim'], 'mount': mount}
-    outcome = run_core_into(truth, {**parameters, 'mount_sim': sim})
-    return Beside(*truth.signals(outcome.excitation_start))
+    truth = truth_of_run({**parameters, 'mount_sim': {**parameters['mount_sim'], 'mount': mount}})
+    return Beside(*(getattr(truth, name) for name in _FIELDS))
 
 
 def _gap_errors(recording: Recording) -> dict[str, float]:

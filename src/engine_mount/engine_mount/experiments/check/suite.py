@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.experiments.harness.contract import Settings
+from engine_mount.experiments.harness.experiment import Settings
 from mount_bringup.settings import checked_settings
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.quantity import ParameterError, check_name
