@@ -217,10 +217,10 @@ def displacement(maps: Maps) -> Verdict:
     if len(levels) > 1:
         friction = maps.friction_peak[:, 0]
         hydro = friction / maps.peak[:, 0, 0, 0]
+        ours, its = (each[-1] / each[0] for each in (friction, hydro))
         told += f"""From V0 = {levels[0]:g} to {maps.axes.levels[-1]:g} m/s the largest displacement grows
-            by a factor of {friction[-1] / friction[0]:.1f} with the friction mount and {hydro[-1] / hydro[0]:.1f}
-            with the hydromount (first values of the rest): the switched mount first lets the engine move up
-            to its switch-on level."""
+            by a factor of {ours:.1f} with the friction mount and {its:.1f} with the hydromount (first values
+            of the rest): the switched mount first lets the engine move up to its switch-on level."""
     return holds_if(lower(maps.peak).ravel().tolist()), told
 
 
