@@ -1,7 +1,7 @@
 """Writes docs/reference/parameters.md: every parameter of every node, as the code declares it.
 
-`python test/docs/parameters_page.py` renews the page, the file of `vehicle_file.py`, and the names that a
-shell offers behind Tab, which hold them too; tests hold all three against the code.
+`python test/docs/parameters_page.py` renews the page and the file of `vehicle_file.py`; tests hold both
+against the code.
 """
 
 import math
@@ -9,8 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from engine_mount.cli.completion.collected import collected
-from engine_mount.cli.completion.values import FILE as NAMES
 from mount_bringup.settings import defaults_of_nodes
 from mount_control.settings import parameter_sets
 from mount_driver.parameters import DriverParameters
@@ -81,5 +79,4 @@ if __name__ == '__main__':
     from vehicle_file import FILE, text  # which is made of the same sets
 
     PAGE.write_text(page(), encoding='utf-8')
-    NAMES.write_text(collected(), encoding='utf-8')
     FILE.write_text(text(), encoding='utf-8')

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from ros_testing import serialised
 from sensor_msgs.msg import JointState
 
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units.unit import UnitError
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
 
 TIMES = np.arange(1000) / 100.0
 MILLIMETRES = 0.8 * np.sin(2.0 * np.pi * 8.0 * TIMES) + 0.1 * np.random.default_rng(1).standard_normal(1000)

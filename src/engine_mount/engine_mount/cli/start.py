@@ -14,11 +14,6 @@ def main() -> None:
 
     signal.signal(signal.SIGINT, _leave)
     os.environ['PYTHONSAFEPATH'] = '1'  # no child imports what lies in the working directory
-    if os.environ.get('_ENGINE_MOUNT_COMPLETE') == 'complete_bash':
-        from engine_mount.cli.command import app
-        from engine_mount.cli.completion.bash import complete_in_bash
-
-        complete_in_bash(app)
     from engine_mount.cli.command import main as run
     from mount_bringup.graph.shutdown import interrupt_and_remember
 

@@ -17,7 +17,6 @@ from functools import partial
 import numpy as np
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
-from std_msgs.msg import String
 
 from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, Frame, open_bus
@@ -27,8 +26,8 @@ from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.environment import prepare_environment
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.cdr import string_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.process import ros_context
 from mount_ros.nodes.shutdown import end_process
@@ -186,12 +185,12 @@ def _air_gap() -> Iterator[bytes]:
 
 def _table(currents: tuple[float, ...], forces: tuple[float, ...], stamp: int = 0) -> Iterator[bytes]:
     """Yield a current-force table with a stamp (ns), by default that of now."""
-    table = to_message(stamp or time.time_ns(), np.array([sorted(currents), forces]))
-    table.data = [*currents, *forces]  # also what our own code would not send
-    yield serialised(table)
+    sound = table_message(stamp or time.time_ns(), np.array([sorted(currents), forces]))
+    numbers = np.array([currents, forces]).tobytes()  # also what our own code would not send
+    yield sound[: -len(numbers)] + numbers
 
 
-_EVENT = serialised(String(data='flood ' + 'x' * 100))
+_EVENT = string_message('flood ' + 'x' * 100)
 _TABLE = (0.0, 1.0, 3.0), (0.0, 500.0, 1000.0)  # A, N
 _FALLING = (0.0, 2.0, 1.0), (0.0, 300.0, 500.0)
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.drives.inputs.taken import ReplayError
-from engine_mount.drives.replay import ReplayOrder, ReplayOutcome, replay_without_output
+from engine_mount.drives.inputs.consumed_samples import ReplayError
+from engine_mount.drives.replay import Replay, replay
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from engine_mount.fleet.what_if.closed_loop import both_motions
 from engine_mount.fleet.what_if.compared import recorded_in
@@ -54,8 +54,8 @@ def before_and_after(
                 (first.setpoint, other.setpoint),
                 (first.displacement, other.displacement),
             )
-        before = replay_without_output(ReplayOrder(path, mount=mount))
-        after = replay_without_output(ReplayOrder(path, changes=changes, mount=mount))
+        before = replay(path, mount=mount)
+        after = replay(path, changes, mount=mount)
     runs = before.given.controls
     if not runs:
         raise ReplayError(f'{uri}: the controller had nothing to do')
@@ -76,5 +76,5 @@ def _as_recording(path: Path, said: Said, closed_loop: bool) -> Iterator[Path]:
         yield path
 
 
-def _setpoints(outcome: ReplayOutcome) -> Column:
+def _setpoints(outcome: Replay) -> Column:
     return np.concatenate([run.setpoints for run in outcome.replayed.runs])

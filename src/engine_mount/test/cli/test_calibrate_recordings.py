@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import WrenchStamped
-from std_msgs.msg import String
 
 from engine_mount.cli.command import main
 from engine_mount.identification.rack.columns import RackRecordingError
@@ -21,9 +19,8 @@ from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message, temperature, wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.messages.sensors import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
@@ -49,9 +46,9 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     try:
         for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', serialised(String(data='scenario: rack')), begin)
-        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), temperature_layout()
-        forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        writer.write(f'/{SESSION.name}', string_message('scenario: rack'), begin)
+        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), OneNumberLayout(temperature)
+        forces = OneNumberLayout(wrench)
         rows = zip(current.tolist(), rate.tolist(), flux.tolist(), pull.tolist(), strict=True)
         for sample, (i, of_current, of_flux, force) in enumerate(rows):
             stamp = sample * 1_000_000

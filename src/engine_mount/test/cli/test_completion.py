@@ -8,9 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from engine_mount.cli.completion.bash import joined
-from engine_mount.cli.completion.collected import collected
-from engine_mount.cli.completion.values import FILE, faults, listed, named, recordings, references, setting
+from engine_mount.cli.completion import KINDS, faults, listed, named, recordings, references, setting
 
 COMMAND = Path(sys.executable).with_name('engine-mount')
 WITHOUT_DETECTION = {'_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION': '1'}
@@ -26,13 +24,11 @@ def environment(**others: str) -> dict[str, str]:
     return {**os.environ, **WITHOUT_DETECTION, 'PATH': path, **others}
 
 
-def first(offered: list[tuple[str, str]]) -> list[str]:
-    return [value for value, _ in offered]
-
-
-def test_the_names_that_are_offered_are_those_of_the_code():
-    renew = 'python test/docs/parameters_page.py renews them'
-    assert FILE.read_text(encoding='utf-8') == collected(), renew
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_kind_has_names(kind):
+    offered = named(kind)('')
+    assert offered
+    assert all(name == str(name) and ' ' not in name for name in offered)
 
 
 @pytest.mark.parametrize(
@@ -44,25 +40,21 @@ def test_the_names_that_are_offered_are_those_of_the_code():
         (listed('place'), 'left,r', 'left,right'),
         (faults, 'right/coil_o', 'right/coil_open'),
         (faults, '', 'list'),
-        (setting(), 'mount_control.pol', 'mount_control.policy=continuous_viscous'),
-        (setting(), 'switch_on', 'switch_on_level=0.0005'),
-        (setting(), 'sawtooth.amp', 'sawtooth.amplitude=0.0016'),
-        (setting(), 'left/mount_control.policy=s', 'left/mount_control.policy=switched_viscous'),
-        (setting('mount_init'), '', 'mount_init.silence_timeout=0.05'),
+        (setting, 'mount_control.pol', 'mount_control.policy=continuous_viscous'),
+        (setting, 'left/mount_control.policy=s', 'left/mount_control.policy=switched_viscous'),
     ],
 )
 def test_values_are_offered(complete, begun, value):
-    offered = first(complete(begun))
+    offered = complete(begun)
     if '=' in value and '=' not in begun:  # the default may change
         value, offered = value.split('=')[0], [each.split('=')[0] for each in offered]
     assert value in offered
     assert all(each.startswith(begun) for each in offered)
 
 
-def test_a_name_that_is_taken_is_not_offered_again_and_others_than_the_owners_are_not():
-    assert 'left,left' not in first(listed('place')('left,'))
-    assert not first(setting('mount_init')('mount_sim.'))
-    assert not first(setting()('mount_sim.seed='))
+def test_a_name_that_is_listed_already_is_not_offered_again():
+    assert 'left,left' not in listed('place')('left,')
+    assert not setting('mount_sim.seed=')
 
 
 def test_runs_and_recordings_are_offered_the_newest_first(tmp_path, monkeypatch):
@@ -75,23 +67,10 @@ def test_runs_and_recordings_are_offered_the_newest_first(tmp_path, monkeypatch)
         os.utime(tmp_path / 'bags' / name, (1e9 - age, 1e9 - age))
     (tmp_path / 'bags' / 'empty').mkdir()
     (tmp_path / 'bags' / 'reference' / 'gap').mkdir(parents=True)
-    assert first(recordings('')) == ['bags/new', 'bags/old']
-    assert first(recordings('bags/o')) == ['bags/old']
-    assert first(recordings('nowhere/')) == []
-    assert first(references('g')) == ['gap']
-
-
-@pytest.mark.parametrize(
-    ('words', 'whole'),
-    [
-        (['a', '--set', 'x.y', '=', '1'], ['a', '--set', 'x.y=1']),
-        (['a', '--set', 'x.y', '='], ['a', '--set', 'x.y=']),
-        (['a', '--set', 'x', '=', '', '--core'], ['a', '--set', 'x=', '--core']),
-        (['a', '--set', 'x'], ['a', '--set', 'x']),
-    ],
-)
-def test_words_that_bash_has_parted_are_whole_again(words, whole):
-    assert joined(words) == whole
+    assert recordings('') == ['bags/new', 'bags/old']
+    assert recordings('bags/o') == ['bags/old']
+    assert recordings('nowhere/') == []
+    assert references('g') == ['gap']
 
 
 @pytest.mark.skipif(shutil.which('bash') is None, reason='no bash')
@@ -100,8 +79,6 @@ def test_words_that_bash_has_parted_are_whole_again(words, whole):
     [
         (['rep'], ['report', 'replay']),
         (['drive', '--scenario', 'm'], ['motorway']),
-        (['drive', '--set', 'mount_control.policy', '=', 's'], ['switched_viscous']),
-        (['replay', '--set', 'policy', '=', 'c'], ['continuous_viscous']),
         (['faults', '--only', 'coil_open,kill_d'], ['coil_open,kill_driver']),
     ],
 )

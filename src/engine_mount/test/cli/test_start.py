@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from engine_mount.cli.bench import chain_runs
+from engine_mount.cli.bench import chains
 from engine_mount.cli.commands import faults, view
 from engine_mount.view import view as looking
 from engine_mount.view.feed.feed import FeedError
@@ -33,7 +33,7 @@ def test_programs_of_the_command_import_nothing_from_the_working_directory(tmp_p
     for module in ('yaml', 'typer', 'queue', 'rclpy'):
         (tmp_path / f'{module}.py').write_text('raise SystemExit("foreign code ran")')
     environment = {name: value for name, value in os.environ.items() if name != 'PYTHONSAFEPATH'}
-    for command in ([*faults._DRIVE], chain_runs._command(['peer'], 7530)):
+    for command in ([*faults._DRIVE], chains._command('peer', 7530)):
         ended = subprocess.run(
             [*command, '--help'], cwd=tmp_path, env=environment, capture_output=True, text=True
         )

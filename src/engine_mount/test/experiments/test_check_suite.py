@@ -140,9 +140,9 @@ def test_a_file_is_refused_with_its_name(tmp_path):
 
 def test_settings_of_the_user_reach_every_manoeuvre(tmp_path):
     made = trials(tmp_path, {'mount_control': {'policy': 'switched_viscous'}})
-    policies = [each.drive.parameters['mount_control'] for each in made]
+    policies = [each.parameters['mount_control'] for each in made]
     assert policies == [{'policy': 'switched_viscous'}] * 2
-    always = trials(tmp_path, {'mount_sim': {'mount': 'friction_always_on'}})[0].drive.parameters
+    always = trials(tmp_path, {'mount_sim': {'mount': 'friction_always_on'}})[0].parameters
     assert always['mount_control']['switching'] == 'always'
 
 
@@ -166,11 +166,11 @@ def test_orders_that_no_manoeuvre_can_follow_are_refused_before_the_first(tmp_pa
 
 @pytest.mark.parametrize('error', [GraphError('no gap'), ParameterError('a graph already runs')])
 def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
-    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=error))
+    monkeypatch.setattr(run, 'drive', Mock(side_effect=error))
     made = trials(tmp_path, through=GRAPH)[0]
     broken = run.run_trial(made)
     assert (broken.figures, broken.broke_down) == ({}, str(error))
-    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=Interrupted()))
+    monkeypatch.setattr(run, 'drive', Mock(side_effect=Interrupted()))
     with pytest.raises(Interrupted):
         run.run_trial(made)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import engine_mount
-from engine_mount.drives.preflight import preflight
+from engine_mount.drives.drive import check_drive
 from engine_mount.fleet.example.fleet import (
     FEWEST,
     WHOLE_FLEET,
@@ -37,13 +37,13 @@ def test_the_whole_fleet_can_be_driven_and_each_recording_has_a_folder_of_its_ow
     orders = list(whole_fleet(tmp_path))
     assert len({order.folder for order in orders}) == len(orders) == WHOLE_FLEET
     for order in orders:
-        preflight(settings_of(order), core=True)
+        check_drive(settings_of(order), core=True)
 
 
 def test_longer_drives_can_be_driven_and_a_sweep_ends_at_its_last_frequency(tmp_path):
     for order in (order for order in whole_fleet(tmp_path) if order.variation is VARIATIONS[0]):
         longer = replace(order, seconds=40.0)
-        length = preflight(settings_of(longer), core=True).duration
+        length = check_drive(settings_of(longer), core=True).duration
         assert length == pytest.approx(
             {'sweep': 18.0, 'sweep_switched': 46.0 / 3.0}.get(order.drive.name, 40.0), abs=1e-3
         )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine_mount.drives.inputs.foreign import foreign_order
-from engine_mount.drives.replay import ReplayOrder, parsed_changes, replay_without_output
+from engine_mount.drives.replay import parsed_changes, replay
 from engine_mount.fleet import before_and_after as pictures
 from engine_mount.fleet.catalogue.index import indexed
 from engine_mount.fleet.catalogue.places import places
@@ -152,8 +152,8 @@ def test_setpoints_are_those_of_a_replay_with_the_same_mapping(drives, said, tmp
     assert (row['reason'], row['as_recorded'], row['recorded_with']) == ('', None, '')
     foreign = foreign_order(['displacement=Weg'])
     for changes, column in (({}, 'peak_current_a'), (CHANGES, 'peak_current_changed_a')):
-        order = ReplayOrder(drives / 'rack' / 'good.csv', changes=changes, foreign=foreign)
-        setpoints = replay_without_output(order).replayed.runs[0].setpoints
+        outcome = replay(drives / 'rack' / 'good.csv', changes, foreign=foreign)
+        setpoints = outcome.replayed.runs[0].setpoints
         assert row[column] == pytest.approx(setpoints.max(), abs=1e-9)
     assert row['peak_current_a'] > row['peak_current_changed_a'] == 0.7
     assert rows['run/recording']['as_recorded'] is True

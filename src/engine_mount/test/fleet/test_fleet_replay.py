@@ -14,7 +14,7 @@ import pytest
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import parsed_changes
 from engine_mount.fleet.job import OrderError
-from engine_mount.fleet.what_if import compared, one, run
+from engine_mount.fleet.what_if import one, run
 from engine_mount.fleet.what_if.asked import AskedError, recordings_asked
 from engine_mount.fleet.what_if.closed_loop import both_motions, compared_motion
 from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
@@ -59,18 +59,6 @@ def test_what_can_be_made_again_is_written_in_long_chunks(driven, tmp_path):
     for folder in (driven, tmp_path / 'piece'):
         chunks = open_run(folder).files[0].chunks
         assert max(chunk.size for chunk in chunks) >= LONG_CHUNK_SIZE
-
-
-@pytest.mark.parametrize('length', [700, 1500])
-def test_a_recording_read_in_stretches_gives_the_figures_of_the_whole(driven, length, monkeypatch):
-    added = []
-    add = compared._add
-    monkeypatch.setattr(compared, '_add', lambda *given: (added.append(given), add(*given)))
-    whole = compared_setpoints(recorded_in(open_run(driven)), CHANGES, 0)
-    assert len(added) == whole['activations'] == 1
-    parts = compared_setpoints(recorded_in(open_run(driven)), CHANGES, length)
-    assert len(added) > 3
-    assert same(parts, whole)
 
 
 def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_was_recorded():

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from ros_testing import serialised
 from sensor_msgs.msg import Imu, JointState
 
 from engine_mount.signals.loading import load_signal
 from engine_mount.signals.signal import SignalError
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
 
 RATE = 104.26  # Hz, of a common motion sensor
 

@@ -1,16 +1,40 @@
 """Performance figures as ratios: ours and its alternative in turn, in one run, medians of several."""
 
+import math
+import statistics
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
-from engine_mount.cli.bench.comparison import Comparison
 from engine_mount.reports.json_file import write_json
 
-Figures = Mapping[str, Comparison]
+GROUPS = ('calls', 'storage', 'fleet', 'graph', 'rate')
+"""What can be measured alone: function `measure` of the module of this name, or of `chains`."""
+_MODULES = {'graph': 'chains', 'rate': 'chains'}
+_FAST = 2000.0  # Hz, of the group `rate`
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A figure of ours and one of its alternative, in s where `unit` says nothing else."""
+
+    what: str
+    ours: float
+    beside: str
+    other: float
+    unit: str = 's'
+
+    @property
+    def ratio(self) -> float:
+        """Ours over the other."""
+        return self.ours / self.other if self.other else math.nan
 
 
 @dataclass(frozen=True)
@@ -23,6 +47,25 @@ class BenchOrder:
     domain: int = 0
     priority: int = 0
     json_file: Path | None = None
+    sample_rate: float | None = None
+    """Hz, of the graph; None: the default."""
+
+
+Figures = Mapping[str, Comparison]
+
+
+def median_times(
+    ours: Callable[[], object], other: Callable[[], object], rounds: int, repeats: int = 1
+) -> tuple[float, float]:
+    """Return the median seconds of one call of each, measured A B A B ..., `repeats` calls at a time."""
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for place, call in enumerate((ours, other)):
+            begin = time.perf_counter()
+            for _ in range(repeats):
+                call()
+            times[place].append((time.perf_counter() - begin) / repeats)
+    return statistics.median(times[0]), statistics.median(times[1])
 
 
 def print_bench(order: BenchOrder, console: Console) -> None:
@@ -30,78 +73,32 @@ def print_bench(order: BenchOrder, console: Console) -> None:
     for name in order.only:
         if name not in GROUPS:
             raise ValueError(f'{name!r} is no group of bench; known are {", ".join(GROUPS)}')
+    found: dict[str, Comparison] = {}
+    with console.status('measuring') as status:
+        for name in order.only or GROUPS:
+            status.update(f'measuring: {name}')
+            found |= measure_group(name, order, status.update)
     table = Table(title='medians, in turn; ratio: ours over the other')
     for title in ('what', 'ours', 'beside', 'other', 'ratio'):
         table.add_column(title, justify='left' if title in ('what', 'beside') else 'right')
-    found: dict[str, Comparison] = {}
-    with console.status('measuring') as status:
-        for name, measure in GROUPS.items():
-            if not order.only or name in order.only:
-                status.update(f'measuring: {name}')
-                found.update(measure(order, status.update))
     for row in found.values():
-        values = _text(row.ours, row.unit), row.other_name, _text(row.other, row.unit), f'{row.ratio:.3g}'
-        table.add_row(row.what, *values)
+        ours, other = _text(row.ours, row.unit), _text(row.other, row.unit)
+        table.add_row(row.what, ours, row.beside, other, f'{row.ratio:.3g}')
     console.print(table)
     if order.json_file is not None:
-        write_json({name: row.figures for name, row in found.items()}, order.json_file)
+        known = {
+            name: asdict(row) | {'ratio': row.ratio if row.other else None} for name, row in found.items()
+        }
+        write_json(known, order.json_file)
 
 
-def _calls(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench import in_process
-
-    return {
-        'pack': in_process.packing(),
-        'unpack': in_process.unpacking(),
-        'decode': in_process.coding(),
-        'control': in_process.control(),
-        'core': in_process.closed_loop(),
-        'replay': in_process.replay(),
-    }
-
-
-def _storage(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench.storage import storage_figures
-
-    return dict(zip(('write', 'load'), storage_figures(), strict=False))  # one without `rosbags`
-
-
-def _fleet(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench.fleet import fleet_figures
-
-    return fleet_figures(say)
-
-
-def _graph(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench.chain_runs import Place
-    from engine_mount.cli.bench.in_real_time import graph_figures
-
-    return graph_figures(Place(order.domain, order.priority), order.seconds, order.rounds, say)
-
-
-def _fast(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench.chain_runs import Place
-    from engine_mount.cli.bench.in_real_time import fast_figures
-
-    return fast_figures(Place(order.domain, order.priority), order.seconds, order.rounds, say)
-
-
-def _lockstep(order: BenchOrder, say: Callable[[str], None]) -> Figures:
-    from engine_mount.cli.bench.chain_runs import Place
-    from engine_mount.cli.bench.in_real_time import lockstep_figures
-
-    return lockstep_figures(Place(order.domain), order.seconds, order.rounds, say)
-
-
-GROUPS: dict[str, Callable[[BenchOrder, Callable[[str], None]], Figures]] = {
-    'calls': _calls,
-    'storage': _storage,
-    'fleet': _fleet,
-    'lockstep': _lockstep,
-    'graph': _graph,
-    'rate': _fast,
-}
-"""What can be measured alone."""
+def measure_group(name: str, order: BenchOrder, report: Report) -> Figures:
+    """Return the comparisons of one group by name."""
+    module = import_module(f'engine_mount.cli.bench.{_MODULES.get(name, name)}')
+    if name == 'rate':
+        found: Figures = module.measure(replace(order, sample_rate=_FAST), report)
+        return {f'{key}_2_khz': row for key, row in found.items()}
+    return module.measure(order, report)
 
 
 def _text(value: float, unit: str) -> str:

@@ -2,8 +2,8 @@
 
 What one would write with rclpy and python-can alone, with the same delivery and sizes as the graph: what this
 chain costs is the price of middleware and bus. `ends` stands where the driver stands, `middle` where the
-controller stands, `peer` where the electronics stand; parts may share a process. They are served as by
-`rclpy.spin`, or by the `EventsExecutor`, which is experimental in rclpy and which the graph uses.
+controller stands, `peer` where the electronics stand. They are served as by `rclpy.spin`, or by the
+`EventsExecutor`, which is experimental in rclpy and which the graph uses.
 """
 
 import argparse
@@ -35,32 +35,27 @@ _LOOK = 0.2  # s: how often a loop looks whether it shall end
 
 
 def main() -> None:
-    """Run the parts that are named until SIGINT, or the peer for a time; the peer prints what it measured."""
+    """Run the part that is named until SIGINT, or the peer for a time; the peer prints what it measured."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('parts', nargs='+', choices=('ends', 'middle', 'peer'))
+    parser.add_argument('part', choices=('ends', 'middle', 'peer'))
     parser.add_argument('--port', type=int, required=True)
     parser.add_argument('--seconds', type=float, default=5.0)
-    parser.add_argument('--rate', type=float, default=1000.0, help='Hz; 0: the peer waits for each answer')
+    parser.add_argument('--rate', type=float, default=1000.0, help='Hz')
     parser.add_argument('--executor', choices=EXECUTORS, default=SPIN)
     chosen = parser.parse_args()
-    if chosen.parts == ['peer']:
+    if chosen.part == 'peer':
         _measure(chosen.port, chosen.seconds, chosen.rate)
         return
     rclpy.init()
     executor = EXECUTORS[chosen.executor]()
-    with contextlib.ExitStack() as ending:
-        ending.callback(rclpy.try_shutdown)
-        for part in chosen.parts:
-            node = Node(f'relay_{part}', namespace='bench_relay', enable_rosout=False)
-            if part == 'middle':
-                _relay(node)
-            else:
-                ending.enter_context(_bridge(node, _bus(chosen.port, _SAMPLE)))
-            executor.add_node(node)
-        with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-            while rclpy.ok():
-                executor.spin_once(_LOOK)
-        executor.shutdown()
+    node = Node(f'relay_{chosen.part}', namespace='bench_relay', enable_rosout=False)
+    executor.add_node(node)
+    work = _relay(node) if chosen.part == 'middle' else _bridge(node, _bus(chosen.port, _SAMPLE))
+    with work, contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        while rclpy.ok():
+            executor.spin_once(_LOOK)
+    executor.shutdown()
+    rclpy.try_shutdown()
 
 
 def _bus(port: int, received: int) -> can.BusABC:
@@ -79,10 +74,11 @@ def _number(message: can.Message) -> int:
     return int.from_bytes(message.data[:_NUMBER], 'little')
 
 
-def _relay(node: Node) -> None:
+def _relay(node: Node) -> contextlib.AbstractContextManager[None]:
     """Hand on each message of one topic on another."""
     publisher = node.create_publisher(JointState, 'answer', 100)
     node.create_subscription(JointState, 'sample', publisher.publish, _QOS)
+    return contextlib.nullcontext()
 
 
 @contextlib.contextmanager
@@ -118,12 +114,12 @@ def _measure(port: int, seconds: float, rate: float) -> None:
     bus = _bus(port, _ANSWER)
     try:
         print(_first_answer(bus), flush=True)
-        sent, late = _sent(bus, seconds, rate) if rate else _sent_in_turn(bus, seconds)
+        sent, late = _sent(bus, seconds, rate)
     finally:
         bus.shutdown()
     percent = statistics.quantiles(late, n=100)
-    told = {'latency_median_s': percent[49], 'latency_p99_s': percent[98]}
-    print(json.dumps({'samples': sent, 'answered': len(late), **told}), flush=True)
+    found = {'latency_median_s': percent[49], 'latency_p99_s': percent[98]}
+    print(json.dumps({'samples': sent, 'answered': len(late), **found}), flush=True)
 
 
 def _first_answer(bus: can.BusABC) -> float:
@@ -153,18 +149,6 @@ def _sent(bus: can.BusABC, seconds: float, rate: float) -> tuple[int, list[float
     while (frame := bus.recv(_LOOK)) is not None:
         late.append(frame.timestamp - left[_number(frame)])
     return count, late
-
-
-def _sent_in_turn(bus: can.BusABC, seconds: float) -> tuple[int, list[float]]:
-    """Send each sample when the one before is answered; return the same."""
-    end, number, late = time.monotonic() + seconds, 0, []
-    while time.monotonic() < end:
-        number += 1
-        begin = time.monotonic()
-        bus.send(_frame(_SAMPLE, number, _SAMPLE_LENGTH))
-        if bus.recv(1.0) is not None:
-            late.append(time.monotonic() - begin)
-    return number, late
 
 
 if __name__ == '__main__':

@@ -1,13 +1,13 @@
-"""Figures of the storage of recordings: writing and loading, each beside its alternative in the same run."""
+"""Storage of recordings: writing beside `mcap`, loading beside `rosbags`, in the same run."""
 
-import tempfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from mcap.writer import Writer
 
 import engine_mount
-from engine_mount.cli.bench.comparison import Comparison, in_turn
+from engine_mount.cli.bench.bench import BenchOrder, Comparison, Figures, Report, median_times
 from mount_models.sampling import SAMPLE_TIME
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import CHUNK_SIZE
@@ -17,60 +17,45 @@ from mount_ros.topics import DISPLACEMENT
 MINUTES = 10
 _SAMPLES = round(60 * MINUTES / SAMPLE_TIME)
 _WRITTEN = 200_000  # messages in one round of writing
-ROUNDS = 3
-_STAMP = 1_700_000_000_000_000_000  # ns, any time
+_ROUNDS = 3
+_BEGIN = 1_700_000_000_000_000_000  # ns, any time
 _TOPIC = f'/{DISPLACEMENT.name}'
 
 
-def storage_figures(
-    samples: int = _SAMPLES, written: int = _WRITTEN, rounds: int = ROUNDS
-) -> list[Comparison]:
-    """Measure and return the figures: medians of `rounds`, ours and the other in turn.
-
-    Loading is that of `displacement` from a recording of `samples` (10 minutes at 1 kHz), from opening the
-    recording to an array of stamps and one of numbers. The other is left out where `rosbags` is missing.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        figures = [_writing(Path(folder), written, rounds)]
-        loading = _loading(Path(folder), samples, rounds)
-        return figures + ([loading] if loading else [])
+def measure(order: BenchOrder, report: Report) -> Figures:
+    """Return what a message costs to write, and to load: from the file to arrays of stamps and numbers."""
+    with TemporaryDirectory() as folder:
+        return {'write': _writing(Path(folder)), 'load': _loading(Path(folder))}
 
 
-def _writing(folder: Path, count: int, rounds: int) -> Comparison:
-    raws = _messages(count)
-    places = iter(range(2 * rounds))
-
-    def ours() -> None:
-        _write(folder / f'ours_{next(places)}', raws)
+def _writing(folder: Path) -> Comparison:
+    raws = _messages(_WRITTEN)
+    places = iter(range(2 * _ROUNDS))
 
     def other() -> None:
         with (folder / f'other_{next(places)}.mcap').open('wb') as stream:
             writer = Writer(stream, chunk_size=CHUNK_SIZE)
             writer.start('ros2')
-            channel = writer.register_channel(
-                _TOPIC, 'cdr', writer.register_schema(DISPLACEMENT.type, 'ros2msg', b'')
-            )
+            schema = writer.register_schema(DISPLACEMENT.type, 'ros2msg', b'')
+            channel = writer.register_channel(_TOPIC, 'cdr', schema)
             for index, raw in enumerate(raws):
-                writer.add_message(channel, _STAMP + index, raw, _STAMP + index)
+                writer.add_message(channel, _BEGIN + index, raw, _BEGIN + index)
             writer.finish()
 
-    first, second = in_turn(ours, other, rounds)
-    return Comparison('write a message to a bag', first / count, 'mcap.writer', second / count)
+    ours, theirs = median_times(lambda: _write(folder / f'ours_{next(places)}', raws), other, _ROUNDS)
+    return Comparison('write a message to a bag', ours / _WRITTEN, 'mcap.writer', theirs / _WRITTEN)
 
 
-def _loading(folder: Path, samples: int, rounds: int) -> Comparison | None:
-    try:
-        from rosbags.rosbag2 import Reader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        return None
-    recording = folder / 'minutes'
-    _write(recording, _messages(samples))
-    store = get_typestore(Stores.ROS2_JAZZY)
+def _loading(folder: Path) -> Comparison:
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+
+    recording, store = folder / 'minutes', get_typestore(Stores.ROS2_JAZZY)
+    _write(recording, _messages(_SAMPLES))
 
     def ours() -> None:
         series = engine_mount.open(recording)[DISPLACEMENT.name]
-        _require(series.stamps, series['mount'], samples)
+        _require(series.stamps, series['mount'])
 
     def other() -> None:
         stamps, numbers = [], []
@@ -79,16 +64,17 @@ def _loading(folder: Path, samples: int, rounds: int) -> Comparison | None:
                 message = store.deserialize_cdr(raw, connection.msgtype)
                 stamps.append(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)  # type: ignore[attr-defined]
                 numbers.append(message.position[0])  # type: ignore[attr-defined]
-        _require(np.array(stamps), np.array(numbers), samples)
+        _require(np.array(stamps), np.array(numbers))
 
-    first, second = in_turn(ours, other, rounds)
-    return Comparison(f'load displacement of {MINUTES} min', first / samples, 'rosbags', second / samples)
+    first, second = median_times(ours, other, _ROUNDS)
+    what = f'load displacement of {MINUTES} min'
+    return Comparison(what, first / _SAMPLES, 'rosbags', second / _SAMPLES)
 
 
-def _require(stamps: np.ndarray, numbers: np.ndarray, samples: int) -> None:
+def _require(stamps: np.ndarray, numbers: np.ndarray) -> None:
     """Raise `ValueError` unless the last sample was read: a figure of something else would mislead."""
-    if len(stamps) != samples or stamps[-1] != _stamp(samples - 1) or numbers[-1] != samples - 1:
-        raise ValueError(f'{len(stamps)} of {samples} samples were read, or read wrongly')
+    if len(stamps) != _SAMPLES or stamps[-1] != _stamp(_SAMPLES - 1) or numbers[-1] != _SAMPLES - 1:
+        raise ValueError(f'{len(stamps)} of {_SAMPLES} samples were read, or read wrongly')
 
 
 def _messages(count: int) -> list[bytes]:
@@ -97,7 +83,7 @@ def _messages(count: int) -> list[bytes]:
 
 
 def _stamp(index: int) -> int:
-    return _STAMP + index * round(SAMPLE_TIME * 1e9)
+    return _BEGIN + index * round(SAMPLE_TIME * 1e9)
 
 
 def _write(folder: Path, raws: list[bytes]) -> None:

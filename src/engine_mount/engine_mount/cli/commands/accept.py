@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import recording_argument
-from engine_mount.cli.completion.values import references
+from engine_mount.cli.completion import references
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import terminal
 

@@ -5,12 +5,12 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import Domain, JsonFile
-from engine_mount.cli.completion.values import named
+from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import terminal
 
 EPILOG = """Groups: `calls` (what one call costs), `storage` (recordings), `fleet` (a recorded
-second in `fleet replay`, stage by stage, and how workers add up), `lockstep`, `graph` (latency,
-processor time, start and memory of the graph in real time, beside a chain of empty nodes), `rate` (2 kHz).
+second in `fleet replay`), `graph` (latency, processor time, start and memory of the graph in real time,
+beside a chain of empty nodes), `rate` (the same at 2 kHz).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.completion.values import named, setting
+from engine_mount.cli.completion import named, setting
 from engine_mount.cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when it ran, whatever came out; 1 when the order was refused.
@@ -46,7 +46,7 @@ def experiment(
             '--set',
             metavar='[OWNER.]NAME=VALUE',
             help='a parameter of the experiment or of a node; may be repeated',
-            autocompletion=setting(),
+            autocompletion=setting,
         ),
     ] = None,
     page: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import Domain
-from engine_mount.cli.completion.values import listed
+from engine_mount.cli.completion import listed
 from engine_mount.cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.

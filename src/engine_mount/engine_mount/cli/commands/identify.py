@@ -15,7 +15,7 @@ from engine_mount.cli.commands.options import (
     mapping_of,
     stated,
 )
-from engine_mount.cli.completion.values import recordings
+from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import terminal

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.completion.values import recordings, setting
+from engine_mount.cli.completion import recordings, setting
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -37,7 +37,7 @@ Settings = Annotated[
         '--set',
         metavar='[NODE.]NAME=VALUE',
         help='any parameter of any node; may be repeated',
-        autocompletion=setting(),
+        autocompletion=setting,
     ),
 ]
 Domain = Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')]

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
-from engine_mount.cli.completion.values import setting
+from engine_mount.cli.completion import setting
 
 OtherThanRecorded = Annotated[
     list[str] | None,
@@ -12,7 +12,7 @@ OtherThanRecorded = Annotated[
         '--set',
         metavar='[NODE.]NAME=VALUE',
         help='a parameter other than recorded, of mount_control or mount_init; may be repeated',
-        autocompletion=setting('mount_control', 'mount_init'),
+        autocompletion=setting,
     ),
 ]
 

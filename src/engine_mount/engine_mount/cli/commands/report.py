@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import RecordingPlaces
-from engine_mount.cli.completion.values import recordings as offered
+from engine_mount.cli.completion import recordings as offered
 from engine_mount.cli.fetching import beside, is_fetched, local, named
 from engine_mount.cli.terminal import note, terminal
 

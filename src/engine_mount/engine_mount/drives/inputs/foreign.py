@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.drives.inputs.input import ControlRun, Messages, ReplayError, ReplayInput, dated
-from engine_mount.drives.inputs.ramps import MeasuredGap, measured_gaps
+from engine_mount.drives.inputs.consumed_samples import ControlRun, MeasuredGap, ReplayError
+from engine_mount.drives.inputs.input import Messages, ReplayInput, measured_gaps
 from engine_mount.recordings.place import open_run
 from engine_mount.settings.chosen import Parameters, chosen_specimen, control_parameters
 from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
@@ -132,7 +132,7 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
         'this sample a fault to cut or repair?',
     )  # fmt: skip
     notes.append(f'largest displacement {1e3 * float(np.max(np.abs(displacement))):.3f} mm')
-    run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - SAMPLE_TIME_NS))
+    run = ControlRun(stamps, displacement, gap.dated(int(stamps[0]) - SAMPLE_TIME_NS))
     layout = ScalarsLayout(topics.DISPLACEMENT)
     pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
     messages = Messages('/' + DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)

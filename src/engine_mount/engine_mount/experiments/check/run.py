@@ -1,6 +1,5 @@
 """The suite driven: orders checked before the first manoeuvre, in core several at a time."""
 
-import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -9,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.drives.drive import DriveOrder, record_drive
-from engine_mount.drives.preflight import preflight
+from engine_mount.drives.drive import Drive, check_drive, drive
 from engine_mount.experiments.check.suite import BANDS, RACK, Manoeuvre, Result
 from engine_mount.experiments.harness.closed_loop import truth_of_run
 from engine_mount.experiments.harness.experiment import Settings, Values
@@ -49,12 +47,17 @@ class CheckError(ValueError):
 
 @dataclass(frozen=True)
 class Trial:
-    """A manoeuvre and its drive: parameters of all nodes, `through` what, folder; how long (s) it takes."""
+    """A manoeuvre with the parameters of all nodes, driven `through` what, how long (s), into which folder.
+
+    `graph` are domain and priority where there are nodes.
+    """
 
     manoeuvre: Manoeuvre
-    drive: DriveOrder
+    parameters: dict[str, Values]
     through: str
     seconds: float
+    out: Path
+    graph: Mapping[str, Any]
 
 
 def trials_of(
@@ -64,11 +67,11 @@ def trials_of(
     through: str = CORE,
     *,
     jobs: int = 0,
-    **more: Any,
+    **graph: Any,
 ) -> list[Trial]:
     """Return the drives of a suite, each refused with its manoeuvre before any begins; a `ValueError`.
 
-    `settings` are the user's {node: {parameter: value}}; `more` are domain and priority of a graph.
+    `settings` are the user's {node: {parameter: value}}; `graph` are domain and priority of a graph.
     """
     if through != CORE and jobs > 1:
         raise CheckError(f'through {through} one manoeuvre is driven at a time; leave out --jobs')
@@ -90,7 +93,7 @@ def trials_of(
             merged[node] = merged.get(node, {}) | values
         parameters = with_control_of_mount(merged)
         try:
-            excitation = preflight(parameters, core=through == CORE)
+            excitation = check_drive(parameters, core=through == CORE)
         except ParameterError as error:
             raise CheckError(f'{each.name}: {error}') from None
         if each.evaluated_from >= excitation.duration:
@@ -98,10 +101,8 @@ def trials_of(
                 f'{each.name}: evaluated_from_s ({each.evaluated_from:g} s) must lie before the end of the '
                 f'excitation ({excitation.duration:g} s)'
             )
-        scenario = str(parameters['mount_sim']['scenario'])
-        drive = DriveOrder(scenario, MODES[through], parameters, out=out / each.name, **more)
         seconds = excitation.start + excitation.duration + (0.0 if through == CORE else _AROUND)
-        trials.append(Trial(each, drive, through, seconds))
+        trials.append(Trial(each, parameters, through, seconds, out / each.name, graph))
     return trials
 
 
@@ -140,20 +141,21 @@ def run_trial(trial: Trial) -> Result:
     One that breaks down, or whose recording cannot be judged, says so in its result: the others go on.
     """
     try:
-        folder, run, complaints = record_drive(trial.drive, Screen(io.StringIO()))
-        return result_of(trial, open_recording(folder.recording), run, complaints)
+        core, lockstep = trial.through == CORE, trial.through == LOCKSTEP
+        run = drive(core=core, lockstep=lockstep, parameters=trial.parameters, out=trial.out, **trial.graph)
+        return result_of(trial, open_recording(run.recording), run)
     except (GraphError, ValueError) as error:
         return Result({}, broke_down=str(error))
 
 
-def result_of(trial: Trial, recording: Recording, run: Values, complaints: list[str]) -> Result:
+def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
     """Return figures and remarks of a recorded manoeuvre, and the truths of the mounts beside it."""
-    parameters, audits = trial.drive.parameters, audit(recording)
+    parameters, audits = trial.parameters, audit(recording)
     lost = losses(recording, audits)
-    drive = load_drive(recording, float(run['excitation_start']))
-    remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
+    signals = load_drive(recording, run.excitation_start)
+    remarks = [*run.complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run.samples)]
     stamps = recording['control_trace'].stamps
-    late = (int(stamps.min()) - drive.zero) / 1e9 if len(stamps) else math.inf
+    late = (int(stamps.min()) - signals.zero) / 1e9 if len(stamps) else math.inf
     if late > 0.0:
         remarks.append(f'control began {late:.1f} s after the excitation: it was initialised late')
     # other mounts on the same excitation: no bus, no recording, the same plant
@@ -161,13 +163,13 @@ def result_of(trial: Trial, recording: Recording, run: Values, complaints: list[
         name: truth_of_run({**parameters, 'mount_sim': {**parameters['mount_sim'], 'mount': mount}})
         for name, mount in _BESIDE.items()
     }
-    truths = {DRIVEN: at_samples(drive.truth, beside[UNDAMPED].time.size), **beside}
-    changes = switching(drive.seen)
-    ends = (*changes.off, float(drive.seen.time[-1]))
+    truths = {DRIVEN: at_samples(signals.truth, beside[UNDAMPED].time.size), **beside}
+    changes = switching(signals.seen)
+    ends = (*changes.off, float(signals.seen.time[-1]))
     gap, truth = recording['air_gap'], recording['sim/truth']
     figures = {
         **figures_of(truths, trial.manoeuvre, parameters),
-        **control_figures(drive, truths[DRIVEN], parameters),
+        **control_figures(signals, truths[DRIVEN], parameters),
         **{
             f'{name}_error_um': 1e6 * abs(float(gap[name][-1]) - float(truth[name][-1]))
             for name in ('rest_gap', 'contact_gap')
@@ -176,7 +178,7 @@ def result_of(trial: Trial, recording: Recording, run: Values, complaints: list[
         'unanswered_samples': _known(lost.unanswered),
         'faults': float(len(lost.faults)),
         'remarks': float(len(remarks)),
-        'latency_p99_us': 1e6 * run['latency_p99_s'] if trial.through == GRAPH else math.nan,
+        'latency_p99_us': 1e6 * run.latency_p99 if trial.through == GRAPH else math.nan,
     }
     damping = [(on, min(end for end in ends if end >= on)) for on in changes.on]
     return Result(figures, [*remarks, *lost.complaints()], truths, damping)
@@ -253,13 +255,13 @@ def _ratio(value: float, reference: float) -> float:
     return value / reference if reference > 0.0 else math.nan
 
 
-def control_figures(drive: DriveSignals, truth: Truth, parameters: Settings) -> dict[str, float]:
+def control_figures(signals: DriveSignals, truth: Truth, parameters: Settings) -> dict[str, float]:
     """Return {measure: number} of the control; the friction error of a mount without friction is NaN."""
-    seen = drive.seen
+    seen = signals.seen
     excited = (seen.time >= 0.0) & (seen.time <= truth.time[-1])
     error, resistance = math.nan, with_flattened(SimParameters(), parameters['mount_sim']).coil.resistance
     if not without_friction(seat_of(parameters)):
-        error = tracking_error(drive, *policy_of(parameters))
+        error = tracking_error(signals, *policy_of(parameters))
     return {
         'friction_error_percent': 100.0 * error,
         'switched_on': float(len(switching(seen).on)),

@@ -1,21 +1,18 @@
 """Controller and plant together: drives that are recorded and read back, many runs that are not."""
 
-import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
 from engine_mount.experiments.harness.experiment import ExperimentError, Order, Settings, Values
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.recording import open_recording
-from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
-from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import defaults_of_nodes
 from mount_control.policy import switched_viscous
 from mount_init.initialisation import InitialisationResult
@@ -67,21 +64,13 @@ def paper_policy(order: Order) -> switched_viscous.Parameters:
 
 
 def _drive(order: Order, name: str, parameters: dict[str, Values]) -> DriveSignals:
-    drive_order = DriveOrder(
-        scenario=str(parameters['mount_sim']['scenario']),
-        mode=order.mode,
-        parameters=parameters,
-        domain=chosen_domain(None) if order.graph else 0,
-        out=order.out / name.replace('0 A', '0A').replace(', ', '_').replace(' ', '_'),
-    )
-    # the experiments' own bar is on the screen
-    folder, run, complaints = record_drive(drive_order, Screen(io.StringIO()))
-    recording = open_recording(folder.recording)
-    complaints += recording.warnings
-    if complaints:
-        raise ExperimentError(f'run {name} in {folder.path} was not as it should be: {"; ".join(complaints)}')
-    drive = load_drive(recording, float(run['excitation_start']))
-    return replace(drive, recording=folder.recording, truth=drive.truth.since(0.0))
+    out = order.out / name.replace('0 A', '0A').replace(', ', '_').replace(' ', '_')
+    run = drive(core=not order.graph, lockstep=order.graph, parameters=parameters, out=out)
+    recording = open_recording(run.recording)
+    if complaints := [*run.complaints, *recording.warnings]:
+        raise ExperimentError(f'run {name} in {out} was not as it should be: {"; ".join(complaints)}')
+    signals = load_drive(recording, run.excitation_start)
+    return replace(signals, recording=run.recording, truth=signals.truth.since(0.0))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ import numpy as np
 
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.metadata import METADATA_NAME
+from mount_ros.messages.cdr import accelerometer
+from mount_ros.messages.scalars import OneNumberLayout
 
 Damage = Callable[[Path, np.random.Generator], None]
 
@@ -46,20 +48,14 @@ def spoil_checksum(folder: Path, random: np.random.Generator) -> None:
 
 def replace_by_foreign(folder: Path, random: np.random.Generator) -> None:
     """Put a bag of another system in its place, which holds an acceleration and no displacement."""
-    from sensor_msgs.msg import Imu
-
-    from mount_ros.messages.cdr import serialised
-
     shutil.rmtree(folder)
     writer = BagWriter(folder)
     try:
+        imu = OneNumberLayout(accelerometer)
         writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
         for place, value in enumerate(random.normal(0.0, 0.3, FOREIGN_SAMPLES)):
-            message = Imu()
-            message.header.stamp.sec, rest = divmod(place, 100)
-            message.header.stamp.nanosec = rest * 10_000_000
-            message.linear_acceleration.z = float(value)
-            writer.write('/imu/data', serialised(message), place * 10_000_000)
+            stamp = place * 10_000_000  # ns
+            writer.write('/imu/data', imu.pack(stamp, float(value)), stamp)
     finally:
         writer.close()
 

@@ -7,21 +7,19 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import engine_mount
-from engine_mount.drives.drive import told_parameters
-from engine_mount.drives.loop.recording import record_car, record_core
-from engine_mount.drives.preflight import preflight
+from engine_mount.drives.drive import check_drive, parameters_of_session
+from engine_mount.drives.loop.recording import record_core
 from engine_mount.fleet.example.damages import DAMAGES
 from engine_mount.fleet.example.variations import DRIVES, VARIATIONS, Drive, Variation
 from engine_mount.fleet.runner import Done, run_tasks
 from engine_mount.recordings.cut import cut
-from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.settings import checked_settings
 from mount_recorder.session import session_text
@@ -139,13 +137,10 @@ def _longest(drive: Drive) -> float:
 
 def _driven(order: Ordered, folder: Path) -> Path:
     parameters = settings_of(order)
-    excitation = preflight(parameters, core=True)
+    excitation = check_drive(parameters, core=True)
     begin = round(order.started.timestamp()) * 1_000_000_000
     sessions = {name: _session(order, values) for name, values in settings_of_mounts(parameters).items()}
-    record = partial(record_car, folder, parameters, sessions)
-    if not mounts_of(parameters):
-        record = partial(record_core, folder, parameters, sessions[''])
-    record(excitation=excitation, begin=begin)
+    record_core(folder, parameters, sessions, excitation=excitation, begin=begin)
     return folder
 
 
@@ -154,7 +149,7 @@ def _session(order: Ordered, parameters: dict[str, dict[str, Any]]) -> str:
         {
             'scenario': order.drive.sim['scenario'],
             'mode': 'core',
-            'parameters': told_parameters(parameters),
+            'parameters': parameters_of_session(parameters),
             'started': order.started.isoformat(timespec='seconds'),
             'versions': versions(),
         }

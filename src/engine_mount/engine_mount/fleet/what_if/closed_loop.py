@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import has
-from engine_mount.drives.inputs.taken import ReplayError
-from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import Samples
-from engine_mount.drives.loop.run import run_core_into
+from engine_mount.drives.loop.run import CoreChain, run_core_into
 from engine_mount.fleet.what_if.compared import Recorded, changed_parameters
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
 from engine_mount.recordings.recording import Recording
@@ -143,7 +142,7 @@ def _shaken(recording: Recording, start: float) -> Excitation:
 def _driven(
     parameters: Parameters, excitation: Excitation, kept: Sequence[str], other: '_Drive | None' = None
 ) -> '_Drive':
-    drive = _Drive(CoreChain(parameters).policy, round(excitation.start * 1e9), kept, other)
+    drive = _Drive(CoreChain(parameters).control.policy, round(excitation.start * 1e9), kept, other)
     run_core_into(drive, parameters, excitation=excitation)
     return drive
 

@@ -1,4 +1,4 @@
-"""One recording as recorded and with a change, both through the core controller, read in stretches."""
+"""One recording as recorded and with a change, both through the core controller."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,17 +9,33 @@ import numpy as np
 
 from engine_mount.drives.agreement import SETTLED, SETTLING
 from engine_mount.drives.core import ControlReplay, run_ramp
+from engine_mount.drives.inputs.consumed_samples import (
+    Column,
+    ControlRun,
+    MeasuredGap,
+    Notes,
+    Ramp,
+    RecordedAnswers,
+    ReplayError,
+    control_runs,
+    looked_up,
+    quiet_at_first,
+)
 from engine_mount.drives.inputs.foreign import default_gap
-from engine_mount.drives.inputs.input import dated, parameters_of, recorded_gaps, session_of
-from engine_mount.drives.inputs.parameter_changes import recorded_changes, without
-from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp, ramps_of
-from engine_mount.drives.inputs.stretches import STRETCH, OutOfOrderError, Stretch, Stretches
-from engine_mount.drives.inputs.taken import Column, ControlRun, Notes, ReplayError, quiet_at_first
-from engine_mount.drives.other_policy import check_effect
+from engine_mount.drives.inputs.input import (
+    displacement_of,
+    has,
+    parameters_of,
+    ramps_of,
+    recorded_changes,
+    recorded_gaps,
+    session_of,
+    without,
+)
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
 from engine_mount.fleet.what_if.figures import AnswerFigures, DifferenceFigures, switching_row
 from engine_mount.recordings.recording import Recording
-from engine_mount.settings.chosen import control_parameters
+from engine_mount.settings.chosen import check_effect, control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_ros import topics
 
@@ -66,16 +82,12 @@ def changed_parameters(recorded: Recorded, changes: Parameters) -> dict[str, dic
     return parameters
 
 
-def compared_setpoints(recorded: Recorded, changes: Parameters, length: int = STRETCH) -> dict[str, Any]:
+def compared_setpoints(recorded: Recorded, changes: Parameters) -> dict[str, Any]:
     """Return the figures of a recording replayed as recorded and with `changes`, as columns of a row.
 
-    It is read in stretches of some `length` samples, 0 for all at once; the figures are the same to the bit.
     Raises a `ValueError` with the reason where there are none.
     """
-    try:
-        return _Comparison(recorded, changes).row(length)
-    except OutOfOrderError:
-        return _Comparison(recorded, changes).row(0)
+    return _Comparison(recorded, changes).row()
 
 
 @dataclass
@@ -109,21 +121,24 @@ class _Comparison:
         self._changed_gaps = self._initialised(ramps) if 'mount_init' in changes else {}
         self._told = recorded_changes(self._recording)
         self._changed_told = without(self._told, changes.get('mount_control', {}))
-        quiet = quiet_at_first(recorded.parameters['mount_control'])
-        self._stretches = Stretches(self._recording, self._gaps, ramps, self._control, quiet)
+        self._answers = _recorded_answers(self._recording, recorded.parameters)
+        self._runs = control_runs(
+            displacement_of(self._recording), self._answers, ramps, self._gaps, self._control, Notes()
+        )
 
-    def row(self, length: int) -> dict[str, Any]:
-        """Replay all stretches; return the figures as columns."""
-        sums, replays = _Sums(), None
-        for stretch in self._stretches.read(length):
-            if replays is None or stretch.begins:
-                replays = self._begun(stretch.run, sums)
-            _add(sums, replays, stretch)
-        if replays is None:
+    def row(self) -> dict[str, Any]:
+        """Replay all runs; return the figures as columns."""
+        if not self._runs:
             raise ReplayError(
                 f'{self._recording.path}: no overlap of displacement and the time after the air_gap: '
                 'the controller had nothing to do'
             )
+        sums = _Sums()
+        for run in self._runs:
+            recorded = np.full(len(run.stamps), math.nan)
+            if self._answers is not None:
+                recorded = looked_up(run.stamps, self._answers.stamps, self._answers.currents)[1]
+            _add(sums, self._begun(run, sums), recorded)
         return self._told_as_row(sums)
 
     def _ramps(self, replayed: bool) -> Sequence[Ramp]:
@@ -155,7 +170,7 @@ class _Comparison:
         )
 
     def _told_as_row(self, sums: _Sums) -> dict[str, Any]:
-        sample_time, zero = 1.0 / self._control.sample_rate, self._stretches.zero
+        sample_time, zero = 1.0 / self._control.sample_rate, self._recording.time_axis.zero
         before, after = sums.before.switching(zero), sums.after.switching(zero)
         return {
             'duration_s': sums.before.samples * sample_time,
@@ -172,28 +187,46 @@ class _Comparison:
 
 def _assumed_gap(recorded: Recorded) -> MeasuredGap | None:
     """Return the nominal gap where the recording was made of files of others, which hold none."""
-    return dated(default_gap({}), 0) if recorded.session.get('scenario') == SCENARIO else None
+    return default_gap({}).dated(0) if recorded.session.get('scenario') == SCENARIO else None
 
 
-def _add(sums: _Sums, replays: _Replays, stretch: Stretch) -> None:
-    recorded = _settled(replays.run, stretch)
+def _recorded_answers(recording: Recording, parameters: Parameters) -> RecordedAnswers | None:
+    """Read the displacement, and return the recorded setpoints and traces, None where there are none."""
+    quiet = quiet_at_first(parameters['mount_control'])
+    traced = tuple(dict.fromkeys(('displacement', 'bridged_samples', *quiet)))
+    wanted = {
+        topics.DISPLACEMENT: topics.DISPLACEMENT.names,
+        topics.CURRENT_SETPOINT: topics.CURRENT_SETPOINT.names,
+        topics.CONTROL_TRACE: traced,
+    }
+    there = {topic.name: names for topic, names in wanted.items() if has(recording, topic)}
+    recording.load_columns(there)
+    if topics.CURRENT_SETPOINT.name not in there:
+        return None
+    stamps, traces = np.empty(0, np.int64), {name: np.empty(0) for name in traced}
+    if topics.CONTROL_TRACE.name in there:
+        series = recording[topics.CONTROL_TRACE.name]
+        stamps, places = np.unique(series.stamps, return_index=True)
+        traces = {name: series.columns[name][places] for name in traced if name in series.columns}
+    setpoints = recording[topics.CURRENT_SETPOINT.name]
+    answered, places = np.unique(setpoints.stamps, return_index=True)
+    return RecordedAnswers(answered, setpoints['coil_current'][places], stamps, traces, quiet)
+
+
+def _add(sums: _Sums, replays: _Replays, recorded: Column) -> None:
+    """Replay a run and add its figures; `recorded`: its recorded setpoints (A), NaN where there is none."""
+    run, settled = replays.run, recorded
+    if not run.from_its_beginning:  # from where on a replay can be expected to give them
+        settled = np.where(run.stamps - run.stamps[0] >= round(SETTLING * 1e9), recorded, math.nan)
     for begin in range(0, len(recorded), _AT_ONCE):
         part = slice(begin, begin + _AT_ONCE)
-        stamps, displacement = stretch.run.stamps[part], stretch.run.displacement[part]
+        stamps, displacement = run.stamps[part], run.displacement[part]
         before = replays.before.answer(stamps, displacement)
         after = replays.after.answer(stamps, displacement)
         sums.before.add(before)
         sums.after.add(after)
         sums.difference.add(stamps, after.setpoints, before.setpoints)
-        sums.kept.add(stamps, before.setpoints, recorded[part])
-
-
-def _settled(run: ControlRun, stretch: Stretch) -> Column:
-    """Return the recorded setpoints (A) from where on a replay can be expected to give them, else NaN."""
-    if run.from_its_beginning:
-        return stretch.recorded
-    settled = stretch.run.stamps - run.stamps[0] >= round(SETTLING * 1e9)
-    return np.where(settled, stretch.recorded, math.nan)
+        sums.kept.add(stamps, before.setpoints, settled[part])
 
 
 def _as_recorded(sums: _Sums) -> bool | None:

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from engine_mount.drives.other_policy import NoEffectError
 from engine_mount.fleet.catalogue.places import Place
 from engine_mount.fleet.foreign import NOTHING_SAID, Said, as_recording, mapped_in, own_recording
 from engine_mount.fleet.job import Answer, Row
@@ -22,6 +21,7 @@ from engine_mount.fleet.what_if.compared import (
 )
 from engine_mount.recordings.place import recording_hash, recording_place
 from engine_mount.recordings.recording import open_recording
+from engine_mount.settings.chosen import NoEffectError
 from engine_mount.signals.sources.source import StoreAwayError
 from engine_mount.signals.sources.stores import local_copy
 from mount_recorder.versions import versions

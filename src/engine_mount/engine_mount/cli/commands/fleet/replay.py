@@ -9,7 +9,7 @@ from engine_mount.cli.commands.fleet.reasons import tell_question
 from engine_mount.cli.commands.fleet.resuming import resumable
 from engine_mount.cli.commands.options import Dbc, JsonFile, MapFiles, Scheduler, Workers
 from engine_mount.cli.commands.other_than_recorded import OtherThanRecorded, changes_of
-from engine_mount.cli.completion.values import named
+from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why not; 1 when one

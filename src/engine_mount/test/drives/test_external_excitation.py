@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.drives.recorded_file import recorded_acceleration
+from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from mount_sim.excitation.scenario import RecordedScenario
 
@@ -13,10 +13,10 @@ MOTORWAY = Path(__file__).resolve().parents[5] / 'shared' / 'data' / 'motorway_i
 
 
 def driven(tmp_path, file, columns, **more):
-    """Return the acceleration (m/s^2) that drives the car, and what is brought."""
-    brought, factor = recorded_acceleration(str(file), columns, **more)
+    """Return the acceleration (m/s^2) that drives the car, and the excitation."""
+    brought = recorded_acceleration(str(file), columns, **more)
     even = recorded_signal(RecordedScenario(str(brought.write(tmp_path / 'given'))))
-    return acceleration_at(even, factor, 1e-3)[:], brought
+    return acceleration_at(even, brought.settings['recorded.scale'], 1e-3)[:], brought
 
 
 def test_it_is_to_the_bit_what_the_simulator_reads_by_itself(tmp_path):
@@ -27,7 +27,7 @@ def test_it_is_to_the_bit_what_the_simulator_reads_by_itself(tmp_path):
     found, brought = driven(tmp_path, file, ['az'], scale=-1.0)
     by_itself = acceleration_at(recorded_signal(RecordedScenario(str(file), 'az')), -1.0, 1e-3)[:]
     assert found.tobytes() == by_itself.tobytes()
-    assert brought.told['file'] == 'drive.csv'
+    assert brought.origin['file'] == 'drive.csv'
 
 
 def test_the_published_layout_needs_no_option_but_the_axis(tmp_path):
@@ -36,5 +36,5 @@ def test_the_published_layout_needs_no_option_but_the_axis(tmp_path):
     found, brought = driven(tmp_path, MOTORWAY, ['accelerometer.2'])
     assert found.size == pytest.approx(59_990, abs=20)
     assert 0.05 < np.abs(found).max() < 10.0
-    column = brought.told['columns']['acceleration']
+    column = brought.origin['columns']['acceleration']
     assert column['factor'] == 1.0

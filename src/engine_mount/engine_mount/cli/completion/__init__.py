@@ -1,1 +1,0 @@
-"""What the shell offers behind Tab: values by name, without loading what would take long."""
