@@ -16,7 +16,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     claim,
     holds_if,
 )
@@ -161,7 +160,7 @@ def _family(figures: Values) -> dict[str, Values]:
 
 
 @claim('Sec. 6', paper="At the engine's eigenfrequency of 8 Hz the damper is permanently active.")
-def _on_active(figures: Values) -> Verdict:
+def _on_active(figures):
     least = min(each['damping_active_share'] for each in _family(figures).values())
     told = f"""Damping is on for at least {100 * least:.0f} % of the evaluated time at
         {figures['frequency_hz']:g} Hz and {1e3 * figures['amplitude_m']:g} mm; the paper does not tell its
@@ -174,7 +173,7 @@ def _on_active(figures: Values) -> Verdict:
     paper="""The loss can be chosen by the characteristic, from the elastomer's own to more than the original
     mount's.""",
 )
-def _on_loss(figures: Values) -> Verdict:
+def _on_loss(figures):
     losses = {name: each['loss_energy_j'] for name, each in figures['runs'].items()}
     family = _family(figures)
     above = any(losses[name] > losses[HYDRO] for name in family)
@@ -188,7 +187,7 @@ def _on_loss(figures: Values) -> Verdict:
     'Fig. 13, left',
     paper='The loops are very smooth and show nothing of the bumps of a dry friction device.',
 )
-def _on_smoothness(figures: Values) -> Verdict:
+def _on_smoothness(figures):
     sine, runs = figures['sine_steepest_share'], figures['runs']
     steep, coulomb = (runs[name]['steepest_share'] for name in (figures['damper'], COULOMB))
     told = 'no friction force' if steep is None else f'at most {100 * steep:.1f} % of its peak'
@@ -202,7 +201,7 @@ def _on_smoothness(figures: Values) -> Verdict:
     'Fig. 13, right; Sec. 7',
     paper='The friction mount has lower force harmonics than the original mount up to the 8th.',
 )
-def _on_harmonics(figures: Values) -> Verdict:
+def _on_harmonics(figures):
     texts, answers = [], []
     for name, each in _family(figures).items():
         missing = [str(k) for k in range(1, ORDERS + 1) if k not in each['lower_than_hydromount']]
@@ -219,7 +218,7 @@ def _on_harmonics(figures: Values) -> Verdict:
     paper="""Damping proportional to velocity gives the best acoustics; a dead zone round zero velocity is
     needed to avoid sticking.""",
 )
-def _on_acoustics(figures: Values) -> Verdict:
+def _on_acoustics(figures):
     damper, runs = figures['damper'], figures['runs']
     chosen, hydro, coulomb = (runs[name]['thd'] for name in (damper, HYDRO, COULOMB))
     found, wanted = (runs[damper][f'{what}_harmonics_n'][2:7:2] for what in ('friction', 'wanted'))

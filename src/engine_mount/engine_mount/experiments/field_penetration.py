@@ -13,7 +13,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     claim,
 )
 from engine_mount.experiments.harness.measures import rms
@@ -151,7 +150,7 @@ def figures_of(cases: list[AtCurrent]) -> Values:
     paper="""The ripples move the field only near the surface of the iron; it enters at a rate in the
     region of um per us.""",
 )
-def _on_rate(figures: Values) -> Verdict:
+def _on_rate(figures):
     depth = 1e6 * figures['characteristic_depth_m'][0]
     rate = depth / 18.0
     told = f"""At {figures['currents_a'][0]:g} A the field has come {depth:.0f} um in 18 us, {rate:.1f} um per
@@ -164,7 +163,7 @@ def _on_rate(figures: Values) -> Verdict:
     paper="""The field enters much faster at a higher mean current, because saturation lowers the
     permeability.""",
 )
-def _on_saturation(figures: Values) -> Verdict:
+def _on_saturation(figures):
     depth, other = (1e6 * np.array(figures[f'equivalent_depth{kind}_m']) for kind in ('', '_2d'))
     currents = figures['currents_a']
     told = f"""The depth that would hold the whole change at its surface value grows from {depth[0]:.0f} um
@@ -174,7 +173,7 @@ def _on_saturation(figures: Values) -> Verdict:
 
 
 @claim('Fig. 3', paper='The authors computed the field by finite elements.')
-def _on_finite_elements(figures: Values) -> Verdict:
+def _on_finite_elements(figures):
     middle, along = (
         ', '.join(
             f'{100 * difference:+.1f} % at {current:g} A'

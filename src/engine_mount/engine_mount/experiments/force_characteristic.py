@@ -13,7 +13,6 @@ from engine_mount.experiments.harness.experiment import (
     Order,
     Seed,
     Values,
-    Verdict,
     claim,
 )
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
@@ -98,7 +97,7 @@ def _within_table_1(gap: float) -> bool:
 
 
 @claim('Sec. 3', paper='At low flux density the force is a quadratic function of the current.')
-def _on_power(figures: Values) -> Verdict:
+def _on_power(figures):
     exponent = figures['exponent_at_low_current']
     told = f'Between 0.2 and 0.8 A, 349 um, the force grows with the power {exponent:.2f} of the current.'
     return abs(exponent - 2.0) < 0.05 or PARTLY, told
@@ -108,7 +107,7 @@ def _on_power(figures: Values) -> Verdict:
     'Sec. 3',
     paper='The iron saturates at about 1.4 T; towards higher currents the curve becomes a straight line.',
 )
-def _on_saturation(figures: Values) -> Verdict:
+def _on_saturation(figures):
     bend = figures['bend_of_upper_part']
     told = f"""The curve at 349 um is steepest at {figures['steepest_current_a']:.2f} A, where the core has
         {figures['flux_density_there_t']:.2f} T; above 2.25 A it leaves a straight line by at most
@@ -117,7 +116,7 @@ def _on_saturation(figures: Values) -> Verdict:
 
 
 @claim('Fig. 2', paper='The influence of the gap cannot be neglected.')
-def _on_gap(figures: Values) -> Verdict:
+def _on_gap(figures):
     (first, highest), *_, (last, lowest) = figures['force_at_1_a_n'].items()
     told = f'At 1 A the force is {highest:.0f} N at {first} and {lowest:.0f} N at {last}.'
     return highest > 1.5 * lowest, told
@@ -127,7 +126,7 @@ def _on_gap(figures: Values) -> Verdict:
     'Sec. 3.1, Eqs (3), (4)',
     paper='One nonlinear function with 18 parameters replaces the large lookup table.',
 )
-def _on_law(figures: Values) -> Verdict:
+def _on_law(figures):
     relative = figures['law_relative_rms']
     told = f"""Fitted to other gaps than most of these, it meets the true force within
         {100 * relative:.2f} % rms and {100 * figures['law_relative_worst']:.1f} % at worst above
@@ -137,7 +136,7 @@ def _on_law(figures: Values) -> Verdict:
 
 
 @claim('Table 1', paper='Its 18 numbers describe the force of the prototype.')
-def _on_table_1(figures: Values) -> Verdict:
+def _on_table_1(figures):
     told = f"""The simulated actuator was fitted to Table 1 and differs from it by
         {figures['table_1_rms_error_n']:.1f} N rms and {figures['table_1_largest_error_n']:.0f} N at worst
         (300 .. 492 um): no single magnetisation curve bends as sharply. So the controller uses the law

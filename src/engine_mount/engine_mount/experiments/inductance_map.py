@@ -14,7 +14,6 @@ from engine_mount.experiments.harness.experiment import (
     Order,
     Seed,
     Values,
-    Verdict,
     claim,
 )
 from engine_mount.experiments.harness.fixed_gaps import (
@@ -159,7 +158,7 @@ def _told(ranges: list[list[float]]) -> str:
     paper="""The gap cannot be read from the incremental inductance directly: the relation between
     inductance, current and gap is ambiguous.""",
 )
-def _on_ambiguity(found: Values) -> Verdict:
+def _on_ambiguity(found):
     told = f"""Over 250 .. 550 um the inductance tells gaps apart at {_told(found['unique_currents_a'])} A,
         and not at {_told(found['ambiguous_currents_a'])} A."""
     return found['ambiguous_currents_a'], told
@@ -169,7 +168,7 @@ def _on_ambiguity(found: Values) -> Verdict:
     'Fig. 4, right',
     paper='At 0.2 A, and at constant 20 mH, the relation is unique; both sections are met by a polynomial.',
 )
-def _on_sections(found: Values) -> Verdict:
+def _on_sections(found):
     rest, level = (found[f'largest_gap_error_at_{where}_m'] for where in ('rest', 'crossing'))
     told = f"""Both are monotone. With {_AVERAGED} ripples of {100 * found['ripple_noise']:g} % noise each,
         the specimen's polynomials give the held gaps
@@ -183,7 +182,7 @@ def _on_sections(found: Values) -> Verdict:
     'Fig. 4, left',
     paper='On the assembled damper the ramp shows 492 um at low current and 349 um when the pads touch.',
 )
-def _on_ramp(found: Values) -> Verdict:
+def _on_ramp(found):
     at_rest, contact = found['ramp_gap_at_rest_m'], found['initialisation']['contact_gap']
     true_rest, true_contact = found['true_gap_at_rest_current_m'], found['true_contact_gap_m']
     told = f"""The recorded ramp gives {1e6 * at_rest:.1f} um at 0.2 A (true: {1e6 * true_rest:.1f}) and
@@ -199,7 +198,7 @@ def _on_ramp(found: Values) -> Verdict:
     paper="""From the difference of both gaps (printed: 153 um) follows an offset current that presses
     the pads lightly against the rod.""",
 )
-def _on_offset(found: Values) -> Verdict:
+def _on_offset(found):
     result = found['initialisation']
     told = f"""492 - 349 is 143. Here the halves go {1e6 * (result['rest_gap'] - result['contact_gap']):.0f}
         um from 0 A to contact, which takes {result['contact_force']:.1f} N; the offset current is

@@ -119,12 +119,12 @@ def _over_hydromount(figures: Values, what: str, value: Any) -> Verdict:
 
 
 @claim('Sec. 7', paper='Lower displacements when damping is on.')
-def _on_displacement(figures: Values) -> Verdict:
+def _on_displacement(figures):
     return _over_hydromount(figures, 'rms displacement', lambda run: run['displacement_rms_m'])
 
 
 @claim('Sec. 7', paper='On the chassis the mount is at least as good as the hydromount.')
-def _on_acceleration(figures: Values) -> Verdict:
+def _on_acceleration(figures):
     what = f'rms acceleration of the chassis from {BANDS[-1][0]:g} to {BANDS[-1][1]:g} Hz'
     return _over_hydromount(figures, what, lambda run: run['acceleration_band_rms_m_s2'][-1])
 

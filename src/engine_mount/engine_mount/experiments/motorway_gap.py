@@ -20,7 +20,6 @@ from engine_mount.experiments.harness.experiment import (
     Holds,
     Order,
     Values,
-    Verdict,
     claim,
     holds_if,
     numbers_of,
@@ -150,7 +149,7 @@ def _shares(figures: Values, key: str, other: str) -> tuple[list[float], str]:
     'Fig. 15; Sec. 6',
     paper='One period after the displacement exceeds the switch-on level of 0.8 mm damping is activated.',
 )
-def _on_switching_on(figures: Values) -> Verdict:
+def _on_switching_on(figures):
     known, told = _delays(figures, 'on_delay_s')
     told = f"""From the first sample above {1e3 * figures['switch_on_level_m']:g} mm to damping on, by depth
         of the gap, {told}. One period is {1e3 * figures['period_s']:.0f} ms; the rest is the band-pass.
@@ -159,7 +158,7 @@ def _on_switching_on(figures: Values) -> Verdict:
 
 
 @claim('Fig. 15', paper='A significant effect of damping can be seen.')
-def _on_effect(figures: Values) -> Verdict:
+def _on_effect(figures):
     known, told = _shares(figures, 'rms_m', OFF)
     told = f"""Rms of the displacement from {WINDOW[0]:g} to {WINDOW[1]:g} s behind that moment over that of
         the same mount without current, by depth of the gap, {told}; counted as significant below {_CLEAR:g}
@@ -172,7 +171,7 @@ def _on_effect(figures: Values) -> Verdict:
     paper="""When the displacement stays below the switch-off level of 0.35 mm for more than one period,
     damping is deactivated.""",
 )
-def _on_switching_off(figures: Values) -> Verdict:
+def _on_switching_off(figures):
     period = figures['period_s']
     (shown, measured), (compared, in_band), (durations, _) = (
         _delays(figures, key) for key in ('off_delay_s', 'off_delay_in_band_s', 'on_duration_s')
@@ -188,7 +187,7 @@ def _on_switching_off(figures: Values) -> Verdict:
 
 
 @claim('Sec. 7', paper='On good roads the friction mount has a clear advantage.')
-def _on_hydro(figures: Values) -> Verdict:
+def _on_hydro(figures):
     known, told = _shares(figures, 'rms_m', HYDRO)
     clear = holds_if([share < _CLEAR for share in known])
     told = f"""Rms of the displacement in the same second over that of the hydromount, {told}; counted as

@@ -17,7 +17,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     claim,
     numbers_of,
 )
@@ -331,7 +330,7 @@ def _damped(vehicle, state, road, damping, first, dt, displacement, every):
 
 
 @claim('Sec. 7', paper='Lower displacements when damping is on.')
-def _on_displacement(figures: Values) -> Verdict:
+def _on_displacement(figures):
     sweeps, texts = figures['sweep_ratio'], {}
     for who in POLICIES:
         ratios = ', '.join(f'{value:.2f} ({level} m/s)' for level, value in sweeps[who].items())
@@ -347,7 +346,7 @@ def _on_displacement(figures: Values) -> Verdict:
     'Fig. 14; Sec. 6',
     paper='At higher frequencies, where damping is off, the acceleration of the chassis is lower.',
 )
-def _on_acceleration(figures: Values) -> Verdict:
+def _on_acceleration(figures):
     ratios = ', '.join(f'{value:.3f}' for value in figures['high_frequency_ratio'][CONTINUOUS].values())
     told = f"""Of the continuous law over the mount without current, 14 to 50 Hz, road levels as above:
         {ratios}."""

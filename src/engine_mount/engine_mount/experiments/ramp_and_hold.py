@@ -12,7 +12,6 @@ from engine_mount.experiments.harness.experiment import (
     Order,
     Seed,
     Values,
-    Verdict,
     claim,
 )
 from engine_mount.experiments.harness.rack_recording import (
@@ -144,7 +143,7 @@ def figures_of(
 
 
 @claim('Sec. 4', paper='The whole test stays in microslip: nothing slides.')
-def _on_microslip(found: Values) -> Verdict:
+def _on_microslip(found):
     told = f"""The force peaks at {found['highest_force_n']:.1f} N; at {found['normal_force']:g} N normal
         force the pads break away at {found['breakaway_force_n']:.1f} N (positive direction)."""
     return found['highest_force_n'] < found['breakaway_force_n'], told
@@ -154,7 +153,7 @@ def _on_microslip(found: Values) -> Verdict:
     'Fig. 7, Eq (10)',
     paper='An exponential meets the measured displacement well for times above 1 s; before, the ramp shows.',
 )
-def _on_relaxation(found: Values) -> Verdict:
+def _on_relaxation(found):
     late, ramp = found['fit_error_late_m'], found['fit_error_during_ramp_m']
     told = f"""From {found['fit_from']:g} s on it lies within {1e9 * late:.0f} nm of the recording, during
         the ramp up to {1e6 * ramp:.1f} um off; right behind the ramp it fits again
@@ -163,7 +162,7 @@ def _on_relaxation(found: Values) -> Verdict:
 
 
 @claim('Eq (11)', paper='c_Re, c_R and d_R follow from the joint stiffness, p, the asymptote and T.')
-def _on_formulas(found: Values) -> Verdict:
+def _on_formulas(found):
     whole = found['errors_fitted_from_end_of_ramp']
     told = f"""In its right form, with the amplitude corrected for the ramp: {_told(found['errors'])}.
         Without that correction: {_told(found['errors_without_ramp_correction'])}. Fitted from the end of
@@ -172,7 +171,7 @@ def _on_formulas(found: Values) -> Verdict:
 
 
 @claim('Eq (11) as printed', paper='The same three formulas, taken literally.')
-def _on_print(found: Values) -> Verdict:
+def _on_print(found):
     printed = found['errors_as_printed']
     told = f"""With k as first over last force and c_xi as force over the wanted displacement, which makes
         the first formula right but for the ramp: {_told(printed)}. The second is right only with c_xi over

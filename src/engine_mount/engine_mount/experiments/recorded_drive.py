@@ -22,7 +22,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     claim,
     holds_if_lower,
     table,
@@ -207,7 +206,7 @@ def _by_band(values: list[float]) -> str:
     paper="""On good roads the mount is a soft spring without damping and performs better than a classical
     one.""",
 )
-def _on_isolation(figures: Values) -> Verdict:
+def _on_isolation(figures):
     force, displacement = (
         ratios(figures, key) for key in ('force_band_rms_else_n', 'displacement_band_rms_else_m')
     )
@@ -218,7 +217,7 @@ def _on_isolation(figures: Values) -> Verdict:
 
 
 @claim('Sec. 7', paper='Lower displacements when damping is on.')
-def _on_displacement(figures: Values) -> Verdict:
+def _on_displacement(figures):
     hydro, soft = (
         ratios(figures, 'displacement_band_rms_at_events_m', other) for other in (HYDRO, ELASTOMER)
     )

@@ -25,7 +25,6 @@ from engine_mount.experiments.harness.experiment import (
     Order,
     Seed,
     Values,
-    Verdict,
     claim,
 )
 from engine_mount.experiments.harness.measures import rms
@@ -187,7 +186,7 @@ def _speed(stroke: StrokeLine) -> float:
     paper="""Behind a turning point the coefficient is higher and then decays while the pads are moved on
     at constant speed.""",
 )
-def _on_decay(figures: Values) -> Verdict:
+def _on_decay(figures):
     first, *_, last = figures['jump_p']
     told = f"""At the drawn normal force mu falls along each stroke, by {first:.3f} at the lowest and
         {last:.3f} at the highest speed (positive direction)."""
@@ -198,7 +197,7 @@ def _on_decay(figures: Values) -> Verdict:
     'Sec. 4, Eq (12)',
     paper='The larger the strain in the direction of sliding, the lower the friction force.',
 )
-def _on_strain(figures: Values) -> Verdict:
+def _on_strain(figures):
     falling, count = figures['strokes_with_falling_coefficient'], figures['strokes']
     told = f'b is negative on {falling} of {count} strokes'
     if falling == count:
@@ -210,7 +209,7 @@ def _on_strain(figures: Values) -> Verdict:
 
 
 @claim('Fig. 9', paper='Over the deflection u the coefficient is a straight line at each constant speed.')
-def _on_line(figures: Values) -> Verdict:
+def _on_line(figures):
     straight = figures['largest_residual_over_noise']
     noise = '' if straight is None else f', {straight:.2f} times the noise of the load cell'
     told = f"""The lines leave at most {figures['largest_residual_of_line']:.4f} rms of mu{noise}, on all
@@ -224,7 +223,7 @@ def _on_line(figures: Values) -> Verdict:
     paper="""a and b of each stroke lie on the analytic curves over speed and normal force, a with
     a logarithm, both directions apart.""",
 )
-def _on_curves(figures: Values) -> Verdict:
+def _on_curves(figures):
     a, b = figures['a_rms_error'], figures['b_rms_error_per_mm']
     told = f"""a comes back with {a:.4f} rms, b with {b:.2f} 1/mm rms of the curves the simulated pads have,
         taken at the mean speed of the slider, a little slower than the pads because the creeping element
@@ -236,7 +235,7 @@ def _on_curves(figures: Values) -> Verdict:
     'Sec. 4',
     paper='Brake material without metal has no Stribeck effect: friction does not fall with speed.',
 )
-def _on_speed(figures: Values) -> Verdict:
+def _on_speed(figures):
     levels = [f'{figures[key][0]:.2f} to {figures[key][-1]:.2f}' for key in ('level_p', 'level_n')]
     told = f"""At the end of the strokes mu rises with speed from {levels[0]} (positive) and {levels[1]}
         (negative direction)."""
@@ -248,7 +247,7 @@ def _on_speed(figures: Values) -> Verdict:
     paper="""Both models meet the measurement in macroslip; in microslip the full one is precise and the
     simplified one far off.""",
 )
-def _on_models(figures: Values) -> Verdict:
+def _on_models(figures):
     macro, micro = figures['simplified_error_macroslip'], figures['simplified_error_microslip']
     shares = {
         name: 'nothing' if share is None else f'{100 * share:.1f} %'

@@ -20,7 +20,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     Workers,
     claim,
     holds_if,
@@ -195,7 +194,7 @@ def higher(ratios: FloatArray) -> Any:
 
 
 @claim('Fig. 14; Sec. 7', paper='With damping on, the displacement is smaller than with the original mount.')
-def displacement(maps: Maps) -> Verdict:
+def displacement(maps):
     """Return where the friction mount moves less, and by how much displacements follow the road level."""
     levels = dict(enumerate(maps.axes.levels))
     always = [level for k, level in levels.items() if lower(maps.peak[k]).all()]
@@ -228,7 +227,7 @@ def displacement(maps: Maps) -> Verdict:
     'Fig. 14; Sec. 7',
     paper='With damping off, the acceleration of the chassis is lower than with the original mount.',
 )
-def acceleration(maps: Maps) -> Verdict:
+def acceleration(maps):
     """Return in how many combinations the chassis has less acceleration, and where least and most."""
     rms = maps.rms[~np.isnan(maps.rms).any(axis=(1, 2, 3, 4))]
     if not len(rms):
@@ -244,7 +243,7 @@ def acceleration(maps: Maps) -> Verdict:
 
 
 @claim('Fig. 13; Sec. 7', paper='The force is lower up to the 8th harmonic.')
-def force_harmonics(maps: Maps) -> Verdict:
+def force_harmonics(maps):
     """Return the number of harmonics in which the friction mount is lower."""
     texts = []
     for asymmetry in maps.axes.asymmetries:

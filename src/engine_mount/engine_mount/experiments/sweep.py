@@ -14,7 +14,6 @@ from engine_mount.experiments.harness.experiment import (
     Findings,
     Order,
     Values,
-    Verdict,
     claim,
     holds_if,
 )
@@ -142,14 +141,14 @@ def _peak_told(figures: Values, name: str) -> str:
 
 
 @claim('Fig. 14', paper='With the original mount the displacement shows a clear resonance peak.')
-def _on_peak_of_hydro(figures: Values) -> Verdict:
+def _on_peak_of_hydro(figures):
     told = f"""The hydromount shows {_peak_told(figures, HYDRO)}. Its height grows with the road level, which
         the paper does not give."""
     return figures['runs'][HYDRO]['defined_peak'], told
 
 
 @claim('Fig. 14', paper='With the friction mount no defined resonance peak is visible.')
-def _on_peak_of_friction(figures: Values) -> Verdict:
+def _on_peak_of_friction(figures):
     chosen = figures['runs'][FRICTION]
     peaks, on, off = (chosen[key] for key in ('peak_displacement_m', 'switched_on_hz', 'switched_off_hz'))
     where = chosen['band_edges_hz'][int(np.argmax(peaks))]
@@ -161,7 +160,7 @@ def _on_peak_of_friction(figures: Values) -> Verdict:
 
 
 @claim('Fig. 14', paper='The damping of the friction mount round the resonance is far higher.')
-def _on_damping(figures: Values) -> Verdict:
+def _on_damping(figures):
     peaks = {name: figures['runs'][name]['resonance_peak_m'] for name in (FRICTION, HYDRO, OFF, ALWAYS)}
     if None in peaks.values():
         return NOT_COMPARABLE, 'The sweep ends before 10 Hz.'
@@ -178,7 +177,7 @@ def _on_damping(figures: Values) -> Verdict:
     'Fig. 14; Sec. 6',
     paper='At higher frequencies, where damping is off, the acceleration of the chassis is lower.',
 )
-def _on_noise(figures: Values) -> Verdict:
+def _on_noise(figures):
     runs, told, lower = figures['runs'], [], []
     pairs = {'road alone': (FRICTION, HYDRO)}
     if FRICTION_IDLE in runs:

@@ -8,6 +8,7 @@ import pytest
 from engine_mount.experiments import policy, policy_cases
 from engine_mount.experiments.harness import measures
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
+from engine_mount.experiments.registry import experiment
 from engine_mount.signals.roads.inversion import road_of
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.road import RandomRoad, random_road
@@ -28,7 +29,7 @@ SHORT = {
 @pytest.fixture(scope='module')
 def compared(tmp_path_factory):
     folder = tmp_path_factory.mktemp('policy')
-    return policy.EXPERIMENT.run(policy.EXPERIMENT.order(folder, {policy.NAME: SHORT}))
+    return experiment(policy.NAME, out=folder, **SHORT)
 
 
 @pytest.mark.slow
