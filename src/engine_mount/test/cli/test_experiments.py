@@ -81,6 +81,12 @@ def test_the_list_names_every_experiment():
         (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
         (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
         (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
+        (['sensitivity', '--set', 'sensitivity.damper=stiff'], 'no damper curve'),
+        (['bench', '--set', 'bench.damper=stiff'], 'no damper curve'),
+        (
+            ['bench', '--set', 'mount_sim.mount=hydro'],
+            'mount_sim.mount is set by the experiment bench itself',
+        ),
         (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
     ],
 )

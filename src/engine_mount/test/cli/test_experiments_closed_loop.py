@@ -9,7 +9,7 @@ import pytest
 
 from engine_mount.experiments import bench, motorway_gap, sensitivity, sweep
 from engine_mount.experiments.harness.closed_loop import Case, run_case, run_cases
-from engine_mount.experiments.harness.experiment import ExperimentError, Holds
+from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.harness.measures import peak_and_rms, sweep_parameters
 from engine_mount.experiments.registry import NAMES, experiment, experiment_named
 from engine_mount.experiments.sweep import defined_peak
@@ -114,18 +114,6 @@ def test_plain_coulomb_has_the_harmonics_of_a_rectangle_and_no_even_ones(rack):
     rectangle = 400.0 / np.pi
     expected = [np.hypot(160.0, rectangle), 0, rectangle / 3, 0, rectangle / 5, 0, rectangle / 7, 0]
     assert found == pytest.approx(expected, rel=0.01, abs=0.1)
-
-
-def test_an_unknown_damper_is_refused_before_anything_is_made(tmp_path):
-    for module in (bench, sweep, motorway_gap, sensitivity):
-        with pytest.raises(ParameterError, match='no damper curve'):
-            experiment(module.NAME, out=tmp_path / 'out', damper='stiff')
-    assert not (tmp_path / 'out').exists()
-
-
-def test_what_the_experiment_sets_itself_cannot_be_set_on_a_node(tmp_path):
-    with pytest.raises(ExperimentError, match=r'mount_sim\.mount is set by the experiment bench itself'):
-        experiment(bench.NAME, out=tmp_path, mount_sim={'mount': 'hydro'})
 
 
 def test_other_parameters_of_nodes_reach_the_run(tmp_path, monkeypatch):
