@@ -167,17 +167,20 @@ def one_missing(table):
 @pytest.mark.parametrize(
     ('columns', 'sentence'),
     [
-        ({'force_n': None}, 'has no column force_n or force_kn; its columns are gap_um, current_a'),
-        ({'force_n': in_kilonewton}, 'are they in kn? Rename the column to force_kn'),
-        ({'gap_um': lambda t: t['gap_um'] / 1e3}, 'are they in mm? Rename the column to gap_mm'),
-        ({'current_a': lambda t: t['current_a'] * 1e3}, 'are they in ma? Rename the column to current_ma'),
+        ({'force_n': None}, 'has no column for force (its columns: gap [um], current_a'),
+        ({'force_n': in_kilonewton}, 'it could be kN'),
+        ({'gap_um': lambda t: t['gap_um'] / 1e3}, 'it could be mm: write --column gap=gap:mm'),
+        (
+            {'current_a': lambda t: t['current_a'] * 1e3},
+            'it could be mA: write --column current=current_a:mA',
+        ),
         (
             {'gap_um': None, 'gap': lambda t: t['gap_um']},
-            "column 'gap' names no unit; its values are 270 .. 550, ",
+            'no unit is said; values from 270 to 550; it could be um',
         ),
         ({'force_n': lambda t: 0.0 * t['current_a'] + 50.0}, 'force is constant (50 N in all 885 rows)'),
         ({'force_n': one_stuck}, 'force stayed at'),
-        ({'force_n': one_missing}, 'row 8: force_n is nan (1 such of 885)'),
+        ({'force_n': one_missing}, "column 'force_n': value number 7 is nan (1 such of 885)"),
         ({'force_n': one_outlier}, '1 of 885 points are outliers'),
         ({'force_n': lambda t: -t['force_n']}, 'is the sign of the load cell right?'),
     ],
@@ -226,7 +229,7 @@ def test_a_target_without_folder_is_refused_before_the_work(files, tmp_path, cap
 
 def test_columns_of_other_names_are_chosen_with_their_unit(files, tmp_path, capsys):
     other = changed(files[0], tmp_path, force_n=None, Kraft=in_kilonewton)
-    assert 'has no column force_n' in refused(capsys, 'actuator', other)
+    assert 'has no column for force' in refused(capsys, 'actuator', other)
     with pytest.raises(SystemExit) as end:
         main(['calibrate', 'actuator', str(other), '--column', 'force=Kraft:kn'])
     assert end.value.code == 0
