@@ -86,8 +86,10 @@ def select_rows(
     for name in needed:
         if name not in mapping.columns:
             option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
+            measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
+            columns = '; '.join((listed(there), *measured.notes))
             raise SignalError(
-                f'{uri} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
+                f'{uri} has no column for {name} (its columns: {columns}); name it as in {option}'
             )
     signals = _select(source, mapping, known, timed=timed, slowest=slowest, whole=True).signals
     first = next(iter(signals.values()))
@@ -210,9 +212,10 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
     known = np.isfinite(column.values)
     bad = np.flatnonzero(~known if whole else np.isinf(column.values))
     if bad.size:
+        at = '' if base.told == _ROWS else f', at {base.times[bad[0]]:.4f} s'
         raise SignalError(
-            f'{where}: value number {bad[0]} is {column.values[bad[0]]}, at {base.times[bad[0]]:.4f} s '
-            f'({bad.size} such of {known.size}); repair it or cut it out'
+            f'{where}: value number {bad[0]} is {column.values[bad[0]]}{at} ({bad.size} such of '
+            f'{known.size}); repair it or cut it out'
         )
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
     return known
