@@ -81,6 +81,8 @@ def select_rows(
     mapping = _mapping(choices, known).of(known)
     there = _headings(source) if isinstance(source, Measured) else headings(source, mapping.stated)
     uri = source.provenance.uri if isinstance(source, Measured) else str(source)
+    for named in mapping.columns.values():
+        heading_of(there, named.column, uri)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
