@@ -7,11 +7,8 @@ from engine_mount.cli.calibration.given import rack_mapping
 from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
 from engine_mount.fleet.foreign import mapped_in, said_in
-from engine_mount.identification.friction.channels import friction_mapping
-from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.rack.force_points import read_force
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.identification.friction.files import friction_mapping, read_recording
+from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.reading import read_files
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
@@ -19,7 +16,7 @@ from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
 
 GRAVITY, POUND, INCH = 9.80665, 4.4482216152605, 0.0254
-NOTHING = GivenValues({}, {}, 20.0)
+NOTHING = FileValues(celsius_of_others=20.0)
 TIME = np.arange(2000) / 1000.0
 WAY = 1e-3 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m
 SHAKING = 3.0 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m/s^2
