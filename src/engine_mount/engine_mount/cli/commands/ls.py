@@ -141,8 +141,7 @@ def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: P
     for sentence in measured.notes:
         note(console, sentence)
     if json_file is not None:
-        columns = [one.as_json() for one in facts]
-        write_json({'provenance': asdict(told), 'columns': columns, 'notes': measured.notes}, json_file)
+        write_json({'provenance': asdict(told), 'columns': facts, 'notes': measured.notes}, json_file)
 
 
 def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
