@@ -180,15 +180,20 @@ def _read(
     """Return the columns at `places`; raises `SignalError` with line, column and cell."""
     if not places:
         return []
-    columns: list[list[NDArray[Any]]] = [[] for _ in places]
+    with path.open('rb') as file:
+        ends = sum(block.count(b'\n') + block.count(b'\r') for block in iter(partial(file.read, BLOCK), b''))
+    kinds = ['datetime64[ns]' if dialect.kinds[place] == 'date' else 'float64' for place in places]
+    columns = [np.empty(ends + 1, kind) for kind in kinds]  # what stays empty takes no memory
+    size = 0
     for number, block in _samples(path, codec, dialect, first):
         found = _in_bulk(block, dialect, places)
         found = found or _cell_by_cell(path, number, block, dialect, places, titles)
-        for parts, part in zip(columns, found, strict=True):
-            parts.append(part)
-    if not columns[0]:
+        for column, part in zip(columns, found, strict=True):
+            column[size : size + part.size] = part
+        size += found[0].size
+    if not size:
         raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [np.concatenate(columns.pop(0)) for _ in places]  # so no more than one is held twice
+    return [column[:size] for column in columns]
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:
