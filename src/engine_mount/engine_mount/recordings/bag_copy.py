@@ -8,7 +8,7 @@ import contextlib
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -64,22 +64,13 @@ def read_messages(recording: Recording, name: str) -> Messages | None:
     return found.at(np.argsort(found.heads['log_time'], kind='stable'))
 
 
-def in_log_order(parts: Sequence[Messages]) -> Iterable[tuple[int, int]]:
-    """Return (number of the part, place in it) of all messages, sorted by log time, then by part."""
-    numbers = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    places = np.concatenate([np.arange(0), *(np.arange(len(part)) for part in parts)])
-    times = np.concatenate([np.zeros(0, np.int64), *(part.heads['log_time'] for part in parts)])
-    order = np.argsort(times, kind='stable')
-    return zip(numbers[order].tolist(), places[order].tolist(), strict=True)
-
-
 class BagCopy:
     """One recording of one file, made of messages of others; types need not be installed.
 
     A context that ends with an error leaves nothing behind. Raises `RecordingError` where the folder exists.
     """
 
-    def __init__(self, folder: str | os.PathLike[str]):
+    def __init__(self, folder: str | os.PathLike[str], chunk_size: int = LONG_CHUNK_SIZE):
         self.folder = Path(folder)
         self._file_name = f'{self.folder.name}_0.mcap'
         self._schemas: dict[tuple[str, str, bytes], int] = {}
@@ -88,7 +79,7 @@ class BagCopy:
         self.notes: list[str] = []
         """What was not copied, in sentences."""
         create_folder(self.folder)
-        self._file = McapWriter(self.folder / self._file_name, LIBRARY, LONG_CHUNK_SIZE)
+        self._file = McapWriter(self.folder / self._file_name, LIBRARY, chunk_size)
         self.write = self._file.add_message
         """Adds one message: channel, bytes, log time, publish time (ns), sequence."""
 
@@ -129,7 +120,11 @@ class BagCopy:
         """Add messages by their log times."""
         channels = [self.channel_of(part.topic) for part in parts]
         heads = [part.heads[['log_time', 'publish_time', 'sequence']].tolist() for part in parts]
-        for number, place in in_log_order(parts):
+        numbers = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+        places = np.concatenate([np.arange(0), *(np.arange(len(part)) for part in parts)])
+        times = np.concatenate([np.zeros(0, np.int64), *(part.heads['log_time'] for part in parts)])
+        order = np.argsort(times, kind='stable')
+        for number, place in zip(numbers[order].tolist(), places[order].tolist(), strict=True):
             self.write(channels[number], parts[number].payloads[place], *heads[number][place])
 
     def complete(

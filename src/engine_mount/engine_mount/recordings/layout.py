@@ -19,14 +19,12 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 
 from mount_recorder.schemas import schema_text
 
-HEAD = 4  # bytes: kind of encoding and options
-_OPTIONS = slice(2, HEAD)  # bytes of the head that say nothing of the content
+_HEAD = 4  # bytes: kind of encoding, and two of options that say nothing of the content
 _ORDERS: dict[bytes, Literal['<', '>']] = {b'\x00\x00': '>', b'\x00\x01': '<'}
 _NUMBERS = {
     **{'bool': 'u1', 'byte': 'u1', 'char': 'u1', 'octet': 'u1', 'float32': 'f4', 'float64': 'f8'},
     **{f'{sign}int{bits}': f'{sign or "i"}{bits // 8}' for sign in ('', 'u') for bits in (8, 16, 32, 64)},
 }
-_TIME, _HEADER = 'builtin_interfaces/msg/Time', 'std_msgs/msg/Header'
 # The middleware gives a message without fields one byte, so that it is not empty.
 _EMPTY = [('structure_needs_at_least_one_member', (Nodetype.BASE, ('uint8', 0)))]
 Fields = Sequence[tuple[str, Any]]
@@ -47,12 +45,6 @@ class Definition:
 
     name: str
     types: Mapping[str, Fields]
-
-    @property
-    def has_stamp(self) -> bool:
-        """Whether its messages begin with a header, and this with a stamp."""
-        first = [kind for _, kind in (self.types[self.name][0], *self.types.get(_HEADER, ())[:1])]
-        return first == [(Nodetype.NAME, _HEADER), (Nodetype.NAME, _TIME)]
 
 
 @cache
@@ -96,7 +88,7 @@ class Layout:
 
     numbers: dict[str, Numbers] = field(default_factory=dict)
     strings: dict[str, str] = field(default_factory=dict)
-    shape: list[int] = field(default_factory=lambda: list(range(_OPTIONS.start)))
+    shape: list[int] = field(default_factory=lambda: [0, 1])
     """Bytes that fix the layout."""
 
     def fits(self, messages: np.ndarray) -> bool:
@@ -132,10 +124,10 @@ def _read(raw: bytes, definition: Definition) -> tuple[SimpleNamespace, Layout]:
 class _Reader:
     def __init__(self, raw: bytes, definition: Definition):
         order = _ORDERS.get(raw[:2])
-        if order is None or len(raw) < HEAD:
-            raise LayoutError(f'a message that begins with {raw[:HEAD].hex() or "nothing"} is no plain CDR')
+        if order is None or len(raw) < _HEAD:
+            raise LayoutError(f'a message that begins with {raw[:_HEAD].hex() or "nothing"} is no plain CDR')
         self.layout = Layout()
-        self._raw, self._definition, self._order, self._position = raw, definition, order, HEAD
+        self._raw, self._definition, self._order, self._position = raw, definition, order, _HEAD
 
     def message(self, path: str, name: str) -> SimpleNamespace:
         prefix = f'{path}.' if path else ''
@@ -176,7 +168,7 @@ class _Reader:
 
     def _skip(self, size: int, alignment: int = 1, *, fixed: bool = False) -> int:
         """Return where the next `size` bytes begin; `fixed`: they are part of the layout."""
-        begin = self._position + -(self._position - HEAD) % alignment
+        begin = self._position + -(self._position - _HEAD) % alignment
         self._position = begin + size
         if self._position > len(self._raw):
             name = self._definition.name

@@ -15,8 +15,6 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.automatic_marks import MarkKind
-from mount_recorder.topic_groups import registered_topic
-from mount_ros.topics import DISPLACEMENT
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault
 _NUMBERS = re.compile(r'\d+(\.\d+)?')
@@ -51,11 +49,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
         for each in answers
         for begin, end in each.silences
     ]
-    mounts = {
-        name.removesuffix(DISPLACEMENT.name).strip('/')
-        for name, topic in recording.topics.items()
-        if registered_topic(name, topic.type) is DISPLACEMENT
-    }
+    mounts = recording.mounts
     present: dict[tuple[str, str], str] = {}  # an error counts once; other numbers make no other error
     for report in reports:
         who, what = (report.namespace, report.node), _NUMBERS.sub('#', report.sentence)
@@ -208,9 +202,14 @@ _FIGURES = (
     *('expected', 'present', 'lost', 'duplicated', 'longest_gap_s', 'out_of_order', 'misdated'),
     *('rate_hz', 'jitter_s', 'worst_jitter_s', 'remark'),
 )
-_COLUMNS = (('expected', 1), ('present', 1), ('lost', 1), ('longest_gap_s', 1e3), ('jitter_s', 1e6))
-_HEADS = ('topic', 'expected', 'present', 'lost', 'gap ms', 'jitter µs')
-_TROUBLES = {'duplicated': 'twice', 'out_of_order': 'late', 'misdated': 'misdated'}
+_COLUMNS = (
+    ('expected', 'expected', 1),
+    ('present', 'present', 1),
+    ('lost', 'lost', 1),
+    ('gap ms', 'longest_gap_s', 1e3),
+    ('jitter µs', 'jitter_s', 1e6),
+)
+_TROUBLES = (('twice', 'duplicated', 1), ('late', 'out_of_order', 1), ('misdated', 'misdated', 1))
 
 
 def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
@@ -226,11 +225,11 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
 
 def as_table(audits: Mapping[str, TopicAudit]) -> Table:
     """Return the figures as a table; columns of troubles are left out where no topic has them."""
-    troubles = [name for name in _TROUBLES if any(getattr(entry, name) for entry in audits.values())]
-    heads = (*_HEADS, *(_TROUBLES[name] for name in troubles))
-    columns = (*_COLUMNS, *((name, 1) for name in troubles))
+    troubles = [each for each in _TROUBLES if any(getattr(entry, each[1]) for entry in audits.values())]
+    columns = [*_COLUMNS, *troubles]
+    heads = ('topic', *(head for head, _, _ in columns))
     rows = [
-        (name, *(_cell(getattr(entry, figure), factor) for figure, factor in columns))
+        (name, *(_cell(getattr(entry, figure), factor) for _, figure, factor in columns))
         for name, entry in audits.items()
     ]
     marked = frozenset(place for place, entry in enumerate(audits.values()) if not entry.sound)

@@ -180,11 +180,11 @@ class McapFile:
 
     def _leave_out(self, chunk: Chunk) -> None:
         self._damaged.add(chunk.position)
-        why = 'is damaged and left out'
-        if chunk.size > chunk.limit:
-            limit = f'limit {chunk.limit} for its bytes in the file'
-            why = f'claims {chunk.size} bytes ({limit}) and is left out: write smaller chunks'
-        self._warn(f'the chunk at byte {chunk.position} {why}')
+        limit = (
+            f'claims {chunk.size} bytes (limit {chunk.limit} for its bytes in the file); write smaller chunks'
+        )
+        why = limit if chunk.size > chunk.limit else 'is damaged'
+        self._warn(f'the chunk at byte {chunk.position} is left out: it {why}')
 
     def _use_summary(self, summary: Summary) -> None:
         assert summary.statistics is not None

@@ -4,9 +4,12 @@ import functools
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, TypeVar
 
 import yaml
+from rosbags.interfaces import QosTime
+from rosbags.rosbag2.metadata import parse_qos
 
 from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
@@ -103,16 +106,6 @@ def _count(entry: Any) -> int:
     return count
 
 
-# The position of a word is its number in rmw/types.h.
-_POLICIES = {
-    'history': 'system_default keep_last keep_all unknown',
-    'reliability': 'system_default reliable best_effort unknown best_available',
-    'durability': 'system_default transient_local volatile unknown best_available',
-    'liveliness': 'system_default automatic manual_by_node manual_by_topic unknown best_available',
-}
-_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
-
-
 # The topics of a recording, and of many recordings, have the same few texts.
 @functools.lru_cache(maxsize=64)
 def _offers_in(text: str) -> tuple[OfferedQos, ...]:
@@ -120,23 +113,13 @@ def _offers_in(text: str) -> tuple[OfferedQos, ...]:
 
 
 def _offers(documents: Any) -> tuple[OfferedQos, ...]:
-    return tuple(_offer(document) for document in documents or ())
+    return tuple(OfferedQos(*map(_plain, offer)) for offer in parse_qos(documents or []))
 
 
-def _offer(document: Any) -> OfferedQos:
-    return OfferedQos(
-        depth=int(document['depth']),
-        avoid_ros_namespace_conventions=bool(document['avoid_ros_namespace_conventions']),
-        **{name: _word(document[name], words.split()) for name, words in _POLICIES.items()},
-        **{
-            name: int(document[name]['sec']) * NANOSECONDS + int(document[name]['nsec'])
-            for name in _DURATIONS
-        },
-    )
-
-
-def _word(value: Any, words: list[str]) -> str:
-    return dict(enumerate(words))[value] if isinstance(value, int) else str(value)
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.name.lower()
+    return value.sec * NANOSECONDS + value.nsec if isinstance(value, QosTime) else value
 
 
 def readable_qos(source: Any) -> tuple[OfferedQos, ...]:

@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from engine_mount.recordings.bag_copy import Messages, in_log_order, read_messages
+from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.difference import time_text as moment_text
-from engine_mount.recordings.metadata import readable_qos
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.recordings.times import distinct
 from mount_models.plain_yaml import YamlError, yaml_in_file
-from mount_recorder.bag_writer import BagWriter
 from mount_recorder.session import session_message, session_text, time_text
 from mount_ros.topics import (
     AIR_GAP,
@@ -118,7 +116,9 @@ def accept(
     shutil.rmtree(made, ignore_errors=True)
     try:
         made.mkdir(parents=True)
-        _write(made / name, parts)
+        with BagCopy(made / name, _CHUNK_SIZE) as bag:
+            bag.add(parts)
+            bag.complete([], [], {})
         entry = {
             'date': time_text(),
             'reason': reason.strip(),
@@ -197,17 +197,6 @@ def _shortened(content: Any) -> Any:
     if isinstance(content, str) and content.startswith('/') and len(Path(content).parts) > 2:
         return Path(content).name
     return content
-
-
-def _write(folder: Path, parts: list[Messages]) -> None:
-    writer = BagWriter(folder, chunk_size=_CHUNK_SIZE)
-    for part in parts:
-        offers = readable_qos(part.topic.details.get('offered_qos_profiles', ''))
-        writer.add_topic(part.topic.name, part.topic.type, offers)
-    for number, place in in_log_order(parts):
-        part, head = parts[number], parts[number].heads[place]
-        writer.write(part.topic.name, part.payloads[place], int(head['log_time']), int(head['publish_time']))
-    writer.close()
 
 
 def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.layout import (
-    HEAD,
     Definition,
     Layout,
     LayoutError,
@@ -25,8 +24,6 @@ from mount_ros.topics import JOINT_STATE, Scalar, Topic
 Column = NDArray[np.float64]
 
 STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
-_STAMP_END = HEAD + 8
-_LITTLE_ENDIAN = (0, 1)  # the first bytes of a message: plain CDR
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 
 
@@ -146,12 +143,7 @@ class Series:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
         if self.stamp_obstacle:
             raise SeriesError(self.stamp_obstacle)
-        found, rows = [NO_TIMES], self.payloads.rows
-        if rows is not None and rows.shape[1] >= _STAMP_END and self._definition.has_stamp:
-            beginnings = np.ascontiguousarray(rows[:, :_STAMP_END])
-            if (beginnings[:, :2] == _LITTLE_ENDIAN).all():
-                times = beginnings.view('V4,<i4,<u4')[:, 0]
-                return np.asarray(times['f1'].astype(np.int64) * 1_000_000_000 + times['f2'])
+        found = [NO_TIMES]
         for layout, rows in self._layouts:
             if not layout.numbers.keys() >= set(STAMP):
                 raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')

@@ -188,10 +188,13 @@ class TimeAxis:
 
     def __init__(self, stamps: Times, received: Times, inherited: Sequence[int] = ()):
         """Take the samples, at least one, as they came in (ns), and zeros that origins tell of."""
-        sound, came = _in_order(stamps, received)
-        stamps, received = _in_time(sound, came)
-        self._stamps, self._received = stamps, received
-        self.zero = min([int(sound.min()), *inherited])
+        wrong = misdated(stamps)
+        sound = np.flatnonzero(~wrong | wrong.all())
+        order = sound[np.argsort(received[sound], kind='stable')]
+        stamps, received = stamps[order], received[order]
+        self.zero = min([int(stamps.min()), *inherited])
+        on_time = np.append(True, stamps[1:] > np.maximum.accumulate(stamps)[:-1])
+        self._stamps, self._received = stamps[on_time], received[on_time]
 
     def of_stamps(self, stamps: Times) -> NDArray[np.float64]:
         """Return the times of stamps (ns)."""
@@ -229,22 +232,6 @@ def anchors(types: Mapping[str, str]) -> list[str]:
     return [
         name for topic in _ANCHORS for name, kind in types.items() if registered_topic(name, kind) is topic
     ]
-
-
-def _in_order(stamps: Times, received: Times) -> tuple[Times, Times]:
-    """Return the samples that are not misdated in the order in which they came in."""
-    wrong = misdated(stamps)
-    if not wrong.any() and (received[1:] >= received[:-1]).all():
-        return stamps, received  # hours of samples need no copies
-    sound = np.flatnonzero(~wrong | wrong.all())
-    order = sound[np.argsort(received[sound], kind='stable')]
-    return stamps[order], received[order]
-
-
-def _in_time(stamps: Times, received: Times) -> tuple[Times, Times]:
-    """Return the samples without late ones, whose stamps are not above those before them."""
-    on_time = np.append(True, stamps[1:] > np.maximum.accumulate(stamps)[:-1])
-    return (stamps, received) if on_time.all() else (stamps[on_time], received[on_time])
 
 
 def _related(times: Times, known: Times, wanted: Times) -> Times:

@@ -23,7 +23,6 @@ SECTIONS: tuple[Callable[[Sequence[Subject]], Section | None], ...] = (
     motion.hysteresis,
     motion.harmonics,
     motion.spectra,
-    motion.sweep,
     run.coil,
     run.tracking,
     run.losses,

@@ -19,7 +19,6 @@ from mount_ros.topics import Topic
 _MESSAGE = struct.Struct('<BIQ')  # opcode, subscription, ns
 _TIME = struct.Struct('<BQ')  # opcode, ns
 _MESSAGE_OPCODE, _TIME_OPCODE = 1, 2
-_WARNING = 1  # level of a status
 _TIME_STEP = 50_000_000  # ns, chosen: how often viewers receive the time
 
 
@@ -61,25 +60,19 @@ class FoxgloveServer(LocalServer):
         greeting = {'op': 'serverInfo', 'name': 'engine mount', **server}
         return [json.dumps(greeting), json.dumps({'op': 'advertise', 'channels': channels})]
 
-    def answer(self, viewer: Viewer, text: str) -> str:
-        """Change the subscriptions of a viewer; return a warning for what is no such request."""
+    def receive(self, viewer: Viewer, text: str) -> None:
+        """Change the subscriptions of a viewer; what is no such request changes nothing."""
         try:
             request: dict[str, Any] = json.loads(text)
             if request['op'] == 'subscribe':
                 viewer.subscriptions |= {
                     int(each['channelId']): int(each['id']) & 0xFFFFFFFF for each in request['subscriptions']
                 }
-                return ''
-            if request['op'] == 'unsubscribe':
-                ended = set(request['subscriptionIds'])
-                viewer.subscriptions = {
-                    channel: number for channel, number in viewer.subscriptions.items() if number not in ended
-                }
-                return ''
+            elif request['op'] == 'unsubscribe':
+                ended, known = set(request['subscriptionIds']), viewer.subscriptions.items()
+                viewer.subscriptions = {channel: number for channel, number in known if number not in ended}
         except (ValueError, KeyError, TypeError):
             pass
-        warning = 'a request that this server does not know was ignored'
-        return json.dumps({'op': 'status', 'level': _WARNING, 'message': warning})
 
     def take(self, message: Message) -> None:
         """Pass a message on to the viewers that have subscribed to its topic."""

@@ -1,6 +1,6 @@
 """The picture of a graph: takes messages from a feed, and once an interval makes of them what viewers get."""
 
-import math
+import contextlib
 import threading
 import time
 from collections import deque
@@ -18,16 +18,12 @@ from engine_mount.reports.drawing.detail import browser_chart
 from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import policy_of
-from engine_mount.view.alternatives import Alternatives
+from engine_mount.view.alternatives import MOUNTS, Alternatives
 from engine_mount.view.feed import Feed, Message
-from engine_mount.view.state import GraphState, decoded
-from mount_models.quantity import ParameterError
-from mount_ros.messages.force_table import ForceTable, from_message
-from mount_ros.messages.scalars import MessageError
+from engine_mount.view.state import GraphState
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,
-    CURRENT_FORCE_TABLE,
     CURRENT_SETPOINT,
     DISPLACEMENT,
     SIM_CHASSIS_ACCELERATION,
@@ -104,14 +100,13 @@ class Model:
         self._on_failure = on_failure
         self._lock = threading.Lock()
         self._arrived: list[Message] = []
-        self._table: ForceTable | None = None
-        self._made_with: tuple[int, str] = (0, '')
+        self._made_with = ''
         self._time, self._number, self._newest = 0.0, 0, 0  # s, intervals, ns of arrival
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._serve, name='view', daemon=True)
         self._listeners: list[Callable[[Interval], None]] = []
         if beside:
-            Alternatives({}, None).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
+            Alternatives({}).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
 
     def take(self, message: Message) -> None:
         """Take a message; cheap, from any thread."""
@@ -140,9 +135,8 @@ class Model:
     @property
     def traces(self) -> list[Trace]:
         """All lines in the order of their panels."""
-        labels = self.alternatives.labels if self.alternatives is not None else {}
-        beside = [Trace(f'beside.{key}', label, 'displacement') for key, label in labels.items()]
-        return [TRACES[0], *beside, *TRACES[1:], _LATENCY]
+        beside = [Trace(f'beside.{key}', label, 'displacement') for key, (label, _) in MOUNTS.items()]
+        return [TRACES[0], *(beside if self.alternatives is not None else []), *TRACES[1:], _LATENCY]
 
     def chart(self) -> dict[str, Any]:
         """Return the panels for the page's script; `keys` are those of the curves in an interval."""
@@ -176,7 +170,9 @@ class Model:
         by_topic: dict[Topic, list[Message]] = {}
         for message in messages:
             by_topic.setdefault(message.topic, []).append(message)
-            self._take_state(message)
+            if message.topic.rate <= _HIGHEST_STATE_RATE:
+                with contextlib.suppress(LayoutError, RuntimeError):  # of bytes that are no such message
+                    self.state.take(message)
             self._newest = message.received
         series = {topic: _series(topic, found) for topic, found in by_topic.items()}
         found = {trace.key: _column(series, trace.topic, trace.column) * trace.factor for trace in TRACES}
@@ -194,7 +190,7 @@ class Model:
     def _levels(self) -> Mapping[str, float]:
         try:
             return levels_of(*policy_of(self.state.parameters))
-        except (ParameterError, ValueError):
+        except ValueError:
             return {}
 
     def _serve(self) -> None:
@@ -211,30 +207,14 @@ class Model:
         except Exception as error:
             self.fail(f'{type(error).__name__}: {error}')
 
-    def _take_state(self, message: Message) -> None:
-        if message.topic.rate > _HIGHEST_STATE_RATE:
-            return
-        try:
-            if message.topic is CURRENT_FORCE_TABLE:
-                self._table = from_message(decoded(message))
-            else:
-                self.state.take(message)
-        except MessageError:
-            self._table = None
-        except (LayoutError, RuntimeError):  # of bytes that are no such message
-            pass
-
     def _moved_beside(self, series: Mapping[Topic, Series]) -> Mapping[str, Array]:
-        """Return displacements (m) of the alternatives, made anew where table or parameters are others."""
+        """Return displacements (m) of the alternatives, made anew where the parameters are others."""
         if not self._beside or SIM_CHASSIS_ACCELERATION not in series:
             return {}
-        made_with = (self._table.stamp if self._table is not None else 0, repr(self.state.parameters))
-        if made_with != self._made_with or self.alternatives is None:
-            self._made_with = made_with
-            offset = self.state.gap.get('offset_current', 0.0)
-            offset = 0.0 if math.isnan(offset) else offset
+        if self.alternatives is None or self._made_with != repr(self.state.parameters):
+            self._made_with = repr(self.state.parameters)
             try:
-                self.alternatives = Alternatives(self.state.parameters, self._table, offset)
+                self.alternatives = Alternatives(self.state.parameters)
             except ValueError:  # parameters of another version
                 self._beside, self.alternatives = False, None
                 return {}

@@ -75,9 +75,8 @@ class LocalServer:
         """Return the first messages of a viewer."""
         raise NotImplementedError
 
-    def answer(self, viewer: Viewer, text: str) -> str:
-        """Return the answer to a message of a viewer, empty for none."""
-        return ''
+    def receive(self, viewer: Viewer, text: str) -> None:
+        """Take a message of a viewer."""
 
     def start(self) -> None:
         """Begin to serve; raises `FeedError` with the remedy where the port is taken."""
@@ -104,8 +103,8 @@ class LocalServer:
         sender = asyncio.create_task(viewer.send())
         try:
             async for message in socket:
-                if message.type == WSMsgType.TEXT and (answer := self.answer(viewer, message.data)):
-                    await socket.send_str(answer)
+                if message.type == WSMsgType.TEXT:
+                    self.receive(viewer, message.data)
         finally:
             self.viewers = tuple(each for each in self.viewers if each is not viewer)
             sender.cancel()

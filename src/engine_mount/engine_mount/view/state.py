@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from engine_mount.recordings.layout import decode, installed_definition
 from engine_mount.recordings.session import SessionError, session_content, session_parameters
 from engine_mount.view.feed import Message
-from mount_ros.messages.event import read_mark
+from mount_ros.messages.event import Mark, read_mark
 from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, DIAGNOSTICS, EVENT, SESSION
 
@@ -17,7 +17,6 @@ _SILENT = 3_000_000_000  # ns, chosen: a node without diagnostics for so long is
 _LEVELS = ('ok', 'warning', 'error')
 _FIGURES = {
     'wear reserve': ('mount_init', 'wear_reserve_um', ' µm'),
-    'coil temperature': None,
     'policy': ('mount_control', 'policy', ''),
     'samples': ('mount_driver', 'samples', ''),
     **{
@@ -43,14 +42,6 @@ class NodeState(NamedTuple):
     received: int
 
 
-class Event(NamedTuple):
-    """Something that happened: time of its stamp (ns), one word, one sentence."""
-
-    time: int
-    kind: str
-    text: str
-
-
 @dataclass
 class GraphState:
     """Everything about the graph that is no trace; `take` keeps it up to date."""
@@ -61,22 +52,22 @@ class GraphState:
     coil_celsius: float = math.nan
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
     scenario: str = ''
-    events: deque[Event] = field(default_factory=lambda: deque(maxlen=_EVENTS))
+    events: deque[Mark] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def take(self, message: Message) -> None:
         """Take a message of a topic that tells of state, and no other."""
         if message.topic is DIAGNOSTICS:
             self._take_diagnostics(message)
         elif message.topic is AIR_GAP:
-            content = decoded(message)
+            content = _decoded(message)
             self.gap = dict(zip(content.name, map(float, content.position), strict=False))
         elif message.topic is COIL_TEMPERATURE:
-            self.coil_celsius = float(decoded(message).temperature)
+            self.coil_celsius = float(_decoded(message).temperature)
         elif message.topic is EVENT:
-            self.events.append(Event(*read_mark(decoded(message).data, message.received)[:3]))
+            self.events.append(read_mark(_decoded(message).data, message.received))
         elif message.topic is SESSION:
             try:
-                content = session_content(decoded(message).data)
+                content = session_content(_decoded(message).data)
             except SessionError:
                 return
             self.parameters = session_parameters(content)
@@ -89,12 +80,11 @@ class GraphState:
             for name, key in (('rest', 'rest_gap'), ('contact', 'contact_gap'))
             if key in self.gap
         }
-        for name, source in _FIGURES.items():
-            if source is None:
-                if not math.isnan(self.coil_celsius):
-                    found[name] = f'{self.coil_celsius:.1f} °C'
-            elif source[0] in self.nodes and (text := self.nodes[source[0]].figures.get(source[1])):
-                found[name] = f'{text}{source[2]}'
+        if not math.isnan(self.coil_celsius):
+            found['coil temperature'] = f'{self.coil_celsius:.1f} °C'
+        for name, (node, figure, unit) in _FIGURES.items():
+            if node in self.nodes and (text := self.nodes[node].figures.get(figure)):
+                found[name] = f'{text}{unit}'
         return found
 
     def as_json(self, now: int, zero: int | None) -> dict[str, Any]:
@@ -118,16 +108,15 @@ class GraphState:
         return {'scenario': self.scenario, 'nodes': nodes, 'values': values, 'events': events}
 
     def _take_diagnostics(self, message: Message) -> None:
-        for verdict in verdicts_in(decoded(message)):
+        for verdict in verdicts_in(_decoded(message)):
             space, _, name = verdict.node.rpartition('/')
             if space != self.namespace.strip('/'):
                 continue  # /diagnostics belongs to all mounts of the car
             before = self.nodes.get(name)
             self.nodes[name] = NodeState(verdict.level, verdict.sentence, verdict.figures, message.received)
             if verdict.level and (before is None or before.sentence != verdict.sentence):
-                self.events.append(Event(message.received, name, verdict.sentence))
+                self.events.append(Mark(message.received, name, verdict.sentence))
 
 
-def decoded(message: Message) -> Any:
-    """Return the fields of a message; raises `LayoutError` for bytes that are no such message."""
+def _decoded(message: Message) -> Any:
     return decode(message.raw, installed_definition(message.topic.type))

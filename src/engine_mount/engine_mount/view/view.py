@@ -4,41 +4,33 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from engine_mount.view.feed import Feed, FeedError, Message, Receive, RecordedFeed
 from engine_mount.view.model import Model
 from mount_bringup.graph.shutdown import ending_signals
 
-PAGE_PORT, FOXGLOVE_PORT = 8137, 8765
-
-
-@dataclass(frozen=True)
-class ViewOrder:
-    """What is to be looked at, and where it is shown; without a recording, the running graph."""
-
-    recording: Path | None = None
-    rate: float = 1.0
-    begin: float = 0.0
-    domain: int = 0
-    namespace: str = ''
-    host: str = '127.0.0.1'
-    port: int = PAGE_PORT
-    foxglove_port: int = FOXGLOVE_PORT  # 0: none
-    beside: bool = True
-
 
 @contextmanager
-def open_feed(order: ViewOrder) -> Iterator[Feed]:
-    """Give the feed that is ordered; raises `FeedError` or `ReadingError`."""
+def open_feed(
+    recording: Path | None = None,
+    *,
+    rate: float = 1.0,
+    begin: float = 0.0,
+    domain: int = 0,
+    namespace: str = '',
+) -> Iterator[Feed]:
+    """Give the feed of a recording from `begin` (s) on, or of the running graph.
+
+    Raises `FeedError` or `ReadingError`.
+    """
     feed: Feed
-    if order.recording is not None:
-        feed = RecordedFeed(order.recording, order.rate, order.begin, order.namespace)
+    if recording is not None:
+        feed = RecordedFeed(recording, rate, begin, namespace)
     else:
         from engine_mount.view.running_graph import RunningGraph
 
-        feed = RunningGraph(order.domain, order.namespace)
+        feed = RunningGraph(domain, namespace)
     try:
         yield feed
     finally:
@@ -69,25 +61,35 @@ def running_model(
         model.stop()
 
 
-def serve_view(order: ViewOrder, say: Callable[[str], None]) -> None:
-    """Serve page and Foxglove until Ctrl-C; `say` takes where to look. Raises `FeedError`, also amid it."""
+def serve_view(
+    feed: Feed,
+    say: Callable[[str], None],
+    *,
+    host: str = '127.0.0.1',
+    port: int,
+    foxglove_port: int = 0,
+    beside: bool = True,
+) -> None:
+    """Serve page and, at a port, Foxglove until Ctrl-C; `say` takes where to look.
+
+    Raises `FeedError`, also amid it.
+    """
     from engine_mount.view.foxglove_server import FoxgloveServer
     from engine_mount.view.web import Web
 
     ending = threading.Event()
     with ExitStack() as stack:
         stack.enter_context(ending_signals(ending.set))
-        feed = stack.enter_context(open_feed(order))
         receivers = []
-        if order.foxglove_port:
-            server = FoxgloveServer(feed.topics, order.host, order.foxglove_port)
+        if foxglove_port:
+            server = FoxgloveServer(feed.topics, host, foxglove_port)
             stack.callback(server.stop)
             server.start()
             receivers.append(server.take)
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
-        look = running_model(feed, beside=order.beside, receivers=receivers, on_failure=ending.set)
+        look = running_model(feed, beside=beside, receivers=receivers, on_failure=ending.set)
         model = stack.enter_context(look)
-        page = Web(model, feed.title, feed.mark, order.host, order.port)
+        page = Web(model, feed.title, feed.mark, host, port)
         stack.callback(page.stop)
         page.start()
         say(f'page       {page.address}')

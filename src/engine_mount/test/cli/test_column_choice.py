@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from engine_mount.cli.calibration.given import rack_mapping
+from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
-from engine_mount.drives.recorded_file import recorded_acceleration
 from engine_mount.fleet.foreign import mapped_in, said_in
 from engine_mount.identification.friction.channels import friction_mapping
 from engine_mount.identification.friction.files import read_recording

@@ -43,7 +43,7 @@ def test_programs_of_the_command_import_nothing_from_the_working_directory(tmp_p
 def test_status_ends_with_the_reason_when_its_model_fails(monkeypatch):
     model = SimpleNamespace(failure='the view has ended: ValueError: broken')
     feed = contextlib.nullcontext(SimpleNamespace(title='a graph'))
-    monkeypatch.setattr(looking, 'open_feed', lambda _: feed)
+    monkeypatch.setattr(looking, 'open_feed', lambda **options: feed)
     monkeypatch.setattr(looking, 'running_model', lambda _, **options: contextlib.nullcontext(model))
     monkeypatch.setattr('engine_mount.view.screen.status_screen', lambda *_: 'figures')
     with pytest.raises(FeedError, match='the view has ended: ValueError: broken'):

@@ -53,10 +53,9 @@ def test_a_long_curve_is_told_briefly_and_hides_no_extreme(count, budget, jitter
     assert (high[group[known]] >= y[known] - even['size']).all()
 
 
-def test_what_short_curves_leave_goes_to_the_long_ones():
+def test_the_numbers_of_a_page_are_shared_by_its_long_curves():
     assert budget_of([chart_of(10)], 100_000) == 100_000
-    assert budget_of([chart_of(10_000), chart_of(200_000, 300_000)], 100_000) == 45_000
-    assert budget_of([chart_of(30_000, 30_000)], 100_000) >= 30_000
+    assert budget_of([chart_of(10), chart_of(200_000, 300_000)], 100_000) == 50_000
 
 
 @pytest.mark.parametrize(

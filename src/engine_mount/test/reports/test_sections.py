@@ -15,13 +15,12 @@ from engine_mount.reports.sections.periodic import (
     distortion,
     dominant_sine,
     evenly,
-    find_sweep,
     harmonics,
     peak_per_band,
     rms_per_band,
     whole_periods,
 )
-from engine_mount.reports.sections.run import coil_load, share_at_limit
+from engine_mount.reports.sections.run import coil_load
 from engine_mount.reports.sections.section import GOOD, LOOK, UNKNOWN
 from engine_mount.reports.sections.subject import QUANTITIES, Run, Signal, Subject
 
@@ -101,33 +100,6 @@ def test_missing_and_unknown_samples_are_bridged_and_counted():
     assert bridged == pytest.approx(TIME)
 
 
-def chirp(first: float, rate: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    time = np.arange(round(seconds * 1000)) * 1e-3
-    return time, np.sin(2 * np.pi * (first * time + 0.5 * rate * time**2))
-
-
-def test_a_sweep_is_recognised_with_its_frequency_at_each_time():
-    sweep = find_sweep(*chirp(1.0, 1.0, 30.0))
-    assert sweep is not None
-    assert sweep.at(np.array([5.0, 20.0])) == pytest.approx([6.0, 21.0], abs=0.05)
-    assert np.isnan(sweep.at(np.array([31.0])))[0]
-
-
-@pytest.mark.parametrize(
-    'values',
-    [
-        np.sin(2 * np.pi * 8.0 * TIME),
-        np.random.default_rng(2).normal(size=len(TIME)),
-        np.zeros(len(TIME)),
-        chirp(1.0, 5.0, 4.0)[1][::-1],
-        np.sin(2 * np.pi * np.where(TIME < 2.0, 8.0, 40.0) * (TIME - 2.0)),
-    ],
-    ids=['sine', 'noise', 'rest', 'falling', 'two sines'],
-)
-def test_what_is_no_sweep_is_not_taken_for_one(values):
-    assert find_sweep(TIME, values) is None
-
-
 def test_each_band_of_a_sweep_has_its_own_peak_and_rms():
     frequency = np.array([1.0, 1.5, 1.999, 2.0, 2.5, 5.2, np.nan])
     values = np.array([1.0, -3.0, 2.0, 4.0, np.nan, -5.0, 100.0])
@@ -137,22 +109,12 @@ def test_each_band_of_a_sweep_has_its_own_peak_and_rms():
     assert rms_per_band(frequency, values)[1] == pytest.approx([np.sqrt(14 / 3), 4.0, 5.0])
 
 
-def test_a_sweep_stands_in_bands_with_a_cell_for_each_recording():
-    time, values = chirp(1.0, 1.0, 30.0)
-    swept = Known(0, displacement=Signal(time, 1e-3 * values))
-    section = motion.sweep([swept, Known(1)])
-    assert section.words[1] == 'N1: the excitation is no sweep.'
-    assert section.tables[0].rows[9] == ('10 .. 11', '1.000')
-    assert motion.sweep([Known(1)]) is None
-
-
 def test_the_heat_of_a_coil_is_that_of_the_rms_current():
     current = np.where(TIME < 1.0, 3.0, 1.0)
     load = coil_load(TIME, current, 2.5)
     assert load.rms_current == pytest.approx(np.sqrt(3.0))
     assert load.mean_heat == pytest.approx(7.5)
     assert load.energy == pytest.approx(30.0)
-    assert share_at_limit(TIME, current, 3.0) == pytest.approx(0.25)
 
 
 def test_unknown_current_is_neither_load_nor_time():
@@ -161,7 +123,6 @@ def test_unknown_current_is_neither_load_nor_time():
     assert load.rms_current == pytest.approx(2.0)
     unknown = np.full(len(TIME), np.nan)
     assert np.isnan(coil_load(TIME, unknown, 1.0).rms_current)
-    assert np.isnan(share_at_limit(TIME, unknown, 3.0))
 
 
 def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy_and_their_difference_below():

@@ -46,10 +46,6 @@ def test_the_undamped_mount_beside_swings_further_than_the_one_that_is_driven(sh
     assert 0.0 < highest(shown, 'beside.hydro') < highest(shown, 'beside.undamped')
 
 
-def test_the_policy_that_is_driven_does_not_stand_beside_itself(shown):
-    assert set(shown.alternatives.labels) == {'hydro', 'undamped', 'switched_viscous'}
-
-
 def test_gap_and_levels_are_told(shown):
     values = {entry['name']: entry['value'] for entry in shown.state_json()['values']}
     assert values['contact gap'].startswith('349.')

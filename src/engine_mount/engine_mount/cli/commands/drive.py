@@ -31,7 +31,6 @@ from engine_mount.cli.commands.road_arguments import (
     Repeat,
     SpeedText,
     height_column,
-    road_excitation,
 )
 from engine_mount.cli.completion import faults, listed, named
 from engine_mount.cli.fetching import local
@@ -192,8 +191,15 @@ def drive(
     console = terminal()
     excitation = None
     if road:
-        length = duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0)
-        excitation = road_excitation(road, speed, height_column(column or []), length, **of_roads)
+        from engine_mount import road as read_road
+        from engine_mount.drives.external_excitation import measured_road
+
+        if not speed:
+            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s), or a file of it over time')
+        named = height_column(column or [])
+        found = read_road(road, lateral=lateral, column=named, distance=distance, speed=speed)
+        length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
+        excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:
         from engine_mount.drives.external_excitation import recorded_acceleration
 

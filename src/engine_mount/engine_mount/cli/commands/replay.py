@@ -31,7 +31,7 @@ Examples:
 
 `engine-mount replay bags/first/recording` - equal to what was recorded?
 
-`engine-mount replay RECORDING --lockstep` - the same through the real nodes over topics
+`engine-mount replay RECORDING --lockstep` - the same through the real node over topics
 
 `engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
 
@@ -50,7 +50,7 @@ def replay(
     ],
     core: Annotated[bool, flag('--core', 'through the controller as function calls; the default')] = False,
     lockstep: Annotated[
-        bool, flag('--lockstep', 'through the real nodes over topics, sample by sample')
+        bool, flag('--lockstep', 'control through its real node over topics, sample by sample')
     ] = False,
     live: Annotated[
         bool, flag('--live', 'publish the recorded topics by the wall clock, to look at')

@@ -72,7 +72,7 @@ class Panel:
 class Chart:
     """Panels above each other over one x axis.
 
-    `name` is that of the file, `title` stands above, `remark` below. `spans` are shaded in all panels and
+    `name` is that of the file, `title` stands above. `spans` are shaded in all panels and
     called `span_name`; `limits` are those of the x axis, None for all. `view` is the part of the x axis that
     is looked at first: a picture shows only that.
     """
@@ -85,7 +85,6 @@ class Chart:
     span_name: str = ''
     limits: Limits | None = None
     view: Limits | None = None
-    remark: str = ''
     ticks: Sequence[float] = ()  # of the x axis; empty: chosen by the drawing
 
 

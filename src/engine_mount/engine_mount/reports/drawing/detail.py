@@ -18,19 +18,9 @@ _UNEVEN = 0.1  # chosen: of the sample time, that a stamp may be off an even gri
 
 
 def budget_of(charts: Sequence[Chart], numbers: int = NUMBERS) -> int:
-    """Return how many numbers each long curve may have, so that all together have at most `numbers`.
-
-    What short ones leave goes to the longer ones.
-    """
-    lengths = sorted(len(curve.x) for chart in charts for panel in chart.panels for curve in panel.curves)
-    lengths = [length for length in lengths if length > _LONG]
-    share = numbers
-    for place, length in enumerate(lengths):
-        share = numbers // (len(lengths) - place)
-        if length > share:
-            break
-        numbers -= length
-    return max(_LONG, share)
+    """Return how many numbers each long curve may have, so that all together have at most `numbers`."""
+    curves = [curve for chart in charts for panel in chart.panels for curve in panel.curves]
+    return max(_LONG, numbers // max(1, sum(len(curve.x) > _LONG for curve in curves)))
 
 
 def browser_chart(chart: Chart, budget: int = NUMBERS) -> dict[str, Any]:

@@ -14,8 +14,6 @@ from engine_mount.reports.sections.periodic import (
     decibels,
     distortion,
     evenly,
-    peak_per_band,
-    rms_per_band,
     whole_periods,
 )
 from engine_mount.reports.sections.periodic import (
@@ -46,13 +44,6 @@ def traces(subjects: Sequence[Subject]) -> Section:
     words = [f'Shaded: damping on in {first.name}.'] if several and damping else []
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
-    absent = [
-        (subject, f'no {what} was recorded')
-        for quantity, what in (('displacement', 'displacement'), ('setpoint', 'current setpoint'))
-        for subject in subjects
-        if subject[quantity] is None
-    ]
-    words += shared_sentences(subjects, absent)
     panels: list[Panel] = []
     ends: list[float] = []
     for quantity, what, unit, factor, share in (
@@ -203,50 +194,11 @@ def spectra(subjects: Sequence[Subject]) -> Section:
             curves.append(subject.curve(label, frequency[shown], factor * density[shown]))
         if curves:
             panels.append(Panel(label, curves, log=True))
-    absent = [
-        (subject, f'no {what} was recorded')
-        for quantity, what in (('mount force', 'mount force'), ('acceleration', 'chassis acceleration'))
-        for subject in subjects
-        if subject[quantity] is None
-    ]
     words = ['From where control was active; Hann windows of 2.048 s that overlap by half.']
-    words += [*shared_sentences(subjects, said), *shared_sentences(subjects, absent)]
+    words += shared_sentences(subjects, said)
     limits = (0.0, _HIGHEST)
     chart = Chart('spectra', 'Spectra', 'frequency (Hz)', panels, limits=limits) if panels else None
     return Section('spectra', 'Spectra', words, chart)
-
-
-def sweep(subjects: Sequence[Subject]) -> Section | None:
-    """Return peak displacement and chassis acceleration by frequency as in Fig. 14; None without a sweep."""
-    said, peaks, shaking = [], [], []
-    bands: dict[float, dict[str, str]] = {}
-    heads = []
-    for subject in subjects:
-        swept, moved, shaken = subject.sweep, subject['displacement'], subject['acceleration']
-        if swept is None or moved is None:
-            said.append((subject, 'the excitation is no sweep'))
-            continue
-        edges, values = peak_per_band(swept.at(moved.time), moved.values)
-        heads.append(subject.curve('peak (mm)', edges, values).name)
-        for edge, value in zip(edges.tolist(), values.tolist(), strict=True):
-            bands.setdefault(edge, {})[heads[-1]] = f'{_MM * value:.3f}'
-        peaks.append(subject.curve('displacement', *_steps(edges, _MM * values), steps=True))
-        if shaken is not None:
-            edges, values = rms_per_band(swept.at(shaken.time), shaken.values)
-            shaking.append(subject.curve('acceleration', *_steps(edges, values), steps=True))
-    if not peaks:
-        return None
-    lines = level_lines(subjects[0].run.levels, both=False)
-    panels = [Panel('peak displacement (mm)', peaks, levels=lines, log=True)]
-    panels += [Panel('chassis acceleration,\nrms (m/s²)', shaking, log=True)] if shaking else []
-    chart = Chart('sweep', 'Sweep', 'frequency of the excitation (Hz)', panels)
-    rows = [
-        (f'{edge:g} .. {edge + 1:g}', *(row.get(name, '') for name in heads))
-        for edge, row in sorted(bands.items())
-    ]
-    words = ['In bands of 1 Hz, by the frequency of the excitation at that moment.']
-    words += shared_sentences(subjects, said)
-    return Section('sweep', 'Sweep', words, chart, [Table(('band (Hz)', *heads), rows, folded=True)])
 
 
 def peak_cell(signal: Signal | None, unit: str, begin: float = -math.inf, end: float = math.inf) -> Cell:
@@ -297,9 +249,3 @@ def _together(
     x = np.interp(time, moved.time[known], moved.values[known]) if known.any() else np.full(len(time), np.nan)
     both = np.isfinite(x) & np.isfinite(y)
     return x[both], y[both], time[both]
-
-
-def _steps(edges: Array, values: Array) -> tuple[Array, Array]:
-    """Return the bands with the end of the last one, so that steps show all of it."""
-    width = float(np.min(np.diff(edges))) if len(edges) > 1 else 1.0
-    return np.append(edges, edges[-1] + width), np.append(values, values[-1])

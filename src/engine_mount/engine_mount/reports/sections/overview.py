@@ -23,23 +23,12 @@ from engine_mount.reports.sections.section import (
 )
 from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
 
-_COMPARED = {
-    'peak displacement': ('peak_displacement_m', 1.0, 'm'),
-    'peak current': ('peak_current_a', 1.0, 'A'),
-    'damping switched on': ('damping_switched_on', 1.0, ''),
-    'friction force error': ('tracking_error_rms', 100.0, '%'),
-}
-"""Rows of the table: the figure, its factor and unit."""
-
 
 def overview(subjects: Sequence[Subject]) -> Section:
     """Return the verdict, the figures, and what the recordings lack, in words."""
     columns = [_cells(subject) for subject in subjects]
     head = ['', *(each.name for each in subjects)]
     rows = [[name, *(column[name] for column in columns)] for name in columns[0]]
-    if subjects[-1].comparison is not None:
-        head.append('B - A')
-        rows = [[*row, _difference(str(row[0]), subjects)] for row in rows]
     words = [f'{subject.prefix}{warning}.' for subject in subjects for warning in subject.recording.warnings]
     missing = [(each, f'missing: {"; ".join(each.missing)}') for each in subjects if each.missing]
     words += shared_sentences(subjects, missing)
@@ -74,32 +63,16 @@ def _cells(subject: Subject) -> dict[str, Cell]:
 
 
 def _friction_cells(subject: Subject) -> dict[str, Cell]:
-    figures = subject.figures
-    if reason := subject.run.without_friction:
-        return dict.fromkeys(list(_COMPARED)[1:], f'not applicable: {reason}')
-    peak, switched, error = (figures[name] for name, _, _ in list(_COMPARED.values())[1:])
-    setpoint = subject['setpoint']
-    current: Cell = 'not recorded' if peak is None else quantity_text(peak, 'A')
-    if peak is not None and setpoint is not None and (setpoint.values == peak).any():
-        current = Link(str(current), 'traces', float(setpoint.time[np.argmax(setpoint.values == peak)]))
-    percent = f'{100.0 * (error or 0.0):.1f} % rms of the peak wanted force'
-    return {
-        'peak current': current,
-        'damping switched on': 'not recorded' if switched is None else Link(_times(switched), 'switching'),
-        'friction force error': 'not known' if error is None else Link(percent, 'tracking'),
-    }
-
-
-def _difference(row: str, subjects: Sequence[Subject]) -> str:
-    """Return how far a figure of the last recording lies from that of the first."""
-    if row not in _COMPARED:
-        return ''
-    name, factor, unit = _COMPARED[row]
-    before, after = subjects[0].figures[name], subjects[-1].figures[name]
-    if before is None or after is None:
-        return ''
-    difference = factor * after - factor * before
-    return f'{"+" if difference > 0.0 else ""}{quantity_text(difference, unit)}'
+    figures, cells = subject.figures, {}
+    for name, figure, section, text in (
+        ('peak current', 'peak_current_a', 'traces', lambda value: quantity_text(value, 'A')),
+        ('damping switched on', 'damping_switched_on', 'switching', _times),
+        ('friction force error', 'tracking_error_rms', 'tracking', _percent),
+    ):
+        known: Cell = 'not known' if figures[figure] is None else Link(text(figures[figure]), section)
+        reason = subject.run.without_friction
+        cells[name] = f'not applicable: {reason}' if reason else known
+    return cells
 
 
 def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
@@ -179,3 +152,7 @@ def _change(value: float, reference: float) -> str:
 
 def _times(count: int) -> str:
     return 'once' if count == 1 else f'{count} times'
+
+
+def _percent(share: float) -> str:
+    return f'{100.0 * share:.1f} % rms of the peak wanted force'

@@ -6,19 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.recordings.difference import SignalDifference, by_importance, quantity_text
+from engine_mount.recordings.difference import signal_table
+from engine_mount.recordings.losses import as_table
 from engine_mount.recordings.losses import sentences as audit_sentences
 from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
 from engine_mount.reports.drawing.chart import DASHED, Array, Chart, Curve, Panel, Span
 from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
 from engine_mount.reports.sections.motion import TIME_LABEL
-from engine_mount.reports.sections.section import Cell, Section, Table, moment
+from engine_mount.reports.sections.section import Section, Table, moment
 from engine_mount.reports.sections.subject import Signal, Subject, Tracking, shared_sentences
 
 _COVERING = 0.95  # chosen: this share of the longest counts as all
-_AT_LIMIT = 0.999  # chosen: this share of the limit counts as at the limit
-_ROWS = 25  # of the table of differences
 _FOLDED = 20  # parameters, chosen: more are shown on demand
 _BEFORE, _AFTER = 0.4, 0.6  # s, chosen: shown round the largest force
 HEAD_OF_SESSION = ('scenario', 'mode', 'started')
@@ -51,7 +50,7 @@ def coil(subjects: Sequence[Subject]) -> Section:
         if current is None:
             said.append((subject, 'no current was recorded'))
             continue
-        run, setpoint = subject.run, subject['setpoint']
+        run = subject.run
         resistance = f'R = {run.resistance:g} ohm'
         if run.unknown:
             said.append((subject, f'{what}; {resistance} assumed, its default: {run.unknown}'))
@@ -60,18 +59,11 @@ def coil(subjects: Sequence[Subject]) -> Section:
         for stretch, inside in _stretches(subject, current.time):
             known = np.where(inside, current.values, np.nan)
             load = coil_load(current.time, known, run.resistance)
-            share = math.nan
-            if setpoint is not None and run.current_limit is not None:
-                first, last = current.time[inside][0], current.time[inside][-1]
-                chosen = np.interp(setpoint.time, current.time, inside.astype(float)) > 0.5
-                chosen &= (setpoint.time >= first) & (setpoint.time <= last)
-                answers = np.where(chosen, setpoint.values, np.nan)
-                share = share_at_limit(setpoint.time, answers, run.current_limit)
-            figures = (*load[1:4], load.energy, 100.0 * share)
-            cells = [_digits(value, digits) for value, digits in zip(figures, (3, 3, 3, 2, 2), strict=True)]
+            figures = zip(load[1:], (3, 3, 3, 2), strict=True)
+            cells = ['not known' if math.isnan(value) else f'{value:.{n}f}' for value, n in figures]
             rows.append((f'{subject.prefix}{stretch}', f'{load.duration:.2f}', *cells))
     head = (
-        '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)', 'at the limit (%)',
+        '', 'time (s)', 'rms current (A)', 'highest (A)', 'heat R i² (W)', 'heat (J)',
     )  # fmt: skip
     words, tables = shared_sentences(subjects, said), [Table(head, rows)] if rows else []
     return Section('coil', 'Current and load of the coil', words, None, tables)
@@ -82,7 +74,9 @@ def coil_load(time: Array, current: Array, resistance: float) -> CoilLoad:
 
     Each sample holds until the next; unknown ones do not count. NaN where nothing is known.
     """
-    held, known = _held(time), np.isfinite(current)
+    known, held = np.isfinite(current), np.diff(time, append=time[-1:])
+    if len(time) > 1:
+        held[-1] = np.median(held[:-1])
     duration = float(held[known].sum())
     if duration <= 0.0:
         return CoilLoad(0.0, *(math.nan,) * 4)
@@ -90,15 +84,6 @@ def coil_load(time: Array, current: Array, resistance: float) -> CoilLoad:
     mean_square = float(np.sum(flowing**2 * held[known])) / duration
     heat = resistance * mean_square
     return CoilLoad(duration, math.sqrt(mean_square), float(np.max(np.abs(flowing))), heat, heat * duration)
-
-
-def share_at_limit(time: Array, current: Array, limit: float) -> float:
-    """Return the share of the known `time` at which `current` is at `limit` (A), NaN where none is known."""
-    held, known = _held(time), np.isfinite(current)
-    duration = float(held[known].sum())
-    return (
-        float(held[known & (current >= _AT_LIMIT * limit)].sum()) / duration if duration > 0.0 else math.nan
-    )
 
 
 def tracking(subjects: Sequence[Subject]) -> Section:
@@ -140,26 +125,13 @@ def tracking(subjects: Sequence[Subject]) -> Section:
 def losses(subjects: Sequence[Subject]) -> Section:
     """Return what is missing of each topic, and the faults."""
     words, tables = [], []
-    head = (
-        'topic', 'expected', 'present', 'lost', 'twice', 'longest gap (ms)', 'jitter (µs)', 'remark',
-    )  # fmt: skip
     for subject in subjects:
-        words.append(f'{subject.prefix}{audit_sentences(subject.audits, subject.losses)[-1]}')
+        words += [f'{subject.prefix}{each}' for each in audit_sentences(subject.audits, subject.losses)]
         if subject.losses.faults:
             faults = [(moment(fault.time), fault.node, fault.sentence) for fault in subject.losses.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{subject.prefix}faults'))
-        rows = [
-            (
-                name,
-                *map(_text, (entry.expected, entry.present, entry.lost, entry.duplicated)),
-                _digits(1e3 * entry.longest_gap_s, 1, ''),
-                _digits(1e6 * entry.jitter_s, 1, ''),
-                entry.remark,
-            )
-            for name, entry in subject.audits.items()
-        ]
-        marked = frozenset(place for place, entry in enumerate(subject.audits.values()) if not entry.sound)
-        tables.append(Table(head, rows, subject.prefix.removesuffix(': '), marked))
+        found = as_table(subject.audits)
+        tables.append(Table(found.heads, found.rows, subject.prefix.removesuffix(': '), found.marked))
     return Section('losses', 'Losses and faults', words, None, tables)
 
 
@@ -172,24 +144,9 @@ def differences(subjects: Sequence[Subject]) -> Section | None:
         f'A is {comparison.name_a}, B is {comparison.name_b}; {alignment_sentence(comparison.alignments)}.',
         *(f'- {sentence}' for sentence in comparison.sentences()),
     ]
-    ordered = by_importance(comparison.signals)
-    rows: list[Sequence[Cell]] = [
-        (
-            signal.name,
-            f'{signal.differing} of {signal.samples}',
-            '' if signal.first is None else moment(signal.first.time),
-            'unknown'
-            if (most := signal.largest) is None
-            else quantity_text(abs(most.difference), signal.unit),
-            '' if most is None else moment(most.time),
-            quantity_text(signal.rms, signal.unit),
-        )
-        for signal in ordered[:_ROWS]
-    ]
-    if len(ordered) > _ROWS:
-        words.append(f'{len(ordered) - _ROWS} more signals differ than the table holds.')
-    head = ('signal', 'samples that differ', 'first', 'largest', 'at', 'rms')
-    return Section('differences', 'Differences', words, None, [Table(head, rows)] if rows else [])
+    found = signal_table(comparison.signals)
+    tables = [Table(found.heads, found.rows)] if found.rows else []
+    return Section('differences', 'Differences', words, None, tables)
 
 
 def parameters(subjects: Sequence[Subject]) -> Section:
@@ -217,12 +174,6 @@ def parameters(subjects: Sequence[Subject]) -> Section:
     return Section('parameters', 'Parameters and versions', words, None, tables)
 
 
-def _largest(signal: SignalDifference) -> tuple[Cell, Cell]:
-    if signal.largest is None:
-        return 'unknown', ''
-    return quantity_text(abs(signal.largest.difference), signal.unit), moment(signal.largest.time)
-
-
 def _current(subject: Subject) -> tuple[Signal | None, str]:
     """Return the current that is known for most of the recording, and what it is; the truest of equals."""
     found = [(signal, what) for name, what in _CURRENTS.items() if (signal := subject[name]) is not None]
@@ -247,14 +198,6 @@ def _stretches(subject: Subject, time: Array) -> list[tuple[str, np.ndarray]]:
     return [(name, inside) for name, inside in found if inside.any()]
 
 
-def _held(time: Array) -> Array:
-    """Return how long each sample holds (s), the last one as long as is usual."""
-    held = np.diff(time, append=time[-1:])
-    if len(time) > 1:
-        held[-1] = np.median(held[:-1])
-    return held
-
-
 def _value(values: Mapping[str, Any], name: str) -> str:
     if name not in values:
         return '' if values else 'not known'
@@ -262,11 +205,3 @@ def _value(values: Mapping[str, Any], name: str) -> str:
     if isinstance(value, list):
         return ', '.join(map(str, value))
     return f'{value:g}' if isinstance(value, float) else str(value)
-
-
-def _digits(value: float, digits: int, unknown: str = 'not known') -> str:
-    return unknown if math.isnan(value) else f'{value:.{digits}f}'
-
-
-def _text(value: int | None) -> str:
-    return '' if value is None else str(value)

@@ -11,12 +11,11 @@ GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
 
 @dataclass(frozen=True)
 class Link:
-    """A text that leads to a section; where it has a chart, to the time `at` (s) and so much `around` it."""
+    """A text that leads to a section; where it has a chart, to the time `at` (s) in it."""
 
     text: str
     section: str
     at: float | None = None
-    around: float = 0.5
 
 
 Cell = str | Link

@@ -28,7 +28,7 @@ from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
 from engine_mount.reports.drive.undamped import Undamped, UndampedError, undamped_of
-from engine_mount.reports.sections.periodic import Sine, Sweep, dominant_sine, find_sweep
+from engine_mount.reports.sections.periodic import Sine, dominant_sine
 from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy import switched_viscous
 from mount_models.quantity import with_flattened
@@ -60,7 +60,6 @@ QUANTITIES = {
     'true current': ((_TRUTH, 'coil_current'),),
     'measured current': ((COIL_RIPPLE.name, 'coil_current'),),
     'damping': ((CONTROL_TRACE.name, 'damping_active'),),
-    'road': ((_TRUTH, 'road_height'),),
 }
 """Topic and column of what a report shows, in SI units; of several the first that was recorded."""
 _NEEDED: dict[str, set[str]] = {topic: set(columns) for topic, columns in DRIVE_COLUMNS.items()}
@@ -302,12 +301,6 @@ class Subject:
         sine = dominant_sine(moved.time[inside], moved.values[inside])
         held = float(np.ptp(moved.time[inside])) if inside.any() else 0.0
         return ((begin, end), sine) if sine.share >= _SINE_SHARE and held * sine.frequency >= 3.0 else None
-
-    @property
-    def sweep(self) -> Sweep | None:
-        """The sweep of the excitation: of the road where it is known, else of the displacement."""
-        signals = filter(None, (self['road'], self['displacement']))
-        return next(filter(None, (find_sweep(one.time, one.values) for one in signals)), None)
 
     def _steady_candidate(self, moved: Signal) -> tuple[float, float]:
         longest = max(self.damping or [], key=lambda span: span[1] - span[0], default=(0.0, 0.0))

@@ -1,5 +1,7 @@
 // Mouse, touch and keys of a report; data-drawn of the root counts its charts, data-ready ends that.
 
+const AROUND = 0.5; // s, chosen: shown to either side of what a number links to
+
 function show(chart, from, to) { // at most all of it, at least a ten-thousandth
   const [low, high] = chart.whole, span = Math.min(high - low, Math.max(to - from, (high - low) / 1e4));
   const begin = Math.min(Math.max(low, (from + to - span) / 2), high - span);
@@ -84,8 +86,8 @@ document.addEventListener('click', (event) => {
   const chart = link && charts.find((each) => `#${each.place.dataset.chart}` === link.hash);
   if (!chart) return;
   event.preventDefault();
-  const at = Number(link.dataset.at), around = Number(link.dataset.around);
-  show(chart, at - around, at + around);
+  const at = Number(link.dataset.at);
+  show(chart, at - AROUND, at + AROUND);
   read(chart, at);
   chart.place.scrollIntoView({ block: 'center' });
   chart.place.focus({ preventScroll: true });
