@@ -23,7 +23,7 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
-from engine_mount.signals.times import SLOWEST, may_hold_times, times_of
+from engine_mount.signals.times import SLOWEST, is_time, times_of
 from engine_mount.signals.units import is_unit, unit_of
 from mount_models.arithmetic.averages import mean
 
@@ -173,7 +173,7 @@ def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     wanted += [mapping.time.column] if timed and mapping.time.column else []
     names = {heading_of(there, text, str(source)).name for text in wanted}
     if timed and not mapping.time.column:
-        names |= may_hold_times(there)
+        names |= {one.name for one in there if is_time(one)}
     return read(source, [one.name for one in there if one.name in names], mapping.stated)
 
 
