@@ -99,7 +99,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     With `gap` the controller is activated with that one instead of the recorded ones.
     """
     recording.load(topic.name for topic in _READ if topic.name in recording)
-    displacement = _displacement(recording)
+    displacement = displacement_of(recording)
     notes = Notes(recording.time_axis.zero)
     session = session_of(recording, notes)
     parameters = parameters_of(session, notes)
@@ -171,7 +171,8 @@ def recorded_answers(
 # Samples.
 
 
-def _displacement(recording: Recording) -> tuple[Times, Column]:
+def displacement_of(recording: Recording) -> tuple[Times, Column]:
+    """Return stamps (ns), rising, and displacement (m); raises `ReplayError` where there is none."""
     if not has(recording, topics.DISPLACEMENT):
         raise ReplayError(
             f'{recording.path} holds no displacement; it has {", ".join(recording.topics) or "no topic"}. '
