@@ -48,19 +48,16 @@ ALLOWED = {
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
     ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.stored', 'np.cumsum'): 'whole numbers',
-    ('engine_mount.signals.even_grid', 'np.mean'): 'shares of whole numbers',
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.time_axis', 'np.interp'): 'times told to people',
+    ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',
     ('engine_mount.recordings.times', '**'): 'rates of topics, for the eye',
     ('engine_mount.recordings.times', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
-    ('engine_mount.signals.formats.trees.leaves', 'math.prod'): 'whole numbers',
-    ('engine_mount.signals.formats.trees.layouts', 'math.prod'): 'whole numbers',
+    ('engine_mount.signals.formats.arrays', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',
-    ('engine_mount.signals.formats.trees.matlab', 'scipy'): 'reads files',
-    ('engine_mount.signals.sources.patience', '**'): 'how long is waited for a store',
 }
 
 

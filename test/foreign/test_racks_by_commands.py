@@ -9,8 +9,8 @@ import json
 import numpy as np
 import pytest
 from command import done, refused
+from foreign_files import MAKERS, make_csv
 
-from engine_mount.signals.testing import MAKERS, make_csv
 from mount_sim.plant.reluctance import ReluctanceActuator, force
 from mount_sim.rack.friction import RackNoise, sawtooth
 

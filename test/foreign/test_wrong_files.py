@@ -38,7 +38,7 @@ BACK = np.concatenate([TIMES[:500], TIMES[500:] - 1.0])
 WRONG = {
     'g without a unit': (
         drive, ('t,az', T, SHAKING / GRAVITY + 1.0), ('--column', 'az'),
-        ("column 'az'", 'a mean of 1', 'looks like g', '--column acceleration=az:g'),
+        ("column 'az'", 'a mean of 1', 'could be g', '--column acceleration=az:g'),
     ),
     'could be g': (
         drive, ('t,az', T, SHAKING), ('--column', 'az'),
@@ -50,11 +50,11 @@ WRONG = {
     ),
     'header says g, values are m/s^2': (
         drive, ('t [s],az [g]', T, SHAKING + GRAVITY), ('--column', 'az'),
-        ("column 'az'", '9.81 times gravity', 'looks like m/s^2', '--column acceleration=az:m/s^2'),
+        ("column 'az'", '9.81 times gravity', 'could be m/s^2', '--column acceleration=az:m/s^2'),
     ),
     'the hand says g, values are m/s^2': (
         drive, ('t,az', T, SHAKING + GRAVITY), ('--column', 'az:g'),
-        ("column 'az'", 'a mean of 9.8', 'looks like m/s^2', '--column acceleration=az:m/s^2'),
+        ("column 'az'", '9.81 times gravity', 'could be m/s^2', '--column acceleration=az:m/s^2'),
     ),
     'mg without a unit': (
         drive, ('t,az', T, 1e3 * (SHAKING / GRAVITY + 1.0)), ('--column', 'az'),
@@ -86,7 +86,7 @@ WRONG = {
     ),
     'micrometres': (
         replay, ('t,x', T, 1e3 * TRAVEL), ('--map', 'displacement=x'),
-        ("column 'x'", 'from -798', 'looks like um', '--map displacement=x:um'),
+        ("column 'x'", 'from -798', 'could be um', '--map displacement=x:um'),
     ),
     'millimetres': (
         replay, ('t,x', T, TRAVEL), ('--map', 'displacement=x'),
@@ -118,7 +118,7 @@ WRONG = {
     ),
     'times that stand still': (
         drive, ('t [s],az', 0.0 * T, SHAKING), ('--column', 'az:m/s^2', '--time', 't:s'),
-        ("column 'az'", 'does not rise', 'remove the repeated'),
+        ("column 'az'", 'does not rise', 'sort the samples'),
     ),
     'a gap': (
         drive, ('t [s],az', T + 0.4 * (T >= 2.0), SHAKING), ('--column', 'az:m/s^2'),

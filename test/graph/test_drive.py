@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.drives.replay import ReplayOrder, replay_without_output
+from engine_mount.drives.replay import replay
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
 from engine_mount.recordings.node_reports import node_reports
@@ -94,7 +94,7 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
         assert recorded_sample_rate(recording) == 2000.0
         assert set(np.diff(recording['displacement'].stamps)) == {500_000}
         assert result.figures['lost_samples'] == result.figures['unanswered_samples'] == 0
-    replayed = replay_without_output(ReplayOrder(both[1].folder / 'recording'))
+    replayed = replay(both[1].folder / 'recording')
     assert replayed.agreement is not None
     assert replayed.agreement.equal
 

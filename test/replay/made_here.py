@@ -17,7 +17,7 @@ from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
 
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.replay import CORE, ReplayOrder, replay
+from engine_mount.drives.replay import replay
 from engine_mount.signals.excitation import build_excitation
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
@@ -53,7 +53,7 @@ def make(folder: Path, references: Path, recordings: list[Path]) -> dict[str, bo
     np.savez(folder / 'numbers.npz', **numbers(folder))
     met = {}
     for each in [*sorted(path for path in references.iterdir() if path.is_dir()), *recordings]:
-        outcome = replay(ReplayOrder(each, CORE, out=folder / 'replays' / each.name))
+        outcome = replay(each, out=folder / 'replays' / each.name)
         met[each.name] = outcome.held
     return met
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine_mount.drives.loop import chain as core_chain
 from engine_mount.drives.loop import run as core_run
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreOutcome, run_core
@@ -20,6 +19,7 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
 from engine_mount.reports.drive.evaluation import switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.settings import chosen
 from engine_mount.settings.chosen import policy_of
 from engine_mount.signals.excitation import build_excitation
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
@@ -232,7 +232,7 @@ def test_without_compensation_a_warm_coil_would_shift_both_gaps():
     settings = {**SHORT, 'electronics.coil_temperature': 40.0, 'temperature.copper': 0.0}
     unaware = replace(default_specimen(), temperature=None)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(core_chain, 'chosen_specimen', lambda *_: unaware)
+        patch.setattr(chosen, 'chosen_specimen', lambda *_: unaware)
         result = run_core({'mount_sim': settings}, lambda topic, raw, stamp: None).result
     assert result is not None
     assert result.rest_gap - 508e-6 == pytest.approx(-26e-6, abs=3e-6)
@@ -273,16 +273,16 @@ def test_a_plant_that_has_blown_up_ends_the_run_with_the_moment(monkeypatch):
 
 
 def test_a_controller_that_finds_itself_spoiled_is_counted_and_begins_afresh(run, monkeypatch):
-    take_many, poisoned = core_run._take_many, []
+    take_many, poisoned = core_run.MountRun.take_many, []
 
-    def take_many_and_poison(mount, chain, samples, pending):
-        if mount.time > 5.0 and not poisoned:
-            controller = chain.loop.controller
+    def take_many_and_poison(self):
+        if self.mount.time > 5.0 and not poisoned:
+            controller = self.chain.loop.controller
             controller.memory.state.view(controller.compiled.state)['policy']['band']['z1'] = np.nan
-            poisoned.append(mount.sample)
-        return take_many(mount, chain, samples, pending)
+            poisoned.append(self.mount.sample)
+        return take_many(self)
 
-    monkeypatch.setattr(core_run, '_take_many', take_many_and_poison)
+    monkeypatch.setattr(core_run.MountRun, 'take_many', take_many_and_poison)
     recorded = run(BENCH)
     trace = recorded[topics.CONTROL_TRACE]
     place = recorded[topics.CONTROL_TRACE].stamps.tolist().index(poisoned[0] * 1_000_000)

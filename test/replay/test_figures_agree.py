@@ -13,7 +13,7 @@ import engine_mount
 from engine_mount.cli.command import app
 from engine_mount.drives import drive as driving
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BENCH = (
@@ -74,9 +74,7 @@ def spoiled(folder: Path) -> None:
 
 
 def mark(words: str) -> bytes:
-    from std_msgs.msg import String
-
-    return serialised(String(data=f'{{kind: fault, text: {words}}}'))
+    return string_message(f'{{kind: fault, text: {words}}}')
 
 
 def told(folder: Path, *options: str) -> Told:
@@ -105,15 +103,15 @@ def good(tmp_path_factory) -> Told:
 @pytest.fixture(scope='module')
 def bad(tmp_path_factory) -> Told:
     """The same drive, of which the recording was spoiled before anybody looked at it."""
-    record = driving.record_drive
+    drive = driving.drive
 
-    def record_and_spoil(order, console):
-        folder, run, complaints = record(order, console)
-        spoiled(folder.recording)
-        return folder, run, complaints
+    def drive_and_spoil(**options):
+        driven = drive(**options)
+        spoiled(driven.recording)
+        return driven
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(driving, 'record_drive', record_and_spoil)
+        patch.setattr(driving, 'drive', drive_and_spoil)
         return told(tmp_path_factory.mktemp('bad') / 'run')
 
 

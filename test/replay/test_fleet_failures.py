@@ -20,7 +20,6 @@ from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
 from engine_mount.fleet.tables import WritingError
 from engine_mount.signals.sources import remote
-from engine_mount.signals.sources.patience import Patience
 from engine_mount.signals.sources.source import StoreAwayError
 
 # The stores are those that the tests of engine_mount.signals fetch from.
@@ -190,7 +189,8 @@ def test_a_store_that_is_away_for_a_while_is_waited_for(away, whole, tmp_path):
 
 
 def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_path, inside, monkeypatch):
-    monkeypatch.setattr(remote, 'Patience', lambda: Patience(attempts=2, first=1e-3))
+    monkeypatch.setattr(remote, 'ATTEMPTS', 2)
+    monkeypatch.setattr(remote, 'FIRST_PAUSE', 1e-3)
 
     def goes():
         away.away = True

@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from std_msgs.msg import String
 
-from engine_mount.drives.loop import recording as core_recording
-from engine_mount.drives.loop import run as core_run
-from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, _told, replay_without_output
+from engine_mount.drives.loop.run import CoreChain, MountRun
+from engine_mount.drives.replay import LOCKSTEP, change_notes, replay
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
 from mount_ros.topics import EVENT
 
@@ -30,26 +27,25 @@ CHANGES = [
 def changed_drive(tmp_path_factory):
     """A core drive whose controller was changed twice, as mount_control would be, and what it told of it."""
     folder, told, patch = tmp_path_factory.mktemp('changed') / 'recording', [], pytest.MonkeyPatch()
-    take_many, run_core = core_run._take_many, core_recording.run_core
+    take_many, end = MountRun.take_many, MountRun.end
     values = {**PARAMETERS['mount_control'], 'damper': 'viscous_2000'}
 
-    def take_many_and_change(mount, chain, samples, pending):
-        stamp = mount.sample * 1_000_000
+    def take_many_and_change(self):
+        stamp, chain = self.stamp, self.chain
         if len(told) < len(CHANGES) and stamp >= CHANGES[len(told)][0] * 1e9:
             _, _, changes = CHANGES[len(told)]
             values.update({name: new for name, (_, new) in changes.items()})
             chain.loop.controller.change(_law(chain, values))
             told.append((stamp, dated(stamp, change_text('mount_control', changes))))
-        return take_many(mount, chain, samples, pending)
+        return take_many(self)
 
-    def run_core_and_tell(parameters, write, *arguments):
-        outcome = run_core(parameters, write, *arguments)
+    def end_and_report(self):
+        end(self)
         for stamp, text in told:
-            write(EVENT, serialised(String(data=text)), stamp)
-        return outcome
+            self._sink._write(EVENT, string_message(text), stamp)
 
-    patch.setattr(core_run, '_take_many', take_many_and_change)
-    patch.setattr(core_recording, 'run_core', run_core_and_tell)
+    patch.setattr(MountRun, 'take_many', take_many_and_change)
+    patch.setattr(MountRun, 'end', end_and_report)
     record_core(folder, PARAMETERS, session_text({'scenario': 'bench', 'parameters': PARAMETERS}))
     patch.undo()
     assert len(told) == 2
@@ -63,7 +59,7 @@ def _law(chain: CoreChain, values):
 
 def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
     folder, told = changed_drive
-    outcome = replay_without_output(ReplayOrder(folder, CORE))
+    outcome = replay(folder)
     assert outcome.agreement.agrees, outcome.agreement
     assert outcome.given.changes[0].values == {'damper': 'viscous_3500'}
     notes = [note for note in outcome.given.notes if 'was told' in note]
@@ -74,8 +70,7 @@ def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
 
 def test_what_the_replay_is_asked_for_stays_as_asked(changed_drive):
     folder, _ = changed_drive
-    order = ReplayOrder(folder, CORE, changes={'mount_control': {'damper': 'viscous_1000'}})
-    outcome = replay_without_output(order)
+    outcome = replay(folder, {'damper': 'viscous_1000'})
     assert [sorted(change.values) for change in outcome.given.changes] == [['eigenfrequency', 'lead_time']]
     (run,) = outcome.replayed.runs
     moving = run.traces['damping_active'] == 1.0
@@ -86,5 +81,5 @@ def test_what_the_replay_is_asked_for_stays_as_asked(changed_drive):
 
 def test_a_replay_in_lock_step_says_that_it_does_not_change_them(changed_drive):
     folder, _ = changed_drive
-    given = replay_without_output(ReplayOrder(folder, CORE)).given
-    assert all(sentence.endswith('does not: use core') for sentence in _told(given, LOCKSTEP))
+    given = replay(folder).given
+    assert all(sentence.endswith('does not: use core') for sentence in change_notes(given, LOCKSTEP))

@@ -1,6 +1,5 @@
 """Another policy than the paper's, one file and one line: driven, recorded, replayed, asked afterwards."""
 
-import io
 import sys
 from pathlib import Path
 
@@ -8,11 +7,10 @@ import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, parsed_changes, replay_without_output
+from engine_mount.drives.replay import replay
 from engine_mount.recordings.compare import compare
-from engine_mount.recordings.screen import Screen
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
@@ -67,10 +65,10 @@ def test_a_recording_names_the_policy_and_what_it_traced(drives):
     assert 'policy: viscous_example' in recording.latched('session').data
 
 
-@pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
+@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
 @pytest.mark.parametrize('policy', ['switched_viscous', 'continuous_viscous', 'viscous_example'])
-def test_each_is_replayed_to_the_bit(drives, policy, mode):
-    outcome = replay_without_output(ReplayOrder(drives[policy], mode))
+def test_each_is_replayed_to_the_bit(drives, policy, lockstep):
+    outcome = replay(drives[policy], lockstep=lockstep)
     assert outcome.agreement.equal, outcome.agreement
 
 
@@ -99,24 +97,21 @@ def test_openings_are_compared_as_a_switch_and_as_a_signal(drives, tmp_path):
 def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tmp_path):
     parameters = {'mount_sim': SIM, 'mount_control': {'policy': 'switched_viscous'}}
     record_core(tmp_path / 'old', parameters, session_text({'parameters': {'mount_sim': SIM}}))
-    assert replay_without_output(ReplayOrder(tmp_path / 'old', CORE)).agreement.equal
-    order = DriveOrder('bench', 'core', {'mount_sim': SIM}, out=tmp_path / 'new')
-    folder, _, _ = record_drive(order, Screen(io.StringIO()))
-    assert 'policy: continuous_viscous' in engine_mount.open(folder.recording).latched('session').data
-    outcome = replay_without_output(ReplayOrder(folder.recording, CORE))
+    assert replay(tmp_path / 'old').agreement.equal
+    driven = drive(core=True, scenario='bench', parameters={'mount_sim': SIM}, out=tmp_path / 'new')
+    assert 'policy: continuous_viscous' in engine_mount.open(driven.recording).latched('session').data
+    outcome = replay(driven.recording)
     assert outcome.agreement.equal
     assert 'amplitude' in outcome.replayed.runs[0].traces.dtype.names
 
 
 def test_a_change_that_the_recorded_policy_does_not_know_is_refused(drives):
-    changes = parsed_changes({'continuous_viscous.quality': 0.7})
     with pytest.raises(ParameterError, match='for the chosen policy is switched_viscous'):
-        replay_without_output(ReplayOrder(drives['switched_viscous'], CORE, changes=changes))
+        replay(drives['switched_viscous'], {'continuous_viscous.quality': 0.7})
 
 
 def test_a_recording_is_asked_what_another_policy_would_have_answered(drives):
-    changes = parsed_changes(CHOSEN)
-    outcome = replay_without_output(ReplayOrder(drives['switched_viscous'], CORE, changes=changes))
+    outcome = replay(drives['switched_viscous'], CHOSEN)
     (run,) = outcome.replayed.runs
     assert 'magnitude' not in run.traces.dtype.names
     moving = run.traces['predicted_velocity'] != 0.0

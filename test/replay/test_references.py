@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.drives.inputs.input import Notes, recorded_parameters
-from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from engine_mount.drives.inputs.consumed_samples import Notes
+from engine_mount.drives.inputs.input import recorded_parameters
+from engine_mount.drives.replay import replay
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
 from engine_mount.recordings.session import (
@@ -24,14 +25,14 @@ REFERENCES = sorted(
 )
 
 
-@pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
+@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
 @pytest.mark.parametrize('reference', REFERENCES, ids=lambda folder: folder.name)
-def test_the_accepted_setpoints_are_met_to_the_bit(reference, mode, domain, tmp_path):
-    outcome = replay(ReplayOrder(reference, mode, out=tmp_path / 'replay', domain=domain))
-    told = differences_from_reference(reference, outcome.folder.recording)
+def test_the_accepted_setpoints_are_met_to_the_bit(reference, lockstep, domain, tmp_path):
+    outcome = replay(reference, lockstep=lockstep, out=tmp_path / 'replay', domain=domain)
+    told = differences_from_reference(reference, outcome.recording)
     assert not told, '\n'.join(
         [
-            f'{reference.name}, {mode}:',
+            f'{reference.name}, {outcome.mode}:',
             *told,
             versions_sentence(version_differences(outcome.given.session, versions()), versions()),
             f'if this is meant: engine-mount accept REPLAY --reference {reference.name} --reason "..."',

@@ -9,7 +9,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from std_msgs.msg import String
 from typer.testing import CliRunner, Result
 
 import engine_mount
@@ -20,7 +19,7 @@ from engine_mount.reports.pages import default_pictures
 from engine_mount.reports.sections import overview as overview_section
 from engine_mount.reports.signals import Signals
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 
 REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
 PAPER = ('--set', 'mount_control.policy=switched_viscous')
@@ -212,8 +211,8 @@ def test_a_foreign_recording_gets_a_page_that_says_what_is_missing(tmp_path):
     writer = BagWriter(tmp_path / 'foreign')
     writer.add_topic('/chatter', 'std_msgs/msg/String')
     writer.add_topic('/session', 'std_msgs/msg/String')
-    writer.write('/chatter', serialised(String(data='hello')), 1_000)
-    writer.write('/session', serialised(String(data='note: </script><script>alert(1)</script>')), 2_000)
+    writer.write('/chatter', string_message('hello'), 1_000)
+    writer.write('/session', string_message('note: </script><script>alert(1)</script>'), 2_000)
     writer.close()
     result = command('report', tmp_path / 'foreign')
     assert result.exit_code == 0, result.output
@@ -353,7 +352,7 @@ def test_a_moment_has_the_same_time_in_a_report_and_among_the_events(bench, tmp_
         for place, log in enumerate(series.receive_times.tolist()):
             writer.write(f'/{name}', series.payloads[place], log + shift)
     stamp = int(drive['displacement'].stamps[3000])
-    writer.write('/event', serialised(String(data=f'{{time: {stamp}, kind: bump}}')), stamp + 9_000_000)
+    writer.write('/event', string_message(f'{{time: {stamp}, kind: bump}}'), stamp + 9_000_000)
     writer.close()
     late = engine_mount.open(tmp_path / 'late')
     events = [(event.kind, event_time(event, late.time_axis)) for event in recorded_events(late)]

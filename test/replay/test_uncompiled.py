@@ -19,12 +19,12 @@ REPLAYS = """
 import sys, types
 from pathlib import Path
 from mount_models.arithmetic.interpolation import interpolated
-from engine_mount.drives.replay import CORE, ReplayOrder, replay
+from engine_mount.drives.replay import replay
 
 assert isinstance(interpolated, types.FunctionType), 'compiled'
 folder, *references = map(Path, sys.argv[1:])
 for reference in references:
-    replay(ReplayOrder(reference, CORE, out=folder / reference.name))
+    replay(reference, out=folder / reference.name)
 """
 
 

@@ -3,9 +3,9 @@
 import pytest
 
 import engine_mount
-from engine_mount.drives.inputs.ramps import measured_gaps
+from engine_mount.drives.inputs.input import measured_gaps
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder, replay
+from engine_mount.drives.replay import replay
 from engine_mount.recordings.reference import accept
 from mount_recorder.session import session_text
 
@@ -30,9 +30,9 @@ def warm_drive(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize('mode', [CORE, LOCKSTEP])
-def test_the_replayed_initialisation_finds_the_recorded_gaps_to_the_bit(warm_drive, mode, domain, tmp_path):
-    outcome = replay(ReplayOrder(warm_drive, mode, out=tmp_path / 'replay', domain=domain))
+@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
+def test_a_replayed_initialisation_finds_its_gaps_to_the_bit(warm_drive, lockstep, domain, tmp_path):
+    outcome = replay(warm_drive, lockstep=lockstep, out=tmp_path / 'replay', domain=domain)
     assert outcome.held
     (ramp,) = outcome.replayed.ramps
     (recorded,) = measured_gaps(engine_mount.open(warm_drive))
@@ -47,4 +47,4 @@ def test_a_reference_keeps_the_temperatures_of_its_initialisation(warm_drive, tm
     accepted = accept(engine_mount.open(warm_drive), 'warm', 'a warm coil', tmp_path)
     stamps = engine_mount.open(accepted.folder)['coil_temperature'].stamps
     assert stamps.tolist() == [100_000_000 * k for k in range(28)]
-    assert replay(ReplayOrder(accepted.folder, CORE, out=tmp_path / 'replay')).held
+    assert replay(accepted.folder, out=tmp_path / 'replay').held

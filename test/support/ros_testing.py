@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
@@ -50,6 +50,20 @@ def free_domain() -> Iterator[int]:
             os.close(handle)
         return
     raise OSError(f'all {_HIGHEST_DOMAIN} ROS domains are held by other tests')
+
+
+def serialised(message: Any) -> bytes:
+    """Return the CDR bytes of a message, without those that the middleware leaves behind its end."""
+    from rclpy.serialization import serialize_message
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, get_typestore
+
+    raw, store = serialize_message(message), get_typestore(Stores.ROS2_JAZZY)
+    kind = f'{type(message).__module__.partition(".")[0]}/msg/{type(message).__name__}'
+    for end in range(len(raw), 0, -1):
+        with contextlib.suppress(SerdeError):  # of bytes behind the end
+            return bytes(store.serialize_cdr(store.deserialize_cdr(raw[:end], kind), kind))
+    raise AssertionError(f'{kind} is not readable')
 
 
 def mutated(content: bytes, seed: int) -> bytes:

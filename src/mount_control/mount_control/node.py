@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.parameter import Parameter
-from std_msgs.msg import String
 
 from mount_control.activation import Activation, AirGap, check_rate
 from mount_control.control_loop import OFF, ControlLoop, SampleCounts
@@ -31,7 +30,7 @@ from mount_models.damper import damper_text
 from mount_models.quantity import ParameterError
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
 from mount_ros.messages.force_table import from_bytes
 from mount_ros.messages.scalars import MessageError, ScalarsLayout
@@ -201,7 +200,7 @@ class MountControl(SafeLifecycleNode):
         self._durations.append(time.monotonic() - begin)
 
     def _send_change(self, stamp: int, text: str) -> None:
-        self._send_event(serialised(String(data=dated(stamp, text))))
+        self._send_event(string_message(dated(stamp, text)))
 
     def _on_air_gap(self, raw: bytes) -> None:
         self._activation.air_gap = self._read(self._air_gap_of, raw)

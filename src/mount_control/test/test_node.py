@@ -11,7 +11,7 @@ import pytest
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from ros_testing import wait_until
 from std_msgs.msg import String
 
@@ -26,9 +26,9 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, load_specimen
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.cdr import message_class, serialised
+from mount_ros.messages.cdr import deserialised, message_class
 from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
@@ -80,7 +80,7 @@ class Surroundings:
         self._air_gap.publish(self._layouts[topics.AIR_GAP].pack(stamp, numbers))
 
     def send_table(self, stamp=ACTIVATION, rows=None):
-        self._table.publish(serialised(to_message(stamp, self._rows if rows is None else rows)))
+        self._table.publish(table_message(stamp, self._rows if rows is None else rows))
 
     def send_raw_table(self, raw):
         self._table.publish(raw)
@@ -439,9 +439,10 @@ def test_a_message_that_is_no_table_takes_the_old_one_away(configured, around):
     control = configured()
     around.initialise()
     wait_until(lambda: control._activation.table is not None, 'the table')
-    message = to_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
+    raw = table_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
+    message = deserialised(raw, topics.CURRENT_FORCE_TABLE.type)
     message.layout.dim[1].label = 'of yesterday'
-    around.send_raw_table(serialised(message))
+    around.send_raw_table(serialize_message(message))
     wait_until(lambda: control._activation.table is None, 'the message')
     assert control.trigger_activate() == FAILURE
     assert 'no current_force_table was received' in control._refusal

@@ -14,8 +14,8 @@ from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_models.coil.heating import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
-from mount_ros.messages.scalars import MessageError, ScalarsLayout
-from mount_ros.messages.sensors import temperature_layout
+from mount_ros.messages.cdr import temperature
+from mount_ros.messages.scalars import MessageError, OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Level, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
@@ -46,7 +46,7 @@ class MountDriver(SafeLifecycleNode):
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
-        self._temperature_layout = temperature_layout()
+        self._temperature_layout = OneNumberLayout(temperature)
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
 
     def configure(self) -> None:

@@ -26,8 +26,7 @@ from mount_models.coil.heating import CoilHeating
 from mount_models.specimen import DEFAULT_SPECIMEN
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class
-from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.sensors import temperature_of
+from mount_ros.messages.scalars import ScalarsLayout, stamp_of, temperature_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT

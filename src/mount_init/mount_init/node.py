@@ -13,10 +13,8 @@ from mount_models.arithmetic.compiled import log_compilation
 from mount_models.specimen import Specimen, chosen_specimen
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
-from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.sensors import temperature_of
+from mount_ros.messages.force_table import table_message
+from mount_ros.messages.scalars import ScalarsLayout, temperature_of
 from mount_ros.messages.verdicts import Level, flags_of, verdicts_of
 from mount_ros.nodes.diagnostics import Finding, Verdict, verdict_on
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -82,10 +80,10 @@ class MountInit(SafeLifecycleNode):
                 raise InitialisationError(reason) from error
             raise
         assert ramp.last_stamp is not None
-        table = to_message(ramp.last_stamp, result.table)
+        table = table_message(ramp.last_stamp, result.table)
         numbers = [getattr(result, name) for name in self._air_gap.names]
         self._send_air_gap(self._air_gap.pack(ramp.last_stamp, numbers))
-        self._send_table(serialised(table))
+        self._send_table(table)
         self.get_logger().info(_summary(result))
         if not self.lockstep:  # there the sample that waits for the next ramp must not be missed
             # No sample is answered any more: without subscriptions there is less to do.

@@ -17,10 +17,9 @@ from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.cdr import message_class
+from mount_ros.messages.cdr import message_class, temperature
 from mount_ros.messages.force_table import from_bytes
-from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.messages.sensors import temperature_layout
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.messages.verdicts import Level
 from mount_ros.qos import publisher_qos
 
@@ -66,7 +65,7 @@ class Electronics:
         )
 
     def send_temperature(self, celsius):
-        self._send_temperature(temperature_layout().pack(self.stamp, celsius))
+        self._send_temperature(OneNumberLayout(temperature).pack(self.stamp, celsius))
 
     def kick(self, answered):
         """Send the next sample unless more than `answered` setpoints have come; return whether they have."""

@@ -9,7 +9,6 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from mount_recorder.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
@@ -21,7 +20,7 @@ from mount_recorder.metadata import OfferedQos
 from mount_recorder.parameters import RecorderParameters, split_of
 from mount_recorder.recorder import Recorder, free_space
 from mount_recorder.watching import FaultWatch, SampleWatch
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import BY_HAND, Mark, mark_text
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -220,7 +219,7 @@ class MountRecorder(SafeLifecycleNode):
         self._marks.mark(MarkKind.RECORDING_LOSS, self._present_time(), text)
 
     def _publish(self, mark: Mark) -> None:
-        self._send_event(serialised(String(data=mark_text(mark))))
+        self._send_event(string_message(mark_text(mark)))
 
     def _publish_automatic(self, mark: Mark) -> None:
         """Publish a mark unless another recorder of this namespace does: of several the first by name."""

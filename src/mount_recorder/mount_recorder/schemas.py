@@ -6,6 +6,7 @@ The texts that rosbags makes of the same types lack their comments: other bytes 
 import importlib.util
 import json
 import re
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -17,19 +18,35 @@ class SchemaError(ValueError):
     """The definition of a message type is not to be found; the text names the type and the place."""
 
 
+other_definitions: Callable[[str], tuple[str, str] | None] | None = None
+"""Returns text and hash of a type that is not installed; the desk sets it, for a desk works without ROS."""
+
+
 def schema_text(type_name: str) -> str:
     """Return the `ros2msg` text of `type_name`: its definition, then that of each dependency once.
 
     The order is that of rosbag2: depth first, the dependencies of one message in alphabetical order.
     `type_name` is such as `sensor_msgs/msg/JointState`; raises `SchemaError`.
     """
-    return _text_with_dependencies(type_name, seen=set())
+    return _definition(type_name)[0]
 
 
 def type_hash(type_name: str) -> str:
     """Return the RIHS01 hash of `type_name` from its installed type description; raises `SchemaError`."""
-    hashes = json.loads(_installed(type_name, 'json'))['type_hashes']
-    return next(entry['hash_string'] for entry in hashes if entry['type_name'] == type_name)
+    return _definition(type_name)[1]
+
+
+@cache
+def _definition(type_name: str) -> tuple[str, str]:
+    try:
+        hashes = json.loads(_installed(type_name, 'json'))['type_hashes']
+        own = next(entry['hash_string'] for entry in hashes if entry['type_name'] == type_name)
+        return _text_with_dependencies(type_name, set()), own
+    except SchemaError:
+        found = other_definitions(type_name) if other_definitions else None
+        if found is None:
+            raise
+        return found
 
 
 def _text_with_dependencies(type_name: str, seen: set[str]) -> str:

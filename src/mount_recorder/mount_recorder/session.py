@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from mount_recorder.versions import versions
+from mount_ros.messages.cdr import string_message
 
 
 def new_session(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -29,8 +30,4 @@ def session_text(content: Mapping[str, Any]) -> str:
 
 def session_message(text: str) -> bytes:
     """Return the serialised message of a session text."""
-    from std_msgs.msg import String  # only here: these load the middleware, which readers do without
-
-    from mount_ros.messages.cdr import serialised
-
-    return serialised(String(data=text))
+    return string_message(text)

@@ -7,13 +7,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from read_back import read_back
+from ros_testing import serialised
 from samples import PERIOD, START, sample
 
 from mount_models.quantity import ParameterError
 from mount_recorder.automatic_marks import BURST, REFILL, AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.recorder import Recorder
 from mount_recorder.watching import FaultWatch, SampleWatch
-from mount_ros.messages.cdr import serialised
 from mount_ros.messages.event import BY_HAND, Mark, mark_text, read_mark
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, DISPLACEMENT, control_trace

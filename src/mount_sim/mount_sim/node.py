@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from std_srvs.srv import SetBool
 
 from mount_driver.bus import open_bus
@@ -18,8 +17,8 @@ from mount_models.arithmetic.compiled import log_compilation
 from mount_models.quantity import ParameterError, flattened
 from mount_ros import topics
 from mount_ros.data_path import DataPath
+from mount_ros.messages.cdr import accelerometer, wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.messages.sensors import level_imu
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
@@ -215,8 +214,8 @@ class _Instruments:
 
     def __init__(self, path: DataPath, name: str = ''):
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
-        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._acceleration = OneNumberLayout(accelerometer)
+        self._force = OneNumberLayout(wrench)
         self._send_truth = path.sender(topics.SIM_TRUTH, name)
         self._send_acceleration = path.sender(topics.SIM_CHASSIS_ACCELERATION, name)
         self._send_force = path.sender(topics.SIM_MOUNT_FORCE, name)

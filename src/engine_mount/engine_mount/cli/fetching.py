@@ -15,7 +15,7 @@ def local(recording: str, console: Console) -> Path:
     from engine_mount.signals.sources.stores import fetched
 
     with TerminalScreen(console).bar(f'fetching {shown(recording)}', transient=True) as bar:
-        return fetched(recording, tell=lambda done, of: bar(done / of, detail=f'{of / 1e6:.1f} MB'))
+        return fetched(recording, lambda done, of: bar(done / of, detail=f'{of / 1e6:.1f} MB'))
 
 
 def beside(recording: Path) -> Path:

@@ -1,14 +1,17 @@
 """Whether a replay gives the recorded answers: matched by stamps, then judged as any two recordings are."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
-from engine_mount.drives.inputs.input import ReplayInput, Times
+from engine_mount.drives.inputs.consumed_samples import Times
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.difference import (
     Column,
+    Moment,
     Quantity,
     SignalDifference,
     signal_difference,
@@ -22,6 +25,8 @@ from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 # band-pass forgets by e^-25 in 1 s, the friction deflection slowly; measured after 3 s: within 0.06 uA.
 SETTLING = 3.0  # s, chosen
 SETTLED = 1e-6  # A, chosen
+SHOWN = 8
+"""Switchings that a summary names one by one."""
 _ACTIVE = 'damping_active'
 _NAMES = ('the recording', 'the replay')
 
@@ -126,6 +131,24 @@ def switching_changes(recorded: Switching, replayed: Switching, sample_time: flo
     a, b = ((np.array(times.on), np.array(times.off)) for times in (recorded, replayed))
     changes = paired_switchings(a, b, sample_time)
     return [change.sentence(*_NAMES) for change in changes if change.alone or change.moved]
+
+
+def switching_text(times: Switching) -> str:
+    """Return when damping was switched, in words."""
+    if not times.on:
+        return 'never on'
+    pairs = [(on, next((off for off in times.off if off > on), None)) for on in times.on]
+    shown = [f'{on:.3f} s to {f"{off:.3f} s" if off is not None else "the end"}' for on, off in pairs]
+    more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
+    return 'on from ' + ', '.join(shown[:SHOWN]) + more
+
+
+def moment_figures(moment: Moment | None) -> dict[str, float | None] | None:
+    """Return a difference as JSON has it: time in s, currents in A, unknown is None."""
+    if moment is None:
+        return None
+    recorded, replayed = (None if math.isnan(value) else value for value in (moment.a, moment.b))
+    return {'time_s': moment.time, 'recorded_a': recorded, 'replayed_a': replayed}
 
 
 def _intermediates(

@@ -7,13 +7,20 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.drives.inputs.input import Column, ControlRun, ReplayError, ReplayInput, Times
-from engine_mount.drives.inputs.parameter_changes import changed
-from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp, initialisation
-from engine_mount.settings.chosen import Parameters, chosen_control
+from engine_mount.drives.inputs.consumed_samples import (
+    Column,
+    ControlRun,
+    MeasuredGap,
+    Ramp,
+    ReplayError,
+    Times,
+)
+from engine_mount.drives.inputs.input import ReplayInput, with_recorded_changes
+from engine_mount.settings.chosen import Parameters, chosen_control, chosen_initialisation
 from mount_control.control_loop import ControlLoop, SampleCounts
 from mount_control.settings import ControlSettings
 from mount_init.errors import InitialisationError
+from mount_init.estimate import TemperatureReadings
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.messages.event import ParametersChanged
@@ -26,14 +33,18 @@ Progress = Callable[[float], None]
 
 @dataclass
 class ControlAnswers:
-    """What the controller answered in one run: a setpoint (A) for each sample, and the traced steps."""
+    """The answers of the controller in one run: a setpoint (A) for each sample, and the traced steps.
+
+    `traces` are records of the policy, one for each sample, valid where `traced`. `refusal`: why the table
+    did not hold until the end, or empty.
+    """
 
     stamps: Times
     setpoints: Column
     traced: NDArray[np.bool_]
-    traces: NDArray[np.void]  # the policy's records, one for each sample; only where `traced`
+    traces: NDArray[np.void]
     counts: SampleCounts
-    refusal: str = ''  # why the table did not hold until the end, or empty
+    refusal: str = ''
 
 
 @dataclass
@@ -47,12 +58,14 @@ class RampAnswers:
 
 @dataclass
 class Replayed:
-    """The answers in the order of the parts that were replayed; times in s."""
+    """The answers in the order of the parts that were replayed, and the gap with which each run began.
+
+    `control_time` (s) is the time that the runs of the controller took.
+    """
 
     parts: list[RampAnswers | ControlAnswers] = field(default_factory=list)
-    gaps: list[MeasuredGap] = field(default_factory=list)  # with which each run of the controller began
-    wall_time: float = 0.0
-    control_time: float = 0.0  # share of the runs of the controller
+    gaps: list[MeasuredGap] = field(default_factory=list)
+    control_time: float = 0.0
 
     @property
     def runs(self) -> list[ControlAnswers]:
@@ -65,29 +78,44 @@ class Replayed:
         return [part for part in self.parts if isinstance(part, RampAnswers)]
 
 
-def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
-    """Replay all parts with these parameters of the nodes; raises a `ValueError` where one is refused."""
+def replay_parts(
+    given: ReplayInput,
+    play_ramp: Callable[[Ramp], RampAnswers],
+    play_run: Callable[[ControlRun, MeasuredGap], ControlAnswers],
+) -> Replayed:
+    """Replay all parts; a run begins with the gap that the replayed initialisation before it has measured."""
     replayed = Replayed()
-    begin = time.perf_counter()
-    result: MeasuredGap | None = None
+    measured: MeasuredGap | None = None
     for part in given.parts:
         if isinstance(part, Ramp):
-            answers = run_ramp(part, parameters)
-            result = answers.gap
-            replayed.parts.append(answers)
+            ramp = play_ramp(part)
+            measured = ramp.gap
+            replayed.parts.append(ramp)
             continue
-        gap = result if result is not None and result.stamp == part.gap.stamp else part.gap
-        part_begin = time.perf_counter()
-        replayed.parts.append(run_control(part, gap, parameters, given.changes))
-        replayed.control_time += time.perf_counter() - part_begin
+        gap = measured if measured is not None and measured.stamp == part.gap.stamp else part.gap
+        begin = time.perf_counter()
+        replayed.parts.append(play_run(part, gap))
+        replayed.control_time += time.perf_counter() - begin
         replayed.gaps.append(gap)
-    replayed.wall_time = time.perf_counter() - begin
     return replayed
+
+
+def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
+    """Replay all parts with these parameters of the nodes; raises a `ValueError` where one is refused."""
+
+    def play_run(run: ControlRun, gap: MeasuredGap) -> ControlAnswers:
+        replay = ControlReplay(int(run.stamps[0]), gap, parameters, given.changes)
+        return replay.answer(run.stamps, run.displacement)
+
+    return replay_parts(given, lambda ramp: run_ramp(ramp, parameters), play_run)
 
 
 def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:
     """Return setpoints and result of an initialisation from its recorded samples."""
-    core = initialisation({node: dict(values) for node, values in parameters.items()}, ramp.temperatures)
+    readings = TemperatureReadings()
+    for stamp, celsius in ramp.temperatures:
+        readings.take(stamp, celsius)
+    core = chosen_initialisation(parameters, readings)
     setpoints = np.array([core.step(*sample) for sample in ramp.samples()])
     try:
         result = core.result()
@@ -97,16 +125,6 @@ def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:
     numbers = {name: float(getattr(result, name)) for name in topics.AIR_GAP.names}
     table = ForceTable(core.last_stamp, result.table[0], result.table[1])
     return RampAnswers(ramp.stamps, setpoints, MeasuredGap(core.last_stamp, numbers, table))
-
-
-def run_control(
-    run: ControlRun, gap: MeasuredGap, parameters: Parameters, changes: Sequence[ParametersChanged] = ()
-) -> ControlAnswers:
-    """Return what mount_control answers to the samples of a run, activated with `gap`.
-
-    `changes` of its parameters act from the sample of their stamp on.
-    """
-    return ControlReplay(int(run.stamps[0]), gap, parameters, changes).answer(run.stamps, run.displacement)
 
 
 class ControlReplay:
@@ -119,44 +137,39 @@ class ControlReplay:
         parameters: Parameters,
         changes: Sequence[ParametersChanged] = (),
     ):
-        """Activate with `gap` before the sample of stamp `first` (ns); `changes` as for `run_control`."""
-        self._begun = changed(parameters, [change for change in changes if change.time <= first])
-        self._later = [change for change in changes if change.time > first]
-        self._made = 0
-        self._loop = loop_from(gap, self._begun, activation_before(first))
+        """Activate with `gap` before the sample of stamp `first` (ns).
+
+        `changes` of its parameters act from the sample of their stamp on.
+        """
+        begun = with_recorded_changes(parameters, [change for change in changes if change.time <= first])
+        later = [change for change in changes if change.time > first]
+        self._later = [
+            (change.time, chosen_control(with_recorded_changes(begun, later[: number + 1])))
+            for number, change in enumerate(later)
+        ]
+        settings, activation = chosen_control(begun), activation_before(first)
+        table = settings.table(gap.table.current, gap.table.normal_force, gap.numbers['offset_current'])
+        self._loop = ControlLoop()
+        self._loop.note(activation)
+        self._loop.begin(settings, table, activation)
 
     def answer(self, stamps: Times, displacement: Column) -> ControlAnswers:
         """Return the answers to the samples that follow (ns, m); counts and refusal are those until now."""
-        answers = self._loop.step_many(stamps, displacement, self._changed_in(stamps))
+        changes: dict[int, list[ControlSettings]] = {}
+        while self._later and self._later[0][0] <= stamps[-1]:
+            time_of_change, settings = self._later.pop(0)
+            changes.setdefault(int(np.searchsorted(stamps, time_of_change)), []).append(settings)
+        answers = self._loop.step_many(stamps, displacement, changes)
         refusal = self._loop.refusal and f'0 A: {self._loop.refusal}'
         return ControlAnswers(
             stamps, answers.currents, answers.traced, answers.traces, self._loop.counts, refusal
         )
 
-    def _changed_in(self, stamps: Times) -> dict[int, list[ControlSettings]]:
-        """Return the settings by the places of the samples that are the first to be answered by them."""
-        found: dict[int, list[ControlSettings]] = {}
-        while self._made < len(self._later) and self._later[self._made].time <= stamps[-1]:
-            place = int(np.searchsorted(stamps, self._later[self._made].time))
-            self._made += 1
-            settings = chosen_control(changed(self._begun, self._later[: self._made]))
-            found.setdefault(place, []).append(settings)
-        return found
-
 
 def activation_before(first: int) -> int:
     """Return the stamp (ns) by which a run is activated: 1 ms before its `first` sample (ns).
 
-    The recording may begin long after the activation; the controller asks whether the measurements went on
-    from there without a break.
+    The recording may begin long after the activation; the controller checks whether the measurements went
+    on from there without a break.
     """
     return first - SAMPLE_TIME_NS
-
-
-def loop_from(gap: MeasuredGap, parameters: Parameters, activation: int) -> ControlLoop:
-    """Return what answers as mount_control does, activated with `gap` as of the stamp `activation` (ns)."""
-    settings, loop = chosen_control(parameters), ControlLoop()
-    table = settings.table(gap.table.current, gap.table.normal_force, gap.numbers['offset_current'])
-    loop.note(activation)
-    loop.begin(settings, table, activation)
-    return loop

@@ -19,22 +19,37 @@ from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from engine_mount.drives.core import OFF, ControlAnswers, Progress, RampAnswers, Replayed, activation_before
-from engine_mount.drives.inputs.input import Column, ControlRun, ReplayError, ReplayInput, Times
-from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp
+from engine_mount.drives.core import (
+    OFF,
+    ControlAnswers,
+    Progress,
+    RampAnswers,
+    Replayed,
+    activation_before,
+    replay_parts,
+)
+from engine_mount.drives.inputs.consumed_samples import (
+    Column,
+    ControlRun,
+    MeasuredGap,
+    Ramp,
+    ReplayError,
+    Times,
+)
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
 from mount_init.node import MountInit
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.data_thread import DataThread
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import from_bytes, to_message
-from mount_ros.messages.scalars import ScalarsLayout, stamp_of
-from mount_ros.messages.sensors import temperature_layout
+from mount_ros.messages.cdr import temperature
+from mount_ros.messages.force_table import from_bytes
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout, stamp_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.process import ros_context, transition
+from mount_ros.topics import Topic
 
 PATIENCE = 10.0  # s, chosen: a node that answers later does not answer
 _LOOK_PERIOD = 0.1  # s
@@ -47,96 +62,62 @@ def replay_in_lockstep(
     given: ReplayInput, parameters: Parameters, domain: int, progress: Progress = lambda share: None
 ) -> Replayed:
     """Replay all parts through mount_init and mount_control; raises a `ValueError` where one refuses."""
-    replayed = Replayed()
     total = sum(len(part.stamps) for part in given.parts)
     done = 0
+
+    def play(play_part: Callable[..., Any], part: Ramp | ControlRun, *gap: MeasuredGap) -> Any:
+        nonlocal done
+        answers = play_part(part, *gap, lambda samples: progress((done + samples) / total))
+        done += len(part.stamps)
+        return answers
+
     with ros_context(domain) as context:
-        player = _Player(context, parameters)
-        begin = time.perf_counter()
-        for part in given.parts:
-            part_begin = time.perf_counter()
-            player.play(part, replayed, partial(_report, progress, done, total))
-            if isinstance(part, ControlRun):
-                replayed.control_time += time.perf_counter() - part_begin
-            done += len(part.stamps)
-        replayed.wall_time = time.perf_counter() - begin
-    return replayed
+        player = NodePlayer(context, parameters, f'/replay_{os.getpid()}')
+        return replay_parts(given, partial(play, player.play_ramp), partial(play, player.play_run))
 
 
-def _report(progress: Progress, done: int, total: int, samples: int) -> None:
-    progress((done + samples) / total)
-
-
-class _Player:
+class NodePlayer:
     """The other side of the topics, where driver and initialisation stand in the graph."""
 
-    def __init__(self, context: Context, parameters: Parameters):
-        self._context = context
-        self._parameters = parameters
-        self._namespace = f'/replay_{os.getpid()}'
+    def __init__(self, context: Context, parameters: Parameters, namespace: str, *, lockstep: bool = True):
+        self._context, self._parameters, self._namespace = context, parameters, namespace
+        self._lockstep = lockstep
         self._thread = DataThread(context)
-        self._result: MeasuredGap | None = None
 
-    def play(self, part: Ramp | ControlRun, replayed: Replayed, progress: Callable[[int], None]) -> None:
-        """Replay one ramp or run through a node of its own, and append its answers."""
-        if isinstance(part, Ramp):
-            answers = self._ramp(part, progress)
-            self._result = answers.gap
-            replayed.parts.append(answers)
-            return
-        result = self._result
-        gap = result if result is not None and result.stamp == part.gap.stamp else part.gap
-        replayed.parts.append(self._run(part, gap, progress))
-        replayed.gaps.append(gap)
-
-    def _ramp(self, ramp: Ramp, progress: Callable[[int], None]) -> RampAnswers:
+    def play_ramp(self, ramp: Ramp, progress: Callable[[int], None]) -> RampAnswers:
+        """Replay one initialisation through a node of its own."""
         layout = ScalarsLayout(topics.COIL_RIPPLE)
         messages = [
             layout.pack(stamp, (current, np.nan), (current_rate, flux_rate))
             for stamp, current, current_rate, flux_rate in ramp.samples()
         ]
-        own = {'silence_timeout': PATIENCE}
-        with self._node(MountInit, 'mount_init', own) as node, self._path(node) as path:
-            send = _with_temperatures(
-                path.sender(topics.COIL_RIPPLE), path.sender(topics.COIL_TEMPERATURE), ramp
-            )
-            dialogue = _Dialogue(send, ramp.stamps, messages)
-            results: dict[str, bytes] = {}
-            path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
-            path.subscribe(topics.AIR_GAP, lambda raw: results.update(gap=raw))
-            path.subscribe(topics.CURRENT_FORCE_TABLE, lambda raw: results.update(table=raw))
-            path.start()
-            _match(path, node)
-            dialogue.begin()
+        dialogue = _Dialogue(ramp.stamps, messages)
+        results: dict[str, bytes] = {}
+        receive = {
+            topics.CURRENT_SETPOINT: dialogue.take_setpoint,
+            topics.AIR_GAP: lambda raw: results.update(gap=raw),
+            topics.CURRENT_FORCE_TABLE: lambda raw: results.update(table=raw),
+        }
+        sent = (topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
+        with self._node(MountInit, 'mount_init', sent, receive) as (node, (ripple, temperature)):
+            dialogue.begin(_with_temperatures(ripple, temperature, ramp))
             transition(node.trigger_activate, node, 'mount_init')
             dialogue.wait(progress, 'mount_init')
             _wait_for(lambda: len(results) == 2, 'air_gap and current_force_table')
-            stamp, numbers, _ = ScalarsLayout(topics.AIR_GAP).unpack(results['gap'])
-            gap = MeasuredGap(
-                stamp, dict(zip(topics.AIR_GAP.names, numbers, strict=True)), from_bytes(results['table'])
-            )
-            return RampAnswers(ramp.stamps, dialogue.setpoints(), gap)
+        stamp, numbers, _ = ScalarsLayout(topics.AIR_GAP).unpack(results['gap'])
+        named = dict(zip(topics.AIR_GAP.names, numbers, strict=True))
+        gap = MeasuredGap(stamp, named, from_bytes(results['table']))
+        return RampAnswers(ramp.stamps, dialogue.setpoints(), gap)
 
-    def _run(self, run: ControlRun, gap: MeasuredGap, progress: Callable[[int], None]) -> ControlAnswers:
-        layout = ScalarsLayout(topics.DISPLACEMENT)
-        pairs = zip(run.stamps.tolist(), run.displacement.tolist(), strict=True)
-        messages = [layout.pack(stamp, (value,)) for stamp, value in pairs]
-        with self._node(MountControl, 'mount_control', {}) as node, self._path(node) as path:
-            send = path.sender(topics.DISPLACEMENT)
-            dialogue = _Dialogue(send, run.stamps, messages)
-            path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
-            path.subscribe(topics.CONTROL_TRACE, dialogue.take_trace)
-            stamp = activation_before(int(run.stamps[0]))
-            gap_layout = ScalarsLayout(topics.AIR_GAP)
-            table = np.stack([gap.table.current, gap.table.normal_force])
-            send_gap, send_table = path.sender(topics.AIR_GAP), path.sender(topics.CURRENT_FORCE_TABLE)
-            path.start()
-            _match(path, node)
-            send_gap(gap_layout.pack(stamp, [gap.numbers[name] for name in gap_layout.names]))
-            send_table(serialised(to_message(stamp, table)))
-            send(layout.pack(stamp, (float(run.displacement[0]),)))
-            transition(node.trigger_activate, node, 'mount_control')
-            dialogue.begin()
+    def play_run(self, run: ControlRun, gap: MeasuredGap, progress: Callable[[int], None]) -> ControlAnswers:
+        """Replay one run of the controller through a node of its own."""
+        dialogue = _Dialogue(run.stamps, displacement_messages(run))
+        receive = {
+            topics.CURRENT_SETPOINT: dialogue.take_setpoint,
+            topics.CONTROL_TRACE: dialogue.traces.append,
+        }
+        with self.active_control(run, gap, receive) as (node, send):
+            dialogue.begin(send)
             dialogue.wait(progress, 'mount_control')
             answers = _control_answers(run, dialogue, node)
             node.trigger_deactivate()
@@ -145,54 +126,72 @@ class _Player:
             return answers
 
     @contextmanager
-    def _node(self, kind: type[N], name: str, own: Mapping[str, Any]) -> Iterator[N]:
-        values = {**self._parameters.get(name, {}), **own, 'lockstep': True}
+    def active_control(
+        self, run: ControlRun, gap: MeasuredGap, receive: Mapping[Topic, Send]
+    ) -> Iterator[tuple[MountControl, Send]]:
+        """Give mount_control, active with `gap` before the first sample of `run`, and what sends samples."""
+        sent = (topics.DISPLACEMENT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
+        with self._node(MountControl, 'mount_control', sent, receive) as (node, senders):
+            send, send_gap, send_table = senders
+            stamp = activation_before(int(run.stamps[0]))
+            for send_part, raw in zip((send_gap, send_table), gap.dated(stamp).messages(), strict=True):
+                send_part(raw)
+            send(ScalarsLayout(topics.DISPLACEMENT).pack(stamp, (float(run.displacement[0]),)))
+            transition(node.trigger_activate, node, 'mount_control')
+            yield node, send
+
+    @contextmanager
+    def _node(
+        self, kind: type[N], name: str, sent: tuple[Topic, ...], receive: Mapping[Topic, Send]
+    ) -> Iterator[tuple[N, list[Send]]]:
+        """Give a configured node and the senders of the topics `sent`; `receive` takes what it publishes."""
+        own = {'silence_timeout': PATIENCE} if kind is MountInit else {}
+        values = {**self._parameters.get(name, {}), **own, 'lockstep': self._lockstep}
         overrides = [Parameter(key, value=value) for key, value in values.items()]
         node = kind(context=self._context, namespace=self._namespace, parameter_overrides=overrides)
         node.data_thread = self._thread
-        node.get_logger().set_level(LoggingSeverity.WARN)
-        try:
-            transition(node.trigger_configure, node, name)
-            yield node
-        finally:
-            node.close()
-            node.destroy_node()
-
-    @contextmanager
-    def _path(self, node: SafeLifecycleNode) -> Iterator[DataPath]:
-        owner = Node(
+        node.get_logger().set_level(LoggingSeverity.WARN)  # the command speaks for it
+        peer = Node(
             'mount_replay',
             context=self._context,
             namespace=self._namespace,
             start_parameter_services=False,
             enable_rosout=False,
         )
-        path = DataPath(owner, lockstep=True, thread=self._thread)
+        path = DataPath(peer, lockstep=self._lockstep, thread=self._thread)
         try:
-            yield path
+            transition(node.trigger_configure, node, name)
+            senders = [path.sender(topic) for topic in sent]
+            for topic, take in receive.items():
+                path.subscribe(topic, take)
+            path.start()
+            assert node.data_path is not None
+            ends = (path, node.data_path)
+            _wait_for(lambda: not any(end.unmatched() for end in ends), 'connection of all topics')
+            yield node, senders
         finally:
             path.stop()
-            owner.destroy_node()
+            peer.destroy_node()
+            node.close()
+            node.destroy_node()
 
 
 class _Dialogue:
     """Sends the next sample as soon as the one before is answered, on the data thread."""
 
-    def __init__(self, send: Send, stamps: Times, messages: list[bytes]):
-        self._send = send
+    def __init__(self, stamps: Times, messages: list[bytes]):
         self._stamps: list[int] = stamps.tolist()
         self._messages = messages
         self._answers: list[bytes] = []
         self.traces: list[bytes] = []
-        self.take_trace = self.traces.append
         self._sent = 0
         self._over = threading.Event()
         self.repeated = 0  # setpoints after the last answer: 0 A at the deactivation
 
-    def begin(self) -> None:
+    def begin(self, send: Send) -> None:
         """Send the first sample."""
-        self._sent = 1
-        self._send(self._messages[0])
+        self._send, self._sent = send, 1
+        send(self._messages[0])
 
     def take_setpoint(self, raw: bytes) -> None:
         """Take the answer to the sample that waits for one, and send the next."""
@@ -226,12 +225,19 @@ class _Dialogue:
         return np.array([unpack(raw)[1][0] for raw in self._answers])
 
 
+def displacement_messages(run: ControlRun) -> list[bytes]:
+    """Return the messages of the samples of a run."""
+    layout = ScalarsLayout(topics.DISPLACEMENT)
+    pairs = zip(run.stamps.tolist(), run.displacement.tolist(), strict=True)
+    return [layout.pack(stamp, (value,)) for stamp, value in pairs]
+
+
 def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) -> Send:
     """Return what sends a ripple sample and behind it the temperatures that had come by its time.
 
     Those from before the ramp go with its first sample, the newest of them only: a subscription keeps few.
     """
-    layout = temperature_layout()
+    layout = OneNumberLayout(temperature)
     first = int(ramp.stamps[0])
     earlier = [entry for entry in ramp.temperatures if entry[0] <= first]
     due = deque([*earlier[-1:], *(entry for entry in ramp.temperatures if entry[0] > first)])
@@ -245,8 +251,7 @@ def _with_temperatures(send_ripple: Send, send_temperature: Send, ramp: Ramp) ->
 
 
 def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -> ControlAnswers:
-    verdict = node.judge()
-    counts = node.loop.counts
+    verdict, counts = node.judge(), node.loop.counts
     _wait_for(lambda: len(dialogue.traces) >= counts.samples, 'the last control_trace')
     answers = ControlAnswers(
         run.stamps,
@@ -263,12 +268,6 @@ def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -
         answers.traced[place] = True
         answers.traces[place] = numbers
     return answers
-
-
-def _match(path: DataPath, node: SafeLifecycleNode) -> None:
-    assert node.data_path is not None
-    ends = (path, node.data_path)
-    _wait_for(lambda: not any(end.unmatched() for end in ends), 'connection of all topics')
 
 
 def _wait_for(condition: Callable[[], bool], what: str) -> None:

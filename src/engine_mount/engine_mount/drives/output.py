@@ -12,18 +12,16 @@ from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_message, session_text
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import Topic
 
+_GAPS = (topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)
 _WRITTEN = (
     topics.DISPLACEMENT,
     topics.COIL_RIPPLE,
     topics.COIL_TEMPERATURE,
     topics.CURRENT_SETPOINT,
-    topics.AIR_GAP,
-    topics.CURRENT_FORCE_TABLE,
+    *_GAPS,
     topics.CONTROL_TRACE,
     topics.SESSION,
 )
@@ -61,15 +59,13 @@ def _inputs(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
 
 def _gaps(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:
     """Give the two messages of each initialisation: as replayed, else as recorded."""
-    layout = ScalarsLayout(topics.AIR_GAP)
     gaps = {gap.stamp: gap for gap in [*replayed.gaps, *(ramp.gap for ramp in replayed.ramps)]}
     first = int(given.parts[0].stamps[0]) + given.log_shift
     for stamp, gap in gaps.items():
         # One that is older than what is recorded stands at the head, where readers look for it.
         time = max(stamp + given.log_shift, first - 1)
-        yield time, 2, topics.AIR_GAP, layout.pack(stamp, [gap.numbers[name] for name in layout.names])
-        table = to_message(stamp, np.stack([gap.table.current, gap.table.normal_force]))
-        yield time, 3, topics.CURRENT_FORCE_TABLE, serialised(table)
+        for place, (topic, raw) in enumerate(zip(_GAPS, gap.messages(), strict=True), 2):
+            yield time, place, topic, raw
 
 
 def _answers(given: ReplayInput, replayed: Replayed) -> Iterator[_Entry]:

@@ -1,19 +1,19 @@
-"""Records topics without a graph of its own: the recorder node alone, a line that tells, keys that mark."""
+"""Topics recorded without a graph of its own: the recorder node alone, a changing line, keys that mark."""
 
 import os
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
-from engine_mount.drives.keyboard import MARK_KEYS, Keyboard
+from engine_mount.drives.keyboard import mark_keys, wait_for_keys
 from engine_mount.recordings.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
@@ -31,49 +31,76 @@ _FAMILY = f'{NAME}_lone'
 _LINE_PERIOD = 0.2  # s, chosen
 _RATE_SPAN = 1.0  # s, chosen: over which messages are counted for their rate
 _SERVICE_PERIOD = 0.2  # s, chosen
-_KEYS = 'm or space: mark, Ctrl-C: end'
 
 
 @dataclass(frozen=True)
-class RecordOrder:
-    """What the user orders; no names of topics are all, `duration` in s, None without an end."""
-
-    out: Path
-    parameters: RecorderParameters
-    topics: tuple[str, ...] = ()
-    domain: int = 0
-    namespace: str = ''
-    duration: float | None = None
-
-
-@dataclass(frozen=True)
-class RecordOutcome:
-    """What came of it: the recordings, messages that came and do not stand there, why it failed, if so."""
+class Recorded:
+    """The recordings made, the messages that were received and are not in them, and why it failed, if so."""
 
     folders: list[Path]
     lost: int
     failure: str
 
 
-def record(order: RecordOrder, screen: Screen) -> RecordOutcome:
-    """Record until Ctrl-C, SIGTERM or the end of the duration; raises a `ValueError` with the reason."""
-    names = chosen_topics(order.topics)
+def record(
+    out: Path,
+    parameters: RecorderParameters,
+    screen: Screen,
+    *,
+    topics: Sequence[str] = (),
+    duration: float | None = None,
+    domain: int = 0,
+    namespace: str = '',
+) -> Recorded:
+    """Record `topics` (none named: all) until Ctrl-C, SIGTERM or `duration` (s); raises a `ValueError`."""
+    names = chosen_topics(topics)
     if refusal := loopback_refusal():
         raise RecordingError(refusal)
-    asked: list[bool] = []  # to end, by a signal; no lock: a second one may come amid the first
-    with ending_signals(lambda: asked.append(True)), ros_context(order.domain) as context:
-        recorder = _LoneRecorder(order, names, context)
+    values = {'uri': str(out), 'topics': names, **parameters._asdict()}
+    signals: list[bool] = []  # that end the recording; no lock: a second one may come amid the first
+    with ending_signals(lambda: signals.append(True)), ros_context(domain) as context:
+        node = MountRecorder(
+            f'{_FAMILY}_{os.getpid()}',
+            context=context,
+            namespace=namespace,
+            parameter_overrides=[Parameter(name, value=value) for name, value in values.items()],
+        )
+        node.get_logger().set_level(LoggingSeverity.FATAL)  # this command speaks for it
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        ending = threading.Event()
+
+        def serve() -> None:
+            while not ending.is_set():
+                executor.spin_once(_SERVICE_PERIOD)
+
+        thread = threading.Thread(target=serve, name=NAME, daemon=True)
+        figures: dict[str, Any] = {}
         try:
-            recorder.begin()
+            transition(node.trigger_configure, node, NAME)
+            transition(node.trigger_activate, node, NAME)
+            thread.start()
             screen.say(f'recording {len(names)} topics')
-            _watch(recorder, order, asked, screen)
+            _watch(node, signals, duration, screen, until_failure=parameters.on_full == OnFull.STOP.value)
         finally:
-            outcome = recorder.end()
-    return outcome
+            if thread.is_alive():
+                ending.set()
+                wake(executor)
+                thread.join()
+                node.trigger_deactivate()
+                figures = _figures(node)
+            executor.shutdown()
+            node.close()
+            node.destroy_node()
+    folders = [out] if figures else []
+    if parameters.snapshot:
+        folders = [snapshot_folder(out, number) for number in range(1, figures.get('snapshots', 0) + 1)]
+    failure = str(figures['sentence']) if figures.get('failed') else ''
+    return Recorded(folders, figures.get('lost', 0), failure)
 
 
-def chosen_topics(names: tuple[str, ...]) -> list[str]:
-    """Return the registered names meant, all if there are none, with `event`, which holds the marks."""
+def chosen_topics(names: Sequence[str]) -> list[str]:
+    """Return the registered names, all if none are given, with `event`, which holds the marks."""
     if not names:
         return [entry.name for entry in TOPICS]
     full = {entry.name.strip('/'): entry.name for entry in TOPICS}
@@ -86,115 +113,45 @@ def chosen_topics(names: tuple[str, ...]) -> list[str]:
     return list(dict.fromkeys([*wanted, EVENT.name]))
 
 
-class _LoneRecorder:
-    """The recorder in this process, and the thread that serves its diagnostics and its service."""
-
-    def __init__(self, order: RecordOrder, topics: list[str], context: Context):
-        values = {'uri': str(order.out), 'topics': topics, **order.parameters._asdict()}
-        self._order = order
-        self._node = MountRecorder(
-            f'{_FAMILY}_{os.getpid()}',
-            context=context,
-            namespace=order.namespace,
-            parameter_overrides=[Parameter(name, value=value) for name, value in values.items()],
-        )
-        self._node.get_logger().set_level(LoggingSeverity.FATAL)  # this command speaks for it
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(self._node)
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name=NAME, daemon=True)
-
-    def begin(self) -> None:
-        """Record from now on."""
-        transition(self._node.trigger_configure, self._node, NAME)
-        transition(self._node.trigger_activate, self._node, NAME)
-        self._thread.start()
-
-    def figures(self) -> Mapping[str, object]:
-        """Return the figures of the recorder, and the `sentence` about them."""
-        verdict = self._node.judge()
-        return {**verdict.figures, 'sentence': verdict.sentence}
-
-    def mark(self) -> None:
-        """Mark this moment."""
-        self._node.mark()
-
-    def end(self) -> RecordOutcome:
-        """Close the recording and the node."""
-        begun = self._thread.is_alive()
-        self._ending.set()
-        if begun:
-            wake(self._executor)
-            self._thread.join()
-        self._executor.shutdown()
-        if begun:
-            self._node.trigger_deactivate()
-        figures = self.figures() if begun else {}
-        self._node.close()
-        self._node.destroy_node()
-        return self._outcome(figures)
-
-    def _serve(self) -> None:
-        while not self._ending.is_set():
-            self._executor.spin_once(_SERVICE_PERIOD)
-
-    def _outcome(self, figures: Mapping[str, object]) -> RecordOutcome:
-        first = self._order.out
-        snapshots = range(1, _number(figures, 'snapshots') + 1)
-        whole = [first] if figures else []
-        folders = [snapshot_folder(first, n) for n in snapshots] if self._order.parameters.snapshot else whole
-        failure = str(figures['sentence']) if figures.get('failed') else ''
-        return RecordOutcome(folders, _number(figures, 'lost'), failure)
+def _figures(node: MountRecorder) -> dict[str, Any]:
+    verdict = node.judge()
+    return {**verdict.figures, 'sentence': verdict.sentence}
 
 
-def _watch(recorder: _LoneRecorder, order: RecordOrder, asked: list[bool], screen: Screen) -> None:
+def _watch(
+    node: MountRecorder, signals: list[bool], duration: float | None, screen: Screen, *, until_failure: bool
+) -> None:
+    """Show the figures and set marks until the end."""
     begin = time.monotonic()
-    end = begin + order.duration if order.duration is not None else float('inf')
-    line = _Line(begin)
-    stopping = order.parameters.on_full == OnFull.STOP.value
-    with Keyboard() as keyboard, screen.line('') as show:
-        hint = f'  ({_KEYS})' if keyboard.present else ''
-        while not asked and (now := time.monotonic()) < end:
-            figures = recorder.figures()
-            if figures['failed'] and stopping:
+    end = begin + duration if duration is not None else float('inf')
+    counts = deque([(begin, 0)])  # s on the clock, messages received
+    with mark_keys() as pressed, screen.line('') as show:
+        hint = '  (m or space: mark, Ctrl-C: end)' if pressed is not None else ''
+        while not signals and (now := time.monotonic()) < end:
+            figures = _figures(node)
+            if figures['failed'] and until_failure:
                 return
-            show(line.text(figures, now) + hint)
-            for key in keyboard.wait(min(_LINE_PERIOD, end - now)):
-                if key in MARK_KEYS:
-                    recorder.mark()
+            counts.append((now, figures.get('received', 0)))
+            while len(counts) > 2 and counts[1][0] <= now - _RATE_SPAN:
+                counts.popleft()
+            rate = (counts[-1][1] - counts[0][1]) / max(now - counts[0][0], 1e-3)
+            show(_line(figures, now - begin, rate) + hint)
+            for _ in range(wait_for_keys(pressed, min(_LINE_PERIOD, end - now))):
+                node.mark()
 
 
-class _Line:
-    """The figures of this moment in one line."""
-
-    def __init__(self, begin: float):
-        self._begin = begin
-        self._counts = deque([(begin, 0)])
-
-    def text(self, figures: Mapping[str, object], now: float) -> str:
-        """Return the line at the time `now` (s, steady clock)."""
-        counts = self._counts
-        counts.append((now, _number(figures, 'received')))
-        while len(counts) > 2 and counts[1][0] <= now - _RATE_SPAN:
-            counts.popleft()
-        span = max(counts[-1][0] - counts[0][0], 1e-3)
-        rate = (counts[-1][1] - counts[0][1]) / span
-        marks = _number(figures, 'events')
-        parts = [
-            f'{now - self._begin:.0f} s',
-            f'{rate:.0f} messages/s',
-            f'{_number(figures, "file_bytes") / 1e6:.1f} MB',
-            f'{_number(figures, "lost")} lost',
-            f'{marks} mark{"" if marks == 1 else "s"}',
-        ]
-        if 'snapshots' in figures:
-            parts.append(f'{_number(figures, "snapshots")} saved, {figures["held_s"]} s in memory')
-        if figures['failed']:
-            parts.append('not recording any more')
-        return '   '.join(parts)
-
-
-def _number(figures: Mapping[str, object], name: str) -> int:
-    value = figures.get(name, 0)
-    assert isinstance(value, int)
-    return value
+def _line(figures: Mapping[str, Any], elapsed: float, rate: float) -> str:
+    """Return the figures of this moment in one line; `elapsed` in s, `rate` in messages/s."""
+    marks = figures.get('events', 0)
+    parts = [
+        f'{elapsed:.0f} s',
+        f'{rate:.0f} messages/s',
+        f'{figures.get("file_bytes", 0) / 1e6:.1f} MB',
+        f'{figures.get("lost", 0)} lost',
+        f'{marks} mark{"" if marks == 1 else "s"}',
+    ]
+    if 'snapshots' in figures:
+        parts.append(f'{figures["snapshots"]} saved, {figures["held_s"]} s in memory')
+    if figures['failed']:
+        parts.append('not recording any more')
+    return '   '.join(parts)

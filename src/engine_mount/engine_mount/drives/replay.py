@@ -1,17 +1,30 @@
-"""One replay from the recording to the last figure: in core, or in lock-step with the real nodes."""
+"""A recorded displacement once more through the same controller, in core or through the real nodes."""
 
-import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from engine_mount.drives.agreement import Agreement, agreement
+import numpy as np
+
+from engine_mount.drives.agreement import (
+    SETTLED,
+    SETTLING,
+    SHOWN,
+    Agreement,
+    agreement,
+    moment_figures,
+    recorded_switching,
+    replayed_switching,
+    switching_changes,
+    switching_text,
+)
 from engine_mount.drives.core import Progress, Replayed, replay_in_core
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input
-from engine_mount.drives.inputs.input import ReplayError, ReplayInput, replay_input
-from engine_mount.drives.inputs.parameter_changes import without
-from engine_mount.drives.other_policy import check_effect
+from engine_mount.drives.inputs.input import ReplayInput, replay_input, without
 from engine_mount.drives.output import write_replay
 from engine_mount.recordings.place import open_mount
 from engine_mount.recordings.recording import Recording
@@ -20,9 +33,12 @@ from engine_mount.recordings.session import (
     recorded_session,
     session_content,
     session_parameters,
+    version_differences,
+    versions_sentence,
 )
 from engine_mount.settings.chosen import (
     Parameters,
+    check_effect,
     check_policy,
     chosen_control,
     chosen_specimen,
@@ -31,6 +47,7 @@ from engine_mount.settings.chosen import (
 from engine_mount.settings.options import owned
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.importing.provenance import SCENARIO
+from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_control.policy.registry import DEFAULT
@@ -40,103 +57,211 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.session import time_text
 from mount_recorder.versions import versions
-from mount_ros import topics
 
 CORE, LOCKSTEP = 'core', 'lock-step'
 REPLAYED_NODES = ('mount_control', 'mount_init')
 
 
-@dataclass(frozen=True)
-class ReplayOrder:
-    """What the user orders; `changes` are parameters other than those recorded, {node: {parameter: value}}.
-
-    `table` is `default` or the path of a recording whose force table is taken, empty for the recorded one.
-    `mount` is which of several mounts is replayed.
-    """
-
-    recording: Path
-    mode: str = CORE
-    changes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    table: str = ''
-    foreign: ForeignOrder | None = None
-    out: Path | None = None
-    domain: int = 0
-    mount: str = ''
-
-
 @dataclass
-class ReplayOutcome:
-    """What came of it.
+class Replay:
+    """A replay: its input, the answers, and how they agree with those recorded (None: none were).
 
-    `reading_time` (s) is that from the closed file to the displacement in memory as numbers, `decoding_time`
-    (s) the part of it from the messages in memory; 0 for a foreign recording, where it is not told apart.
+    `changes` {node: {parameter: value}} and the force `table` are other than recorded, `parameters` those of
+    the nodes; `folder` is where it was written.
     """
 
-    order: ReplayOrder
+    mode: str
+    changes: Parameters
+    table: str
+    is_foreign: bool
     given: ReplayInput
     parameters: Parameters
     replayed: Replayed
     agreement: Agreement | None
-    reading_time: float
-    decoding_time: float = 0.0
     folder: RunFolder | None = None
 
     @property
-    def as_recorded(self) -> bool:
-        """Whether nothing was changed, so that the answers should be those recorded."""
-        return not self.order.changes and not self.order.table and self.order.foreign is None
-
-    @property
-    def computing_time(self) -> float:
-        """Seconds from the messages of displacement in memory to the last answer of the controller.
-
-        In lock-step from the start of the node, which decodes them itself.
-        """
-        decoding = self.decoding_time if self.order.mode == CORE else 0.0
-        return decoding + self.replayed.control_time
+    def recording(self) -> Path | None:
+        """The recording of the replay, None where none was written."""
+        return self.folder.recording if self.folder else None
 
     @property
     def held(self) -> bool:
-        """Whether the replay gave what it promises: the recorded answers, where nothing was changed."""
-        return not self.as_recorded or self.agreement is None or self.agreement.agrees
+        """Whether the answers are those recorded; true where something was changed or nothing compared."""
+        changed = self.changes or self.table or self.is_foreign
+        return bool(changed) or self.agreement is None or self.agreement.agrees
+
+    @property
+    def samples(self) -> int:
+        """How many samples mount_control answered."""
+        return sum(len(run.stamps) for run in self.replayed.runs)
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The figures; times in s on the recording's time axis, unknown is None."""
+        given, runs, found = self.given, self.replayed.runs, self.agreement
+        now, before = replayed_switching(given, self.replayed), recorded_switching(given)
+        duration = self.samples * given.sample_time
+        return {
+            'source': given.source,
+            'recording': str(self.recording) if self.folder else None,
+            'mode': self.mode,
+            'changed': {node: dict(values) for node, values in self.changes.items()},
+            'samples': self.samples,
+            'duration_s': duration,
+            'activations': len(runs),
+            'initialisations': len(self.replayed.ramps),
+            'bridged_samples': sum(run.counts.bridged for run in runs),
+            'restarts': sum(run.counts.restarts for run in runs),
+            'invalid_samples': sum(run.counts.invalid for run in runs),
+            'equal_to_recorded': None if found is None else found.equal,
+            'recorded_with': version_differences(given.session, versions()),
+            'compared_setpoints': 0 if found is None else found.setpoints.samples,
+            'differing_setpoints': None if found is None else found.setpoints.differing,
+            'first_difference': moment_figures(found.setpoints.first if found else None),
+            'largest_difference': moment_figures(found.setpoints.largest if found else None),
+            'differing_intermediates': {
+                each.signal: each.differing
+                for each in (found.intermediates if found else ())
+                if each.differing
+            },
+            'switch_on_s': list(now.on),
+            'switch_off_s': list(now.off),
+            'recorded_switch_on_s': list(before.on) if before else None,
+            'recorded_switch_off_s': list(before.off) if before else None,
+            'switching_changes': switching_changes(before, now, given.sample_time) if before else [],
+            'peak_current_a': max((float(np.max(run.setpoints)) for run in runs), default=None),
+            'recorded_peak_current_a': _recorded_peak(given),
+            'real_time_factor': duration / self.replayed.control_time,
+            'notes': list(given.notes),
+        }
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the printed summary: rows of a name, empty where it continues, and a sentence."""
+        figures, switched = self.figures, 'every switching at the same sample'
+        rows = [
+            ('replayed', _counted(figures)),
+            ('settings', self._settings()),
+            *_named('setpoints', self._verdict()),
+        ]
+        if not self.is_foreign:
+            rows.append(('versions', versions_sentence(figures['recorded_with'], versions())))
+        rows.append(('damping switched', switching_text(replayed_switching(self.given, self.replayed))))
+        if figures['recorded_switch_on_s'] is not None:
+            changes = figures['switching_changes']
+            more = [f'and {len(changes) - SHOWN} more'] if len(changes) > SHOWN else []
+            differ = [f'{len(changes)} switchings differ', *changes[:SHOWN], *more]
+            rows += _named('against the recording', differ if changes else [switched])
+        rows.append(('peak current', _peaks(figures)))
+        rows.append(('speed', f'{figures["real_time_factor"]:.0f} x real time, without reading the file'))
+        return rows
+
+    def sentences(self) -> list[str]:
+        """Return the printed summary and the notes, a line each."""
+        return [*(f'{name:<22} {text}' for name, text in self.rows()), *self.given.notes]
+
+    def _settings(self) -> str:
+        changes = []
+        for node, values in self.changes.items():
+            recorded = {} if self.is_foreign else self.given.parameters.get(node, {})
+            for name, value in values.items():
+                before = f' (recorded {recorded[name]})' if name in recorded else ''
+                changes.append(f'{node}.{name} = {value}{before}')
+        if self.is_foreign:
+            return ', '.join(changes) or 'the defaults'
+        if self.table:
+            changes.append(f'table of {self.table}')
+        return 'as recorded' + (f' but {", ".join(changes)}' if changes else '')
+
+    def _verdict(self) -> list[str]:
+        found = self.agreement
+        if found is None:
+            return ['nothing recorded to compare with']
+        sentences = found.sentences
+        if found.settling_skipped:
+            sentences.append(
+                f'not compared: the first {SETTLING:g} s ({found.settling_skipped} setpoints), see the '
+                f'notes; then up to {1e6 * SETTLED:g} uA apart is as near as it can be'
+            )
+        return sentences + [run.refusal for run in self.replayed.runs if run.refusal]
 
 
-def replay(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
-    """Replay, compare and write a recording; raises a `ValueError` with the reason."""
-    outcome = replay_without_output(order, progress)
-    outcome.folder = make_run_folder(order.out, f'replay_{order.mode}')
-    outcome.folder.logs.rmdir()
-    write_replay(outcome.folder.recording, outcome.given, outcome.replayed, _session(outcome.order, outcome))
-    return outcome
+def replay(
+    recording: str | os.PathLike[str],
+    changes: Mapping[str, Any] | None = None,
+    *,
+    lockstep: bool = False,
+    table: str = '',
+    foreign: ForeignOrder | None = None,
+    mount: str = '',
+    out: str | os.PathLike[str] | None = None,
+    domain: int | None = None,
+    progress: Progress = lambda share: None,
+) -> Replay:
+    """Replay a recording or run and compare its answers with those recorded, to the bit.
 
-
-def replay_without_output(order: ReplayOrder, progress: Progress = lambda share: None) -> ReplayOutcome:
-    """Replay and compare."""
-    given, reading_time, decoding_time = _read(order)
-    parameters = _changed(given, order)
-    check_parameters(parameters)
-    given.changes = without(given.changes, order.changes.get('mount_control', {}))
-    given.notes += _told(given, order.mode)
-    if order.mode == LOCKSTEP:
-        from engine_mount.drives.lockstep import replay_in_lockstep  # needs the middleware
-
-        replayed = replay_in_lockstep(given, parameters, order.domain, progress)
+    `changes` are parameters other than recorded, {`name` or `node.name`: value} or {node: {name: value}}, a
+    name alone one of mount_control. `table` is `default` or a recording whose force table is used, `foreign`
+    says how a foreign recording becomes a displacement, `mount` which of several is replayed. With a folder
+    `out` the replay is written as a recording that can be replayed again. In lock-step the real nodes answer
+    over topics of `domain`. Raises a `ValueError` with the reason.
+    """
+    changed, mode = parsed_changes(changes or {}), LOCKSTEP if lockstep else CORE
+    if foreign is not None:
+        parameters = {node: dict(changed.get(node, {})) for node in REPLAYED_NODES}
+        parameters['mount_control'].setdefault('policy', DEFAULT)
+        check_parameters(parameters)
+        gap, sentence = chosen_gap(table, parameters)
+        given = foreign_input(Path(recording), foreign, parameters, gap)
+        given.notes.insert(0, sentence)
     else:
-        _load_compiled_run(given, parameters)
+        given = _recorded_input(open_mount(Path(recording), mount), table)
+        refuse_other_rate(given.parameters, changed)
+    if 'mount_init' in changed and len(given.controls) == len(given.parts):
+        raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
+    parameters = with_changes(given.parameters, changed)
+    check_parameters(parameters)
+    given.changes = without(given.changes, changed.get('mount_control', {}))
+    given.notes += change_notes(given, mode)
+    if lockstep:
+        from engine_mount.drives.lockstep import replay_in_lockstep  # loads the middleware
+
+        replayed = replay_in_lockstep(given, parameters, chosen_domain(domain), progress)
+    else:
+        load_compiled_law(chosen_control(parameters))  # once in a process, not to be counted
+        chosen_specimen(parameters)
         replayed = replay_in_core(given, parameters)
-    return ReplayOutcome(
-        order, given, parameters, replayed, agreement(given, replayed), reading_time, decoding_time
-    )
+    found = agreement(given, replayed)
+    result = Replay(mode, changed, table, foreign is not None, given, parameters, replayed, found)
+    if out is not None:
+        result.folder = make_run_folder(Path(out), '')
+        result.folder.logs.rmdir()
+        write_replay(result.folder.recording, given, replayed, _session(result))
+    return result
 
 
-def _told(given: ReplayInput, mode: str) -> list[str]:
-    """Return a sentence for each change of parameters while the recording ran."""
-    done = 'the replay does the same' if mode == CORE else 'a replay in lock-step does not: use core'
-    return [
-        f'{change.node} was told {name} = {value} at {(change.time - given.zero) / 1e9:.3f} s; {done}'
-        for change in given.changes
-        for name, value in change.values.items()
-    ]
+def parsed_changes(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of {`name` or `node.name`: value}, in the types of the nodes.
+
+    Raises `ParameterError`, also for a node that takes no part in a replay.
+    """
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        flat |= (
+            {f'{name}.{own}': each for own, each in value.items()}
+            if isinstance(value, Mapping)
+            else {name: value}
+        )
+    changes: dict[str, dict[str, Any]] = {}
+    for name, value in flat.items():
+        node, parameter = owned(name)
+        if node in defaults_of_nodes() and node not in REPLAYED_NODES:
+            raise ParameterError(
+                f'{node} takes no part in a replay; what can be changed are parameters of '
+                f'{" and ".join(REPLAYED_NODES)}'
+            )
+        changes.setdefault(node, {})[parameter] = value
+    return checked_settings(changes)
 
 
 def check_parameters(parameters: Parameters) -> None:
@@ -148,77 +273,7 @@ def check_parameters(parameters: Parameters) -> None:
     with_flattened(InitParameters(), parameters.get('mount_init', {}))
 
 
-def parsed_changes(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of {`name` or `node.name`: value}, in the types of the nodes.
-
-    Raises `ParameterError`, also for a node that takes no part in a replay.
-    """
-    changes: dict[str, dict[str, Any]] = {}
-    for name, value in settings.items():
-        node, parameter = owned(name)
-        if node in defaults_of_nodes() and node not in REPLAYED_NODES:
-            raise ParameterError(
-                f'{node} takes no part in a replay; what can be changed are parameters of '
-                f'{" and ".join(REPLAYED_NODES)}'
-            )
-        changes.setdefault(node, {})[parameter] = value
-    return checked_settings(changes)
-
-
-# Reading.
-
-
-def _read(order: ReplayOrder) -> tuple[ReplayInput, float, float]:
-    """Return the input and the times (s) of reading and of decoding the displacement."""
-    if order.foreign is not None:
-        begin = time.perf_counter()
-        parameters = {node: dict(order.changes.get(node, {})) for node in REPLAYED_NODES}
-        parameters['mount_control'].setdefault('policy', DEFAULT)
-        check_parameters(parameters)
-        gap, sentence = chosen_gap(order.table, parameters)
-        given = foreign_input(order.recording, order.foreign, parameters, gap)
-        given.notes.insert(0, sentence)
-        return given, time.perf_counter() - begin, 0.0
-    begin = time.perf_counter()
-    recording = open_mount(order.recording, order.mount)
-    decoding_time = _load_displacement(recording)
-    reading_time = time.perf_counter() - begin
-    table = order.table or (DEFAULT_TABLE if _is_imported(recording) else '')
-    gap, sentence = chosen_gap(table, {}) if table else (None, '')
-    given = replay_input(recording, gap)
-    given.notes += [*([sentence] if sentence else []), *recording.warnings]
-    return given, reading_time, decoding_time
-
-
-def _is_imported(recording: Recording) -> bool:
-    """Whether a recording was made of files of others, in which no gap was ever measured."""
-    try:
-        return session_content(recorded_session(recording)).get('scenario') == SCENARIO
-    except SessionError:
-        return False
-
-
-def _load_displacement(recording: Recording) -> float:
-    """Bring stamps and numbers into memory; return the time (s) from messages in memory to numbers."""
-    if topics.DISPLACEMENT.name not in recording:
-        return 0.0
-    series = recording[topics.DISPLACEMENT.name]
-    begin = time.perf_counter()
-    if len(series):
-        assert len(series.stamps) == len(series[topics.DISPLACEMENT.names[0]])
-    return time.perf_counter() - begin
-
-
-def _changed(given: ReplayInput, order: ReplayOrder) -> dict[str, dict[str, Any]]:
-    changes = order.changes
-    if order.foreign is None:
-        refuse_other_rate(given.parameters, changes)
-    if 'mount_init' in changes and not any(part not in given.controls for part in given.parts):
-        raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
-    return with_changes(given.parameters, changes)
-
-
-def refuse_other_rate(recorded: Parameters, changes: Mapping[str, Mapping[str, Any]]) -> None:
+def refuse_other_rate(recorded: Parameters, changes: Parameters) -> None:
     """Raise `ReplayError` for another sample rate than the recorded one."""
     rate = control_parameters(recorded).sample_rate
     for node, values in changes.items():
@@ -229,49 +284,98 @@ def refuse_other_rate(recorded: Parameters, changes: Mapping[str, Mapping[str, A
             )
 
 
-def with_changes(
-    recorded: Mapping[str, Mapping[str, Any]], changes: Mapping[str, Mapping[str, Any]]
-) -> dict[str, dict[str, Any]]:
+def with_changes(recorded: Parameters, changes: Parameters) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes that replay, changed.
 
     With another `parameters_file` the recorded friction goes: it may be that of the file before. Raises
     `ParameterError` for a change that has no effect with the policy.
     """
-    check_effect(changes.get('mount_control', {}), control_parameters(recorded).policy)
+    own = changes.get('mount_control', {})
+    check_effect(own, control_parameters(recorded).policy)
     parameters = {node: dict(recorded.get(node, {})) for node in REPLAYED_NODES}
-    if 'parameters_file' in changes.get('mount_control', {}):
+    if 'parameters_file' in own:
         control = parameters['mount_control']
-        parameters['mount_control'] = {
-            name: value for name, value in control.items() if not name.startswith(('friction.', 'contact.'))
-        }
+        for name in [name for name in control if name.startswith(('friction.', 'contact.'))]:
+            del control[name]
     return {node: {**values, **changes.get(node, {})} for node, values in parameters.items()}
 
 
-def _load_compiled_run(given: ReplayInput, parameters: Parameters) -> None:
-    """Load or compile the laws, which a process does once."""
-    load_compiled_law(chosen_control(parameters))
-    chosen_specimen(parameters)
+def change_notes(given: ReplayInput, mode: str) -> list[str]:
+    """Return a sentence for each change of parameters while the recording ran."""
+    done = 'the replay does the same' if mode == CORE else 'a replay in lock-step does not: use core'
+    return [
+        f'{change.node} was told {name} = {value} at {(change.time - given.zero) / 1e9:.3f} s; {done}'
+        for change in given.changes
+        for name, value in change.values.items()
+    ]
 
 
-# The session of the replay's own recording.
+def _recorded_input(recording: Recording, table: str) -> ReplayInput:
+    """Return what a recording of this project gives to replay, with the gap that `table` names."""
+    try:
+        imported = session_content(recorded_session(recording)).get('scenario') == SCENARIO
+    except SessionError:
+        imported = False
+    table = table or (DEFAULT_TABLE if imported else '')  # in foreign files no gap was ever measured
+    gap, sentence = chosen_gap(table, {}) if table else (None, '')
+    given = replay_input(recording, gap)
+    given.notes += [*([sentence] if sentence else []), *recording.warnings]
+    return given
 
 
-def _session(order: ReplayOrder, outcome: ReplayOutcome) -> dict[str, Any]:
-    given = outcome.given
+def _session(done: Replay) -> dict[str, Any]:
+    """Return the session of the recording of a replay."""
+    given = done.given
+    own = {node: dict(values) for node, values in done.parameters.items()}
     return {
         'scenario': 'replay',
         **given.session,
-        'parameters': {
-            **session_parameters(given.session),
-            **{node: dict(values) for node, values in outcome.parameters.items()},
-        },
+        'parameters': {**session_parameters(given.session), **own},
         'replay': {
             'of': given.source,
-            'mode': order.mode,
+            'mode': done.mode,
             'made': time_text(),
-            'changed': {node: dict(values) for node, values in order.changes.items()},
-            'table': order.table and Path(order.table).name,
+            'changed': {node: dict(values) for node, values in done.changes.items()},
+            'table': done.table and Path(done.table).name,
             'notes': list(given.notes),
             'versions': versions(),
         },
     }
+
+
+# Figures and sentences.
+
+
+def _named(name: str, sentences: Iterable[str]) -> list[tuple[str, str]]:
+    """Return a row for each sentence, the first with the name."""
+    return [('' if place else name, sentence) for place, sentence in enumerate(sentences)]
+
+
+def _counted(figures: dict[str, Any]) -> str:
+    text = f'{figures["samples"]} samples of mount_control ({figures["duration_s"]:.1f} s)'
+    words = {
+        'activations': 'activation{}',
+        'initialisations': 'initialisation{}',
+        'bridged_samples': 'sample{} bridged',
+        'restarts': 'restart{}',
+        'invalid_samples': 'invalid sample{}',
+    }
+    for name, each in words.items():
+        if count := figures[name]:
+            text += f', {count} ' + each.format('' if count == 1 else 's')
+    return text
+
+
+def _peaks(figures: dict[str, Any]) -> str:
+    now, recorded = figures['peak_current_a'], figures['recorded_peak_current_a']
+    text = f'{now:.3f} A'
+    return text if recorded in (None, now) else f'{text}, recorded {recorded:.3f} A ({now - recorded:+.3f} A)'
+
+
+def _recorded_peak(given: ReplayInput) -> float | None:
+    if given.answers is None:
+        return None
+    samples = np.concatenate([run.stamps for run in given.controls])
+    currents = given.answers.currents[np.isin(given.answers.stamps, samples)]
+    peak = float(np.max(currents)) if len(currents) else math.nan
+    return None if math.isnan(peak) else peak

@@ -24,11 +24,9 @@ from engine_mount.experiments.harness.contract import (
 from engine_mount.experiments.harness.many_runs import Found, Job, TruthOnly, run_all
 from engine_mount.experiments.harness.measures import rms_in_bands
 from engine_mount.experiments.registry import NAMES
-from engine_mount.signals.roads.driving import CONTACT_LENGTH, wheel_height
-from engine_mount.signals.roads.iso8608 import unevenness
-from engine_mount.signals.roads.profile import RoadProfile
-from engine_mount.signals.roads.reading import road_profile
-from engine_mount.signals.roads.speed import FASTEST, SLOWEST, speed_of
+from engine_mount.signals.roads.driving import CONTACT_LENGTH, FASTEST, SLOWEST, speed_of, wheel_height
+from engine_mount.signals.roads.iso8608 import RoadProfile, unevenness
+from engine_mount.signals.roads.table import road_profile
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME

@@ -27,7 +27,7 @@ from mount_sim.plant.vehicle import Vehicle
 @functools.cache
 def recorded_road(recorded: RecordedScenario) -> FloatArray:
     """Return the road (m) behind a recorded acceleration, at the step of the plant; raises `SignalError`."""
-    acceleration = acceleration_at(recorded_signal(recorded), recorded.scale, STEP_TIME)
+    acceleration = acceleration_at(recorded_signal(recorded), STEP_TIME)
     return road_of(acceleration[:], STEP_TIME, Vehicle())
 
 

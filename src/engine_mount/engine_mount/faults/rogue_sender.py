@@ -16,7 +16,6 @@ from contextlib import ExitStack
 import numpy as np
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
-from std_msgs.msg import String
 
 from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, Frame, open_bus
@@ -26,8 +25,8 @@ from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.environment import prepare_environment
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.cdr import string_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.process import ros_context
 from mount_ros.nodes.shutdown import end_process
@@ -97,13 +96,13 @@ def air_gap() -> Iterator[bytes]:
 
 def table(currents: tuple[float, ...], forces: tuple[float, ...], stamp: int = 0) -> Iterator[bytes]:
     """Yield a current-force table (A, N) with a stamp (ns), by default that of now."""
-    message = to_message(stamp or time.time_ns(), np.array([sorted(currents), forces]))
-    message.data = [*currents, *forces]  # also what our own code would not send
-    yield serialised(message)
+    sound = table_message(stamp or time.time_ns(), np.array([sorted(currents), forces]))
+    numbers = np.array([currents, forces]).tobytes()  # also what our own code would not send
+    yield sound[: -len(numbers)] + numbers
 
 
 _SOUND = (0.0, 1.0, 3.0), (0.0, 500.0, 1000.0)
-_EVENT = serialised(String(data='flood ' + 'x' * 100))
+_EVENT = string_message('flood ' + 'x' * 100)
 
 ON_BUS = {'can_host': second_host, 'can_electronics': second_electronics}
 REPLIES = {

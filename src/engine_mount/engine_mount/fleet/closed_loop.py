@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
+from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import has
-from engine_mount.drives.inputs.taken import ReplayError
-from engine_mount.drives.loop.chain import CoreChain
 from engine_mount.drives.loop.messages import Samples
-from engine_mount.drives.loop.run import run_core_into
+from engine_mount.drives.loop.run import CoreChain, run_core_into
 from engine_mount.fleet.figures import AnswerFigures, compared_answers, difference, ordered_sum
 from engine_mount.fleet.setpoints import Compared, Parameters, Recorded, changed_parameters
 from engine_mount.recordings.recording import Recording
@@ -96,7 +95,7 @@ def _recorded_excitation(recording: Recording, start: float) -> Excitation:
     series = recording[SIM_CHASSIS_ACCELERATION.name]
     times = (series.stamps - series.stamps[0]) * 1e-9
     signal = signal_of(SIM_CHASSIS_ACCELERATION.name, times, series[_VERTICAL])
-    values = acceleration_at(evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE), 1.0, STEP_TIME)
+    values = acceleration_at(evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE), STEP_TIME)
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, start)
 
 
@@ -107,7 +106,7 @@ class _Drive:
         self.start = round(excitation.start * 1e9)
         self.answers = AnswerFigures()
         self._columns: dict[str, list[NDArray[Any]]] = defaultdict(list)
-        self._trace = trace_dtype(CoreChain(parameters).policy)
+        self._trace = trace_dtype(CoreChain(parameters).control.policy)
         self._is_initialised = False
         run_core_into(self, parameters, excitation=excitation)
 

@@ -6,7 +6,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,18 +13,19 @@ import numpy as np
 import yaml
 
 import engine_mount
-from engine_mount.drives.drive import told_parameters
-from engine_mount.drives.loop.recording import record_car, record_core
-from engine_mount.drives.preflight import preflight
+from engine_mount.drives.drive import check_drive, parameters_of_session
+from engine_mount.drives.loop.recording import record_core
 from engine_mount.fleet.runner import Done, run_tasks
 from engine_mount.recordings.cut import cut
-from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.settings import checked_settings
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
+from mount_ros.messages.cdr import accelerometer
+from mount_ros.messages.scalars import OneNumberLayout
 from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.mount_choice import with_control_of_mount
 
@@ -141,18 +141,15 @@ def _drive(order: Ordered, folder: Path) -> None:
             {
                 'scenario': order.drive['sim']['scenario'],
                 'mode': 'core',
-                'parameters': told_parameters(values),
+                'parameters': parameters_of_session(values),
                 'started': order.started.isoformat(timespec='seconds'),
                 'versions': versions(),
             }
         )
         for name, values in settings_of_mounts(parameters).items()
     }
-    record = partial(record_car, folder, parameters, sessions)
-    if not mounts_of(parameters):
-        record = partial(record_core, folder, parameters, sessions[''])
     begin = round(order.started.timestamp()) * 1_000_000_000
-    record(excitation=preflight(parameters, core=True), begin=begin)
+    record_core(folder, parameters, sessions, excitation=check_drive(parameters, core=True), begin=begin)
 
 
 def _spoil(folder: Path, damage: str) -> None:
@@ -179,18 +176,11 @@ def _spoil(folder: Path, damage: str) -> None:
 
 def _write_foreign(folder: Path, random: np.random.Generator) -> None:
     """Write a bag of another system, which holds 5 s of an acceleration and no displacement."""
-    from sensor_msgs.msg import Imu
-
-    from mount_ros.messages.cdr import serialised
-
-    writer = BagWriter(folder)
+    writer, imu = BagWriter(folder), OneNumberLayout(accelerometer)
     try:
         writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
         for place, value in enumerate(random.normal(0.0, 0.3, 500)):
-            message = Imu()
-            message.header.stamp.sec, rest = divmod(place, 100)
-            message.header.stamp.nanosec = rest * 10_000_000
-            message.linear_acceleration.z = float(value)
-            writer.write('/imu/data', serialised(message), place * 10_000_000)
+            stamp = place * 10_000_000  # ns
+            writer.write('/imu/data', imu.pack(stamp, float(value)), stamp)
     finally:
         writer.close()

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.drives.other_policy import NoEffectError
 from engine_mount.fleet.job import Progress, Rows, TableJob
 from engine_mount.fleet.places import Place, root_of, select_recordings
 from engine_mount.fleet.runner import LOCAL, processes_for
@@ -23,6 +22,7 @@ from engine_mount.fleet.setpoints import (
 from engine_mount.fleet.tables import Row
 from engine_mount.recordings.place import open_mount, open_run, recording_hash, recording_place
 from engine_mount.reports.fleet.looks import Signals
+from engine_mount.settings.chosen import NoEffectError
 from engine_mount.signals.sources.stores import local_copy
 from engine_mount.signals.sources.uris import shown
 from mount_recorder.versions import versions

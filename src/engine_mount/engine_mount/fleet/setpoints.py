@@ -8,18 +8,7 @@ import numpy as np
 
 from engine_mount.drives.agreement import SETTLED, SETTLING
 from engine_mount.drives.core import ControlReplay, run_ramp
-from engine_mount.drives.inputs.foreign import default_gap
-from engine_mount.drives.inputs.input import (
-    dated,
-    displacement_of,
-    has,
-    parameters_of,
-    recorded_gaps,
-    session_of,
-)
-from engine_mount.drives.inputs.parameter_changes import recorded_changes, without
-from engine_mount.drives.inputs.ramps import ramps_of
-from engine_mount.drives.inputs.taken import (
+from engine_mount.drives.inputs.consumed_samples import (
     Column,
     Notes,
     RecordedAnswers,
@@ -29,13 +18,23 @@ from engine_mount.drives.inputs.taken import (
     looked_up,
     quiet_at_first,
 )
-from engine_mount.drives.other_policy import check_effect
+from engine_mount.drives.inputs.foreign import default_gap
+from engine_mount.drives.inputs.input import (
+    displacement_of,
+    has,
+    parameters_of,
+    ramps_of,
+    recorded_changes,
+    recorded_gaps,
+    session_of,
+    without,
+)
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
 from engine_mount.fleet.figures import AnswerFigures, compared_answers, difference
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.times import each_once
 from engine_mount.reports.fleet.looks import Signals
-from engine_mount.settings.chosen import control_parameters
+from engine_mount.settings.chosen import check_effect, control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_ros.topics import (
     AIR_GAP,
@@ -99,7 +98,7 @@ def compare_setpoints(recorded: Recorded, changes: Parameters) -> Compared:
     recording, parameters = recorded.recording, recorded.parameters
     changed = changed_parameters(recorded, changes)
     is_imported = recorded.session.get('scenario') == SCENARIO  # such a recording holds no gap
-    gaps = recorded_gaps(recording, dated(default_gap({}), 0) if is_imported else None)
+    gaps = recorded_gaps(recording, default_gap({}).dated(0) if is_imported else None)
     ramps = []
     if 'mount_init' in changes or len(gaps) > 1:  # replayed, or between two runs of the controller
         ramps = ramps_of(recording, parameters, gaps, Notes())

@@ -2,18 +2,17 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from engine_mount.recordings.place import open_run
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.session import duration_of, session_parameters, started_of, told_session
 from engine_mount.settings.run_folder import RunFolder
-from engine_mount.signals.sources.local import local_path
-from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.sources.stores import is_local, outline
+from engine_mount.signals.sources.stores import entries
+from engine_mount.signals.sources.uris import inside, is_local, local_path
 from mount_recorder.metadata import METADATA_NAME
 from mount_sim.mount_choice import simulated_mounts
 
@@ -61,8 +60,8 @@ class Listed:
 def listed(folders: Sequence[Path | str]) -> list[Listed]:
     """Return the recordings in `folders`, and those that these are themselves, the newest first.
 
-    A folder is a path or a URI; of what lies in a store only the ends are read. Raises `SourceError` where a
-    store does not tell what is there.
+    A folder is a path or a URI; in a store only names and sizes are read. Raises `SourceError` where a store
+    cannot be listed.
     """
     found = [one for folder in folders for one in _listed_at(str(folder))]
     return sorted(found, key=lambda one: one.started.timestamp() if one.started else 0.0, reverse=True)
@@ -94,14 +93,32 @@ def _listed_at(folder: str) -> Iterator[Listed]:
     if is_local(folder):
         yield from map(listed_one, _places(local_path(folder)))
         return
-    from engine_mount.signals.sources.outlines import recordings_at
+    for uri, size in _stored(folder).items():
+        yield Listed(uri, verdict=f'{size / 1e6:.1f} MB, not read: engine-mount info fetches it')
 
-    for uri in recordings_at(folder):
-        try:
-            with outline(uri) as path:
-                yield replace(listed_one(path), path=uri)
-        except SourceError as error:
-            yield Listed(uri, verdict=str(error), sound=False)
+
+def _stored(folder: str) -> dict[str, int]:
+    """Return the recordings and runs that a place in a store is or directly holds, with their bytes."""
+    root = folder.rstrip('/')
+    files = {entry.uri[len(root) :].strip('/'): entry.size for entry in entries(folder)}
+    if '' in files:
+        return {folder: files['']}
+    found: dict[str, int] = {}
+    for name, size in files.items():
+        first, _, rest = name.partition('/')
+        found[first if rest else ''] = found.get(first if rest else '', 0) + size
+    recorded = {PurePosixPath(name).parent.as_posix() for name in files if _is_recorded(name)}
+    if recorded & {'.', 'recording'}:
+        return {folder: sum(files.values())}
+    return {
+        inside(folder, name): size
+        for name, size in sorted(found.items())
+        if recorded & {name, f'{name}/recording'}
+    }
+
+
+def _is_recorded(name: str) -> bool:
+    return name.endswith('.mcap') or PurePosixPath(name).name == METADATA_NAME
 
 
 def _places(folder: Path) -> Iterator[Path]:

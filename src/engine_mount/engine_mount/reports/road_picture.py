@@ -10,9 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from engine_mount.reports.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
-from engine_mount.signals.roads.iso8608 import CLASSES, FIRST_LIMIT, Unevenness
-from engine_mount.signals.roads.long_waves import LONGEST_WAVE, without_long_waves
-from engine_mount.signals.roads.profile import RoadProfile
+from engine_mount.signals.roads.iso8608 import (
+    CLASSES,
+    FIRST_LIMIT,
+    LONGEST_WAVE,
+    RoadProfile,
+    Unevenness,
+    without_long_waves,
+)
 from mount_sim.excitation.road import REFERENCE_FREQUENCY
 
 

@@ -1,10 +1,14 @@
-"""Sizes and durations as people write them."""
+"""Sizes and durations as people write them, and the options of the recorder that are made of them."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
-from mount_models.quantity import ParameterError
+from mount_models.quantity import ParameterError, with_flattened
+from mount_recorder.automatic_marks import mark_kinds
 from mount_recorder.bag_writer import SplitRule, checked_rule
+from mount_recorder.diagnosis import OnFull
+from mount_recorder.parameters import RecorderParameters, split_of
 
 _SIZES = {'B': 1, 'kB': 10**3, 'MB': 10**6, 'GB': 10**9, 'KiB': 1 << 10, 'MiB': 1 << 20, 'GiB': 1 << 30}
 _DURATIONS = {'ms': 10**6, 's': 10**9, 'min': 60 * 10**9, 'h': 3600 * 10**9}
@@ -25,6 +29,28 @@ def split_rule(texts: Iterable[str]) -> SplitRule:
         else:
             raise ParameterError(f'{text!r} is no size and no duration; write 500MB, 1GiB, 60s or 10min')
     return checked_rule(SplitRule(size, duration))
+
+
+def recorder_options(split: Sequence[str], snapshot: str, snapshot_after: str = '') -> dict[str, Any]:
+    """Return {parameter: value} of the recorder of texts such as `500MB`, `60s`; raises `ParameterError`."""
+    options: dict[str, Any] = {}
+    if split:
+        rule = split_rule(split)
+        options.update(split_size=rule.size, split_duration=rule.duration * 1e-9)
+    for name, text in (('snapshot', snapshot), ('snapshot_after', snapshot_after)):
+        if text:
+            options[name] = duration_in_nanoseconds(text) * 1e-9
+    return options
+
+
+def checked_recorder(options: Mapping[str, Any]) -> RecorderParameters:
+    """Return the recorder's parameters, or raise the `ValueError` with which it would refuse them."""
+    parameters = with_flattened(RecorderParameters(), options)
+    split_of(parameters)
+    mark_kinds(parameters.automatic_marks)
+    if parameters.on_full not in [word.value for word in OnFull]:
+        raise ParameterError(f'on_full must be stop or continue; instead received {parameters.on_full!r}')
+    return parameters
 
 
 def size_in_bytes(text: str) -> int:

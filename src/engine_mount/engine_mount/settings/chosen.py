@@ -5,13 +5,37 @@ from typing import Any
 
 from mount_control.policy.contract import Policy
 from mount_control.policy.registry import UNPREFIXED
-from mount_control.settings import ControlParameters, ControlSettings, control_settings, policy_parameters
-from mount_models.quantity import with_flattened
+from mount_control.settings import (
+    ControlParameters,
+    ControlSettings,
+    control_settings,
+    policy_parameters,
+    without_effect,
+)
+from mount_init.estimate import TemperatureReadings
+from mount_init.initialisation import Initialisation
+from mount_init.parameters import InitParameters
+from mount_models.quantity import ParameterError, with_flattened
 from mount_models.specimen import Specimen
 from mount_models.specimen import chosen_specimen as specimen_of
 
 Parameters = Mapping[str, Mapping[str, Any]]
 """{node: {parameter: value}}, as given to the nodes."""
+
+
+class NoEffectError(ParameterError):
+    """A parameter belongs to another policy than the chosen one; the text names both."""
+
+
+def check_effect(values: Mapping[str, Any], chosen: str = '') -> None:
+    """Raise `NoEffectError` if {parameter: value} name one of another policy than the chosen one.
+
+    The chosen policy is the one in `values`, else `chosen`, else the default. On the desk such a parameter
+    is a mistake.
+    """
+    policy = values.get('policy') or chosen or ControlParameters().policy
+    if sentence := without_effect(values, policy):
+        raise NoEffectError(sentence)
 
 
 def control_parameters(parameters: Parameters) -> ControlParameters:
@@ -41,6 +65,14 @@ def chosen_specimen(parameters: Parameters, node: str = 'mount_init') -> Specime
     """Return the specimen of a run, as `node` loads it."""
     values = parameters.get(node, {})
     return specimen_of(values.get('parameters_file', ''), values.get('specimen', ''))
+
+
+def chosen_initialisation(
+    parameters: Parameters, temperatures: TemperatureReadings | None = None
+) -> Initialisation:
+    """Return a ramp of mount_init before its first sample; `temperatures` are those of the coil."""
+    own = with_flattened(InitParameters(), parameters.get('mount_init', {}))
+    return Initialisation(chosen_specimen(parameters), own, temperatures or TemperatureReadings())
 
 
 def chosen_control(parameters: Parameters) -> ControlSettings:

@@ -9,18 +9,16 @@ to either side. Of a sine, relative to its amplitude (held by a test):
 | 0.45 f | halved |
 | from 0.5 f on (images of samples, or what the slower rate cannot hold) | below 2e-4 |
 
-A step overshoots by 13 % of its height; no samples at all leave their range by more than 0.6 of it. Before
-the first sample and behind the last the signal stands still.
+A step overshoots by 13 % of its height; no result leaves the range of its samples by more than 0.6 of it.
+Before the first sample and behind the last the signal stands still.
 """
 
 import functools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from engine_mount.signals.even_grid import EvenSignal
-from engine_mount.signals.plausibility import OVERSHOOT, check_range
 from engine_mount.signals.signal import FloatArray
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import sine_and_cosine
@@ -30,8 +28,6 @@ HALF_LENGTH = 26  # samples of the slower rate
 CUTOFF = 0.45  # of the slower rate, chosen: what is left at its half is as small as the window allows
 _SHAPE = 7.857  # Kaiser's beta for 80 dB
 _PHASES = 1024  # points of the kernel for each sample; between them it is straight, within 1e-6
-_COARSE = 4  # points to a period of the slower rate
-_WITHOUT_DOUBT = 0.9  # of what is allowed, chosen: 8 % for what lies between the points, and some more
 _SAME = 0.1  # samples, chosen: grids that run apart by no more over the whole signal are one
 
 
@@ -40,44 +36,16 @@ def resampled(
 ) -> StreamedSeries:
     """Return `count` values `step_time` (s) apart, from `first` (s after the first sample) on.
 
-    Without `count` up to before the last sample. A signal that has that step already is not touched. Raises
-    `SignalError` for a result that its samples do not bear out.
+    Without `count` up to before the last sample. A signal that has that step already is not touched.
     """
     if first == 0.0 and has_step(even, step_time):
         return series_of(even.values[:count])
     if count is None:
         count = max(1, math.ceil(even.length / step_time - 1e-6))
-    grid, kernel = _Grid(even.period, first, step_time), _kernel()
-    _check(even, grid, count, kernel)
-    return StreamedSeries(count, lambda begin, behind: _filtered(even.values, grid, begin, behind, kernel))
-
-
-class _Grid(NamedTuple):
-    """Where results stand: period of the samples, time of the first result, time between results, in s."""
-
-    period: float
-    first: float
-    step_time: float
-
-
-def _check(even: EvenSignal, grid: _Grid, count: int, kernel: FloatArray) -> None:
-    """Raise `SignalError` where one of `count` results leaves the range of the samples too far.
-
-    The results are band-limited to half the slower rate. What a signal of that band does on a grid of four
-    points to the slower rate's period, to both sides as far as the kernel reaches, it exceeds between them by
-    no more than 1 / cos(pi / 8), or 8 % (Duffin and Schaeffer, 1945). Most signals pass by that.
-    """
-    low, high = float(even.values.min()), float(even.values.max())
-    slower = max(grid.period, grid.step_time)
-    if slower > _COARSE * grid.step_time:
-        reach = HALF_LENGTH * slower
-        coarse = grid._replace(first=grid.first - reach, step_time=slower / _COARSE)
-        points = math.ceil(((count - 1) * grid.step_time + 2.0 * reach) / coarse.step_time) + 1
-        _, value = _farthest(even.values, coarse, points, kernel, 0.5 * (low + high))
-        if abs(value - 0.5 * (low + high)) <= _WITHOUT_DOUBT * (0.5 + OVERSHOOT) * (high - low):
-            return
-    number, value = _farthest(even.values, grid, count, kernel, 0.5 * (low + high))
-    check_range(even, value, grid.first + number * grid.step_time, low, high)
+    grid = (even.period, step_time, first)
+    return StreamedSeries(
+        count, lambda begin, behind: _filtered(even.values, *grid, begin, behind, _kernel())
+    )
 
 
 def has_step(even: EvenSignal, step_time: float) -> bool:
@@ -94,38 +62,22 @@ def _kernel() -> FloatArray:
 
 
 @compiled
-def _filtered(values, grid, begin, behind, kernel):
+def _filtered(values, period, step_time, first, begin, behind, kernel):
     """Return the results `begin` .. `behind` - 1."""
+    slower = max(period, step_time)
+    reach = HALF_LENGTH * slower / period
     result = np.empty(behind - begin)
     for number in range(begin, behind):
-        result[number - begin] = _result(values, grid, number, kernel)
+        at = (first + number * step_time) / period
+        total, weights = 0.0, 0.0
+        for place in range(math.ceil(at - reach), math.floor(at + reach) + 1):
+            distance = abs(at - place) * (period / slower) * _PHASES
+            point = int(distance)
+            weight = kernel[point] + (distance - point) * (kernel[point + 1] - kernel[point])
+            total += weight * values[min(max(place, 0), values.size - 1)]
+            weights += weight
+        result[number - begin] = total / weights  # a constant comes out as it went in
     return result
-
-
-@compiled
-def _farthest(values, grid, count, kernel, middle):
-    """Return number and value of that of the first `count` results that lies farthest from `middle`."""
-    farthest, value = 0, middle
-    for number in range(count):
-        result = _result(values, grid, number, kernel)
-        if abs(result - middle) > abs(value - middle):
-            farthest, value = number, result
-    return farthest, value
-
-
-@compiled
-def _result(values, grid, number, kernel):
-    slower = max(grid.period, grid.step_time)
-    reach = HALF_LENGTH * slower / grid.period
-    at = (grid.first + number * grid.step_time) / grid.period
-    total, weights = 0.0, 0.0
-    for place in range(math.ceil(at - reach), math.floor(at + reach) + 1):
-        distance = abs(at - place) * (grid.period / slower) * _PHASES
-        point = int(distance)
-        weight = kernel[point] + (distance - point) * (kernel[point + 1] - kernel[point])
-        total += weight * values[min(max(place, 0), values.size - 1)]
-        weights += weight
-    return total / weights  # a constant comes out as it went in
 
 
 @compiled

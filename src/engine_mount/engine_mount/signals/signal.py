@@ -51,3 +51,15 @@ def check_count(name: str, count: int) -> None:
     """Raise `SignalError` if a signal has too few samples to be one."""
     if count < _FEWEST:
         raise SignalError(f'{name} has {count} samples; at least {_FEWEST} are needed')
+
+
+def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
+    """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if beyond +- `limit`."""
+    ends = (int(values.argmax()), int(values.argmin()))  # no absolute values: they would be an hour once more
+    place = max(ends, key=lambda each: (abs(values[each]), -each))
+    if abs(values[place]) <= limit:
+        return
+    raise SignalError(
+        f'{name}: sample {place} at {place * step_time:.4f} s is {values[place]:.4g} {unit}, beyond '
+        f'+-{limit:g} {unit} ({np.count_nonzero(np.abs(values) > limit)} such of {len(values)}); {remedy}'
+    )

@@ -7,23 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import WrenchStamped
-from std_msgs.msg import String
 
 from engine_mount.cli.command import main
 from engine_mount.identification.rack.columns import RackRecordingError
 from engine_mount.identification.rack.force_points import read_force
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
-from engine_mount.signals.units.mapping import ColumnChoice
+from engine_mount.signals.mapping import ColumnChoice, Mapping
 from mount_models.actuator.law import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
+from mount_ros.messages.cdr import string_message, temperature, wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.messages.sensors import temperature_layout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
@@ -49,9 +46,9 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     try:
         for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', serialised(String(data='scenario: rack')), begin)
-        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), temperature_layout()
-        forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        writer.write(f'/{SESSION.name}', string_message('scenario: rack'), begin)
+        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), OneNumberLayout(temperature)
+        forces = OneNumberLayout(wrench)
         rows = zip(current.tolist(), rate.tolist(), flux.tolist(), pull.tolist(), strict=True)
         for sample, (i, of_current, of_flux, force) in enumerate(rows):
             stamp = sample * 1_000_000
@@ -114,7 +111,7 @@ def test_the_specimen_names_its_recordings_by_their_hash(calibrated, recordings)
 
 def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6, celsius=61.2)
-    (ripple,) = read_ripple([bag], {}, NOTHING, AREA)
+    (ripple,) = read_ripple([bag], Mapping(), NOTHING, AREA)
     columns = record_ripple(RACK, 349e-6, 61.2, duration=1.5, peak_current=2.5)
     assert (ripple.gap, ripple.celsius) == (pytest.approx(349e-6), pytest.approx(61.2))
     np.testing.assert_array_equal(ripple.current, columns['current_a'])
@@ -128,7 +125,7 @@ def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path)
 
 def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6)
-    points = read_force([bag], {}, NOTHING)
+    points = read_force([bag], Mapping(), NOTHING)
     assert 50 < points.current.size <= 100
     assert (np.diff(points.current) > 0.0).all()
     assert np.ptp(points.gap) == 0.0
@@ -140,29 +137,29 @@ def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
 def test_a_recording_without_what_is_needed_is_refused(tmp_path):
     bag = record(tmp_path / 'held', 349e-6)
     with pytest.raises(RackRecordingError, match='its air gap is not known; add --gap held=UM'):
-        read_ripple([bag], {}, NOTHING, AREA)
+        read_ripple([bag], Mapping(), NOTHING, AREA)
     given = GivenValues({bag: 349e-6}, {})
     with pytest.raises(RackRecordingError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
-        read_force([bag], {'force': ColumnChoice('sim/mount_force:wrench.force.z')}, given)
+        read_force([bag], Mapping({'force': ColumnChoice('sim/mount_force:wrench.force.z')}), given)
     with pytest.raises(RackRecordingError, match='of an MCAP recording write TOPIC:FIELD'):
-        read_force([bag], {'force': ColumnChoice('kraft')}, given)
+        read_force([bag], Mapping({'force': ColumnChoice('kraft')}), given)
 
 
 def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6, spoil=5)
     with pytest.raises(RackRecordingError, match='20% of the inductances are not positive, at most 10%'):
-        read_ripple([bag], {}, NOTHING, AREA)
+        read_ripple([bag], Mapping(), NOTHING, AREA)
 
 
 def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6, warming=10.0)
     with pytest.raises(RackRecordingError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
-        read_ripple([bag], {}, NOTHING, AREA)
+        read_ripple([bag], Mapping(), NOTHING, AREA)
 
 
 def test_a_single_mcap_file_is_read_as_its_folder_is(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6)
     (file,) = Path(bag).glob('*.mcap')
-    (of_file,) = read_ripple([file], {}, NOTHING, AREA)
-    (of_folder,) = read_ripple([bag], {}, NOTHING, AREA)
+    (of_file,) = read_ripple([file], Mapping(), NOTHING, AREA)
+    (of_folder,) = read_ripple([bag], Mapping(), NOTHING, AREA)
     np.testing.assert_array_equal(of_file.inductance, of_folder.inductance)

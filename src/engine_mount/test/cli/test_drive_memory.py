@@ -2,13 +2,13 @@
 
 import tracemalloc
 
+from engine_mount.drives.drive import check_drive
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.preflight import preflight
 
 
 def peak_of_core(folder, duration):
     parameters = {'mount_sim': {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': duration}}
-    excitation = preflight(parameters)
+    excitation = check_drive(parameters)
     tracemalloc.start()
     outcome = record_core(folder, parameters, 'session', excitation=excitation)
     peak = tracemalloc.get_traced_memory()[1]

@@ -22,6 +22,7 @@ from engine_mount.experiments.registry import NAMES, experiment_named
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
 from engine_mount.recordings.audit import audit
+from engine_mount.signals.mapping import Mapping
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
 
@@ -205,7 +206,7 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
 
 def _check_that_calibration_reads_the_ramp(folder, inductance_at_rest):
     turns_area = default_specimen().turns_area
-    (ripple,) = read_ripple([folder], {}, GivenValues({folder: 492e-6}, {}), turns_area)
+    (ripple,) = read_ripple([folder], Mapping(), GivenValues({folder: 492e-6}, {}), turns_area)
     assert ripple.celsius == 20.0
     resting = np.abs(ripple.current - 0.2) < 0.005
     assert np.nanmean(ripple.inductance[resting]) == pytest.approx(inductance_at_rest, rel=1e-3)

@@ -22,7 +22,7 @@ from engine_mount.experiments.recorded_drive import (
 )
 from engine_mount.experiments.registry import experiments_named
 from engine_mount.signals.excitation import acceleration_at, recorded_signal
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.sources.source import SourceError
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario
 
@@ -130,7 +130,7 @@ def test_without_a_file_it_says_what_to_give(tmp_path):
 
 
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
-    with pytest.raises(SignalError, match='does not exist'):
+    with pytest.raises(SourceError, match='no such file'):
         run(tmp_path / 'out', tmp_path / 'none.csv')
     with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
         run(tmp_path / 'out', tmp_path / 'none.csv', duration=5.0)
@@ -150,8 +150,8 @@ def test_alone_its_own_page_is_the_page(driven, tmp_path):
 
 @needs_i280
 def test_the_committed_page_tells_of_this_recording():
-    signal = recorded_signal(RecordedScenario(str(I280), 'accelerometer.2'))
-    values = acceleration_at(signal, -1.0, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
+    signal = recorded_signal(RecordedScenario(str(I280), 'accelerometer.2', scale=-1.0))
+    values = acceleration_at(signal, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
     text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
     told = re.findall(r'([\d.]+) m/s\^2 from', text)
     assert [float(number) for number in told] == pytest.approx(rms_in_bands(values, BANDS), abs=0.001)

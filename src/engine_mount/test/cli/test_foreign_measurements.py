@@ -5,15 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from engine_mount.cli.calibration.given import columns_of
-from engine_mount.identification.friction.channels import said
+from engine_mount.identification.friction.channels import friction_mapping
 from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.friction.recording import IdentificationError
-from engine_mount.identification.rack.columns import RackRecordingError
+from engine_mount.identification.rack.columns import RACK
 from engine_mount.identification.rack.force_points import read_force
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
-from engine_mount.signals.units.mapping import Mapping, mapping_in_file
+from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
+from engine_mount.signals.signal import SignalError
 
 POUND, INCH = 4.4482216152605, 0.0254
 NOTHING = GivenValues({}, {}, 20.0)
@@ -103,7 +102,7 @@ FORMATS = [
 def test_identify_reads_friction_in_imperial_units_of_every_format(tmp_path, suffix, write):
     file = tmp_path / f'rig.{suffix}'
     write(file, MOTION)
-    found = read_recording(file, said(SAID))
+    found = read_recording(file, friction_mapping(SAID))
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
     assert found.force == pytest.approx(FRICTION, rel=1e-9, abs=1e-9)
@@ -114,7 +113,7 @@ def test_identify_reads_friction_in_imperial_units_of_every_format(tmp_path, suf
 def test_calibrate_reads_forces_in_imperial_units_of_every_format(tmp_path, suffix, write):
     file = tmp_path / f'force.{suffix}'
     write(file, FORCES)
-    points = read_force([file], columns_of(FORCES_SAID, Mapping()), NOTHING)
+    points = read_force([file], with_options(Mapping(), FORCES_SAID, known=RACK), NOTHING)
     assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
     assert points.current == pytest.approx(CURRENT, rel=1e-9)
     assert points.force == pytest.approx(PULL, rel=1e-9)
@@ -137,7 +136,7 @@ def test_units_in_titles_are_heard(tmp_path):
         tmp_path / 'force.xlsx',
         {'gap [mm]': 1e-3 * GAP, 'current [A]': CURRENT, 'force_kip': PULL / POUND / 1e3},
     )
-    points = read_force([tmp_path / 'force.xlsx'], {}, NOTHING)
+    points = read_force([tmp_path / 'force.xlsx'], Mapping(), NOTHING)
     assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
     assert points.force == pytest.approx(PULL, rel=1e-9)
 
@@ -157,17 +156,15 @@ columns:
 def test_a_mapping_file_says_columns_units_axes_and_offsets(tmp_path):
     (tmp_path / 'rig.yaml').write_text(MAPPING)
     as_mat(tmp_path / 'rig.mat', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
-    found = read_recording(tmp_path / 'rig.mat', said([], mapping_in_file(tmp_path / 'rig.yaml')))
+    found = read_recording(tmp_path / 'rig.mat', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FRICTION, rel=1e-9, abs=1e-9)
     (tmp_path / 'forces.yaml').write_text(
         MAPPING.replace('cell, unit: lbf, scale: -1', 'Kraft, unit: lbf, offset: 2.0')
     )
     as_parquet(tmp_path / 'force.parquet', FORCES)
-    chosen = columns_of([], mapping_in_file(tmp_path / 'forces.yaml'))
+    chosen = mapping_in_file(tmp_path / 'forces.yaml').of(RACK)
     assert read_force([tmp_path / 'force.parquet'], chosen, NOTHING).force == pytest.approx(PULL - 2.0)
-    other = columns_of(['force=Strom:N'], mapping_in_file(tmp_path / 'forces.yaml'))
-    assert other['force'].column == 'Strom:N'
 
 
 @pytest.mark.parametrize(
@@ -182,11 +179,9 @@ def test_a_scale_without_a_unit_stands_beside_the_unit_of_the_header(tmp_path, s
         '  normal_force: {column: load}\n'
     )
     (tmp_path / 'rig.yaml').write_text(text)
-    chosen = said([], mapping_in_file(tmp_path / 'rig.yaml'))
+    chosen = friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml'))
     if factor is None:
-        with pytest.raises(
-            IdentificationError, match=r'says mm \(0.001 SI units each\), the mapping a scale of 0.98'
-        ):
+        with pytest.raises(SignalError, match=r'says mm \(0.001 m each\), the scale says 0.98'):
             read_recording(tmp_path / 'rig.csv', chosen)
         return
     found = read_recording(tmp_path / 'rig.csv', chosen)
@@ -195,9 +190,10 @@ def test_a_scale_without_a_unit_stands_beside_the_unit_of_the_header(tmp_path, s
 
 
 def test_a_mapped_unit_of_another_quantity_is_refused(tmp_path):
+    as_csv(tmp_path / 'rig.csv', {'t': TIME, 'x': WAY, 'friction_force_n': FRICTION, 'normal_force_n': LOAD})
     (tmp_path / 'rig.yaml').write_text('columns:\n  displacement: {column: x, unit: N}\n')
-    with pytest.raises(IdentificationError, match='the mapping names N for displacement'):
-        said([], mapping_in_file(tmp_path / 'rig.yaml'))
+    with pytest.raises(SignalError, match='is in N, as you say: that is of force'):
+        read_recording(tmp_path / 'rig.csv', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
 
 
 def test_ripple_tables_are_read_of_other_formats_too(tmp_path):
@@ -205,31 +201,39 @@ def test_ripple_tables_are_read_of_other_formats_too(tmp_path):
     as_mdf(tmp_path / 'L.mf4', table)
     as_csv(tmp_path / 'L.csv', table)
     for one, other in zip(
-        read_ripple([tmp_path / 'L.mf4'], {}, NOTHING, 0.1),
-        read_ripple([tmp_path / 'L.csv'], {}, NOTHING, 0.1),
+        read_ripple([tmp_path / 'L.mf4'], Mapping(), NOTHING, 0.1),
+        read_ripple([tmp_path / 'L.csv'], Mapping(), NOTHING, 0.1),
         strict=True,
     ):
         np.testing.assert_allclose(one.inductance, other.inductance, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
-    ('texts', 'words'),
+    ('text', 'words'),
     [
-        (['displacement=way:lbf'], "unit 'lbf' is none of length; known are m, mm"),
-        (['friction_force=cell:g'], "unit 'g' is none of force"),
-        (['load=cell:N'], 'write NAME=COLUMN or NAME=COLUMN:UNIT with NAME one of'),
+        ('displacement=way:lbf', 'is in lbf, as you say: that is of force, but displacement is of length'),
+        ('friction_force=cell:g', 'that is of acceleration, but friction_force is of force'),
+        ('friction_force=load_cell:N', "has no column 'load_cell'"),
     ],
 )
-def test_a_unit_of_another_quantity_is_refused(texts, words):
-    with pytest.raises(IdentificationError, match=words):
-        said(texts)
+def test_a_unit_of_another_quantity_is_refused(tmp_path, text, words):
+    as_csv(tmp_path / 'rig.csv', MOTION)
+    said = {one.partition('=')[0]: one for one in (*SAID, text)}
+    with pytest.raises(SignalError, match=words):
+        read_recording(tmp_path / 'rig.csv', friction_mapping(said.values()))
 
 
 def test_a_column_that_is_not_there_and_a_unit_of_another_quantity_are_refused(tmp_path):
     as_npz(tmp_path / 'force.npz', FORCES)
-    with pytest.raises(RackRecordingError, match=r"no column 'Luft'; its columns are .*Spalt, Strom, Kraft"):
-        read_force([tmp_path / 'force.npz'], columns_of(['gap=Luft:mm'], Mapping()), NOTHING)
-    with pytest.raises(
-        RackRecordingError, match="'lbf' is no unit of gap; known are um, mm, m and others of length"
-    ):
-        read_force([tmp_path / 'force.npz'], columns_of(['gap=Spalt:lbf'], Mapping()), NOTHING)
+    with pytest.raises(SignalError, match=r"no column 'Luft'; its columns are .*Spalt, Strom, Kraft"):
+        read_force(
+            [tmp_path / 'force.npz'],
+            with_options(Mapping(), ['gap=Luft:mm', *FORCES_SAID[1:]], known=RACK),
+            NOTHING,
+        )
+    with pytest.raises(SignalError, match='is in lbf, as you say: that is of force, but gap is of length'):
+        read_force(
+            [tmp_path / 'force.npz'],
+            with_options(Mapping(), ['gap=Spalt:lbf', *FORCES_SAID[1:]], known=RACK),
+            NOTHING,
+        )

@@ -4,14 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import WrenchStamped
 
 from engine_mount.cli.command import main
 from engine_mount.drives.loop.run import run_core
 from engine_mount.identification.drift.law import DriftError, fitted_drift
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.cdr import wrench
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
     AIR_GAP,
@@ -82,10 +81,10 @@ def record_on_rack(folder, coefficient, gap, clamp, noise):
         writer.add_topic(f'/{topic.name}', topic.type, latched=topic in topics[:2])
     found = {'rest_gap': 500e-6, 'contact_gap': gap, 'contact_gap_std': GAP_STD, 'offset_current': 0.49}
     gaps, positions = ScalarsLayout(AIR_GAP), ScalarsLayout(DISPLACEMENT)
-    forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+    forces = OneNumberLayout(wrench)
     table = np.array([[0.5, 3.0], [0.0, 300.0]])
     writer.write(f'/{AIR_GAP.name}', gaps.pack(0, [found.get(name, 1.0) for name in gaps.names]), 0)
-    writer.write(f'/{CURRENT_FORCE_TABLE.name}', serialised(to_message(0, table)), 0)
+    writer.write(f'/{CURRENT_FORCE_TABLE.name}', table_message(0, table), 0)
     rows = zip(displacement.tolist(), force.tolist(), normal.tolist(), strict=True)
     for sample, (x, friction, load) in enumerate(rows):
         stamp = 1_000_000 * sample

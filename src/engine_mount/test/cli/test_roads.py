@@ -168,4 +168,4 @@ def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, tmp_path, 
     numbers = np.random.default_rng(1).normal(0.0, 1.0, 2000)
     flat.write_text('x [m],acc\n' + ''.join(f'{0.05 * k:.2f},{each:.4f}\n' for k, each in enumerate(numbers)))
     said = refused(capsys, 'road', 'show', flat, '--column', 'acc')
-    assert 'is an acceleration, not a height' in said
+    assert 'no unit is said' in said

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
 from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.sources.stores import traffic
 
 REFERENCE = Path(__file__).parents[4] / 'bags' / 'reference' / 'gap'
 STORE = 'memory://drives'
@@ -99,18 +98,23 @@ def test_a_run_by_uri_becomes_a_reference(tmp_path):
     assert 'new reference' in told
 
 
-def test_ls_lists_a_store_and_reads_only_the_ends_of_its_files(tmp_path):
-    shutil.copytree(REFERENCE, tmp_path / 'there' / 'gap')
-    before = traffic().bytes
+def test_ls_lists_the_recordings_of_a_store_with_their_sizes_and_fetches_none(tmp_path):
+    files = fsspec.filesystem('memory')
+    for name in ('run/recording/metadata.yaml', 'run/log/x.txt', 'c/notes.txt', 'd/deeper/d_0.mcap', 'e.csv'):
+        files.pipe(f'/drives/{name}', b'x')
     run('ls', STORE, '--json', 'store.json')
-    assert traffic().bytes - before < 0.6 * (REFERENCE / 'gap_0.mcap').stat().st_size
-    run('ls', tmp_path / 'there', '--json', 'disk.json')
-    stored, here = (
-        json.loads(Path(name).read_text())['recordings'][0] for name in ('store.json', 'disk.json')
-    )
-    assert stored.pop('recording') == RUN
-    assert here.pop('recording') == str(tmp_path / 'there' / 'gap')
-    assert stored == here
+    found = json.loads(Path('store.json').read_text())['recordings']
+    size = sum(file.stat().st_size for file in REFERENCE.iterdir())
+    told = {one['recording']: one['verdict'] for one in found}
+    assert told == {
+        RUN: f'{size / 1e6:.1f} MB, not read: engine-mount info fetches it',
+        f'{STORE}/run': '0.0 MB, not read: engine-mount info fetches it',
+    }
+    for place in (RUN, f'{RUN}/gap_0.mcap'):
+        run('ls', place, '--json', 'one.json')
+        (one,) = json.loads(Path('one.json').read_text())['recordings']
+        assert one['recording'] == place
+    assert not (tmp_path / 'copies').exists()
 
 
 def test_ls_tells_where_nothing_is():

@@ -11,7 +11,6 @@ from mount_ros import environment
 
 def test_no_recording_begins_where_the_loopback_interface_is_down(tmp_path, monkeypatch):
     monkeypatch.setattr(environment, '_NEIGHBOUR', ('255.255.255.255', 9))  # refused without a flag
-    order = record.RecordOrder(tmp_path / 'out', RecorderParameters())
     with pytest.raises(RecordingError, match=r'^the loopback interface is down'):
-        record.record(order, Screen())
+        record.record(tmp_path / 'out', RecorderParameters(), Screen())
     assert not (tmp_path / 'out').exists()

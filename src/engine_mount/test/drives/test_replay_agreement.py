@@ -8,7 +8,8 @@ import pytest
 
 from engine_mount.drives.agreement import SETTLING, agreement, recorded_switching, switching_changes
 from engine_mount.drives.core import ControlAnswers, Replayed
-from engine_mount.drives.inputs.input import ControlRun, RecordedAnswers, ReplayInput
+from engine_mount.drives.inputs.consumed_samples import ControlRun, RecordedAnswers
+from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.switching import Switching
 from mount_control.control_loop import SampleCounts
 from mount_control.policy import switched_viscous

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engine_mount.drives.inputs.taken import looked_up, places_in
+from engine_mount.drives.inputs.consumed_samples import looked_up, places_in
 
 STAMPS = np.arange(100, 200, 5)
 

@@ -194,11 +194,11 @@ def test_a_manoeuvre_that_ends_before_it_is_looked_at_is_refused(tmp_path):
 
 @pytest.mark.parametrize('error', [GraphError('no gap'), ParameterError('a graph already runs')])
 def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
-    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=error))
+    monkeypatch.setattr(run, 'drive', Mock(side_effect=error))
     made = trials(tmp_path, through=GRAPH)[0]
     broken = run.run_trial(made)
     assert (broken.figures, broken.broke_down) == ({}, str(error))
-    monkeypatch.setattr(run, 'record_drive', Mock(side_effect=Interrupted()))
+    monkeypatch.setattr(run, 'drive', Mock(side_effect=Interrupted()))
     with pytest.raises(Interrupted):
         run.run_trial(made)
 

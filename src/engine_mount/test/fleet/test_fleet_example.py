@@ -5,7 +5,7 @@ import hashlib
 import pytest
 
 import engine_mount
-from engine_mount.drives.preflight import preflight
+from engine_mount.drives.drive import check_drive
 from engine_mount.fleet.example import (
     FEWEST,
     VARIATIONS,
@@ -36,12 +36,12 @@ def test_the_whole_fleet_can_be_driven_and_each_recording_has_a_folder_of_its_ow
     orders = whole_fleet(tmp_path)
     assert len({order.folder for order in orders}) == len(orders) == WHOLE_FLEET
     for order in orders:
-        preflight(settings_of(order), core=True)
+        check_drive(settings_of(order), core=True)
 
 
 def test_longer_drives_can_be_driven_and_a_sweep_ends_at_its_last_frequency(tmp_path):
     for order in whole_fleet(tmp_path, 40.0)[:: len(VARIATIONS)]:
-        length = preflight(settings_of(order), core=True).duration
+        length = check_drive(settings_of(order), core=True).duration
         sweeps = {'sweep': 18.0, 'sweep_switched': 46.0 / 3.0}
         assert length == pytest.approx(sweeps.get(order.folder.parent.name, 40.0), abs=1e-3)
 

@@ -14,6 +14,7 @@ from engine_mount.identification.rack.columns import RackRecordingError
 from engine_mount.identification.rack.given import GivenValues
 from engine_mount.identification.rack.ripple_recordings import read_ripple
 from engine_mount.identification.specimen import with_gap_curves
+from engine_mount.signals.mapping import Mapping
 from mount_models.coil.gap import evaluate
 from mount_models.quantity import LawRefusedError
 from mount_models.specimen import default_specimen
@@ -124,7 +125,7 @@ def written(file, celsius=(20.0,), drift=0.0):
 
 def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path):
     file = written(tmp_path / 'all.csv', (20.0, 80.0))
-    recordings = read_ripple([file], {}, NOTHING, 0.1)
+    recordings = read_ripple([file], Mapping(), NOTHING, 0.1)
     assert len(recordings) == 2 * GAPS.size
     assert {round(each.celsius) for each in recordings} == {20, 80}
     for each in recordings:
@@ -144,4 +145,4 @@ def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path)
 def test_a_temperature_that_runs_is_refused_still(tmp_path):
     file = written(tmp_path / 'runs.csv', drift=2.0)
     with pytest.raises(RackRecordingError, match=r'coil temperature ran from 20\.0 to 42\.0 degC'):
-        read_ripple([file], {}, NOTHING, 0.1)
+        read_ripple([file], Mapping(), NOTHING, 0.1)

@@ -7,6 +7,7 @@ import pytest
 from compared_drives import answers, text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from recorded_drive import PERIOD, RECORDED, START, joint_state
+from ros_testing import serialised
 
 import engine_mount
 from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_answers
@@ -15,7 +16,6 @@ from engine_mount.recordings.audit_report import as_json, sentences
 from engine_mount.recordings.losses import losses
 from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.cdr import serialised
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,

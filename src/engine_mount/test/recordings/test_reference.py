@@ -15,7 +15,7 @@ from engine_mount.recordings.reference import (
     differences_from_reference,
 )
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.force_table import table_message
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -34,7 +34,6 @@ ANSWERS = (CURRENT_SETPOINT, CONTROL_TRACE)
 
 def _run(folder, *, shift=0, topics=(*INPUTS, *ANSWERS), session='scenario: bench\n', count=COUNT, begin=0):
     """Write a run: setpoints from the beginning, traces after the ramp; damping `shift` samples later."""
-    from mount_ros.messages.cdr import serialised
 
     signals = answers(COUNT, on=80 + shift, off=150)
     writer = BagWriter(folder)
@@ -59,8 +58,8 @@ def _run(folder, *, shift=0, topics=(*INPUTS, *ANSWERS), session='scenario: benc
         if index == RAMP:
             gap = joint_state(stamp, list(AIR_GAP.names), np.full(6, 4e-4), np.empty(0))
             write(AIR_GAP, gap, index)
-            table = to_message(stamp, [[0.0, 1.0, 3.0], [0.0, 100.0, 900.0]])
-            write(CURRENT_FORCE_TABLE, serialised(table), index)
+            table = table_message(stamp, [[0.0, 1.0, 3.0], [0.0, 100.0, 900.0]])
+            write(CURRENT_FORCE_TABLE, table, index)
     writer.close()
     return folder
 

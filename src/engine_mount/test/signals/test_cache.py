@@ -1,4 +1,4 @@
-"""Copies: bounded, the one used longest ago goes first, never one in use."""
+"""Copies: of limited size, the one used longest ago removed first, never one in use, never half of one."""
 
 import os
 import subprocess
@@ -7,151 +7,129 @@ from collections import namedtuple
 
 import pytest
 
-from engine_mount.signals.sources import cache as module
-from engine_mount.signals.sources.cache import Cache, default_folder, default_limit
+from engine_mount.signals.sources import cache
 from engine_mount.signals.sources.source import SourceError
 
 HOLD = """
 import sys
-from pathlib import Path
-from engine_mount.signals.sources.cache import Cache
-Cache(Path(sys.argv[1]), 100).hold('a', 'a.bin', 60, lambda part: None, None)
-print('held', flush=True)
-sys.stdin.read()
+from engine_mount.signals.sources.cache import cached_copy
+with cached_copy('a', 'a.bin', 60, None):
+    print('held', flush=True)
+    sys.stdin.read()
 """
 Usage = namedtuple('Usage', 'total used free')
 
 
 @pytest.fixture
-def cache(tmp_path):
-    return Cache(tmp_path / 'copies', 100)
+def copies(own_home, monkeypatch):
+    monkeypatch.setenv('ENGINE_MOUNT_CACHE_LIMIT', '100B')
+    return own_home / 'copies'
 
 
-def hold(cache, key, size):
-    """Hold the copy `key` of `size` bytes, and let it have been used later than all others."""
-    held = cache.hold(
-        key,
-        f'{key}.bin',
-        size,
-        lambda part: None,
-        lambda part: (part / f'{key}.bin').write_bytes(bytes(size)),
+def copy(key, size):
+    """Return a context of the copy `key` of `size` bytes."""
+    return cache.cached_copy(
+        key, f'{key}.bin', size, lambda folder: (folder / f'{key}.bin').write_bytes(bytes(size))
     )
-    hold.clock += 1
-    os.utime(held.path.parent.parent / 'lock', (hold.clock, hold.clock))
-    return held
 
 
-hold.clock = 1_700_000_000
+def use(copies, key, size):
+    """Use a copy later than all others were used."""
+    with copy(key, size):
+        pass
+    use.clock += 1
+    os.utime(copies / f'{key}-{size}', (use.clock, use.clock))
 
 
-def present(cache):
-    return {path.name.removesuffix('.bin') for path in cache.folder.rglob('*.bin')}
+use.clock = 1_700_000_000
 
 
-def test_what_was_used_longest_ago_goes_first(cache):
+def present(copies):
+    return {path.name.removesuffix('.bin') for path in copies.rglob('*.bin')}
+
+
+def test_as_many_as_needed_of_those_used_longest_ago_go(copies):
     for key in 'abc':
-        hold(cache, key, 30).release()
-    cache.hold('a', 'a.bin', 30, lambda part: None, lambda part: None).release()  # takes the time of today
-    hold(cache, 'd', 30).release()
-    assert present(cache) == set('acd')
+        use(copies, key, 30)
+    use(copies, 'd', 10)
+    assert present(copies) == set('abcd')
+    with copy('a', 30):
+        pass  # takes the time of today
+    use(copies, 'e', 30)
+    assert present(copies) == set('acde')
 
 
-def test_no_more_goes_than_has_to(cache):
-    for key in 'abc':
-        hold(cache, key, 30).release()
-    hold(cache, 'd', 10).release()
-    assert present(cache) == set('abcd')
-
-
-def test_what_is_in_use_stays(cache):
-    kept = hold(cache, 'a', 60)
-    hold(cache, 'b', 30).release()
-    hold(cache, 'c', 40).release()
-    assert present(cache) == set('ac')
-    with pytest.raises(SourceError, match=r'needed in .* may hold 0.1 kB and has 0.1 kB in use.*CACHE_LIMIT'):
-        hold(cache, 'd', 60)
-    assert present(cache) == {'a'}
-    kept.release()
-    hold(cache, 'd', 60).release()
-    assert present(cache) == {'d'}
-
-
-def test_what_another_process_uses_stays_until_it_ends(cache):
-    hold(cache, 'a', 60).release()
-    command = [sys.executable, '-c', HOLD, str(cache.folder)]
+def test_what_is_in_use_stays_here_and_in_another_process(copies):
+    use(copies, 'a', 60)
+    command = [sys.executable, '-c', HOLD]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout.readline() == 'held\n'
-        with pytest.raises(SourceError, match='in use'):
-            hold(cache, 'b', 60)
+        with pytest.raises(SourceError, match=r'may hold 0.1 kB and has 0.1 kB in use.*CACHE_LIMIT'):
+            use(copies, 'b', 60)
         other.kill()
-    hold(cache, 'b', 60).release()
-    assert present(cache) == {'b'}
+    with copy('a', 60):
+        use(copies, 'b', 30)
+        use(copies, 'c', 40)
+        assert present(copies) == set('ac')
+    use(copies, 'b', 60)
+    assert present(copies) == {'b'}
 
 
-def test_what_is_larger_than_all_copies_may_be_is_refused(cache):
-    with pytest.raises(SourceError, match='ENGINE_MOUNT_CACHE_LIMIT'):
-        hold(cache, 'a', 101)
-    assert not present(cache)
-
-
-def test_room_on_the_disk_is_made_by_removing_copies(cache, monkeypatch):
-    cache.limit = 1000
+def test_room_on_the_disk_is_made_by_removing_copies_or_refused(copies, monkeypatch):
+    monkeypatch.setenv('ENGINE_MOUNT_CACHE_LIMIT', '10GB')
     for key in 'ab':
-        hold(cache, key, 60).release()
-    free = lambda folder: Usage(0, 0, module._SPARE + 100 - 60 * (len(present(cache)) - 1))  # noqa: E731
-    monkeypatch.setattr(module.shutil, 'disk_usage', free)
-    hold(cache, 'c', 60).release()
-    assert present(cache) == set('bc')
-
-
-def test_a_full_disk_is_told_with_what_is_needed_and_free(cache, monkeypatch):
-    monkeypatch.setattr(module.shutil, 'disk_usage', lambda folder: Usage(0, 0, 2_000_000))
-    cache.limit = 10**10
+        use(copies, key, 60)
+    free = lambda folder: Usage(0, 0, cache.SPARE + 100 - 60 * (len(present(copies)) - 1))  # noqa: E731
+    monkeypatch.setattr(cache.shutil, 'disk_usage', free)
+    use(copies, 'c', 60)
+    assert present(copies) == set('bc')
+    monkeypatch.setattr(cache.shutil, 'disk_usage', lambda folder: Usage(0, 0, 2_000_000))
     with pytest.raises(SourceError, match=r'5\.0 GB are needed in .*, 2\.0 MB are free.*ENGINE_MOUNT_CACHE'):
-        cache.hold('a', 'a.bin', 5 * 10**9, lambda part: None, None)
-    assert not present(cache)
+        use(copies, 'd', 5 * 10**9)
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     (tmp_path / 'file').write_text('')
-    with pytest.raises(SourceError, match=r'cannot be written: .*ENGINE_MOUNT_CACHE'):
-        hold(Cache(tmp_path / 'file' / 'copies', 100), 'a', 1)
+    monkeypatch.setenv('ENGINE_MOUNT_CACHE', str(tmp_path / 'file' / 'copies'))
+    with pytest.raises(SourceError, match=r'cannot be written: .*ENGINE_MOUNT_CACHE'), copy('a', 1):
+        pass
 
 
-def test_what_was_half_removed_is_not_taken_for_whole(cache, monkeypatch):
-    hold(cache, 'a', 60).release()
+def test_what_was_half_removed_is_not_taken_for_whole(copies, monkeypatch):
+    use(copies, 'a', 60)
 
     def remove_half(place, **how):
-        if not how:  # of a copy, not of what a process left that was killed
-            for file in place.rglob('*.bin'):
-                file.unlink()
-            raise OSError('killed')
+        for file in place.rglob('a.bin'):
+            file.unlink()
 
     with monkeypatch.context() as patch:
-        patch.setattr(module.shutil, 'rmtree', remove_half)
-        with pytest.raises(SourceError):
-            hold(cache, 'b', 60)
-    assert hold(cache, 'a', 60).path.read_bytes() == bytes(60)
+        patch.setattr(cache.shutil, 'rmtree', remove_half)
+        use(copies, 'b', 60)
+    with copy('a', 60) as path:
+        assert path.read_bytes() == bytes(60)
 
 
-def test_what_fails_leaves_nothing(cache):
-    def fill(part):
-        (part / 'a.bin').write_bytes(b'half')
+def test_what_fails_leaves_nothing_and_of_two_the_first_stays(copies):
+    def fail(folder):
+        (folder / 'a.bin').write_bytes(b'half')
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        cache.hold('a', 'a.bin', 10, lambda part: None, fill)
-    assert not present(cache)
-    assert hold(cache, 'a', 10).path.read_bytes() == bytes(10)
+    with pytest.raises(KeyboardInterrupt), cache.cached_copy('a', 'a.bin', 10, fail):
+        pass
+    assert not present(copies)
+
+    def be_late(folder):
+        (folder / 'a.bin').write_bytes(b'late')
+        use(copies, 'a', 10)
+
+    with cache.cached_copy('a', 'a.bin', 10, be_late) as path:
+        assert path.read_bytes() == bytes(10)
 
 
 def test_folder_and_limit_are_chosen_by_the_environment(monkeypatch, own_home):
-    assert default_folder() == own_home / 'copies'
-    assert default_limit() == 20 * 10**9
-    monkeypatch.setenv('ENGINE_MOUNT_CACHE_LIMIT', '500MB')
-    assert default_limit() == 500 * 10**6
+    assert cache.cache_folder() == own_home / 'copies'
     monkeypatch.setenv('ENGINE_MOUNT_CACHE', '')
-    assert default_folder() == own_home / 'cache' / 'engine_mount' / 'recordings'
+    assert cache.cache_folder() == own_home / 'cache' / 'engine_mount' / 'recordings'
     monkeypatch.setenv('ENGINE_MOUNT_CACHE_LIMIT', 'much')
-    with pytest.raises(ValueError, match='much'):
-        default_limit()
+    with pytest.raises(ValueError, match='much'), copy('a', 1):
+        pass

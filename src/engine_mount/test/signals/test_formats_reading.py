@@ -4,11 +4,10 @@ import hashlib
 
 import numpy as np
 import pytest
+from foreign_files import BEGIN, MAKERS
 
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.testing import MAKERS
-from engine_mount.signals.testing.made import BEGIN
 
 N = 400
 TIMES = np.arange(N) / 200.0

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from foreign_files import MAKERS
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +13,6 @@ from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.testing import MAKERS
 
 N = 60
 TIMES = np.arange(N) / 100.0
@@ -147,11 +147,15 @@ def test_json_names_line_and_column_of_a_fault(tmp_path):
     path.write_text('{"data": [[0, 1], [1]]}')
     assert 'data[1] holds 1 values where row 0 holds 2' in _refusal(path)
     path.write_text('{"a": 1}')
-    assert 'holds no lists of numbers' in _refusal(path)
+    assert 'holds no columns of numbers' in _refusal(path)
 
 
-def test_a_workbook_that_unpacks_to_more_than_may_be_is_refused(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(excel, '_LARGEST', 1000)
-    file, _ = whole['excel']
-    with pytest.raises(SignalError, match=r'unpacks to \d+ bytes \(limit 1000\): export the sheet as CSV'):
-        headings(file.path, Stated())
+def test_rows_with_a_far_cell_are_refused_with_their_width(tmp_path, monkeypatch):
+    import openpyxl
+
+    monkeypatch.setattr(excel, 'MOST_CELLS', 100_000)
+    book = openpyxl.Workbook()
+    for row in range(1, 11):
+        book.active[f'XFD{row}'] = 1.0
+    book.save(tmp_path / 'wide.xlsx')
+    assert 'more than 100000 cells (limit), 16384 in a row: remove' in _refusal(tmp_path / 'wide.xlsx')

@@ -12,8 +12,8 @@ from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.importing.importing import ImportOrder, import_recording
+from engine_mount.signals.mapping import ColumnChoice, Mapping, TimeChoice
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.units.mapping import ColumnChoice, Mapping, MappingError, TimeChoice
 
 TIMES = np.arange(3000) / 1000.0
 TRAVEL = 0.8e-3 * np.sin(2.0 * np.pi * 8.0 * TIMES)
@@ -155,5 +155,5 @@ def test_files_that_follow_each_other_become_one_drive(tmp_path):
 
 def test_what_no_title_tells_must_be_said(tmp_path):
     file = table(tmp_path / 'drive.csv', {'t': TIMES, 'x': TRAVEL})
-    with pytest.raises(MappingError, match='say it with --column QUANTITY=COLUMN:UNIT'):
+    with pytest.raises(SignalError, match='say it with --column QUANTITY=COLUMN:UNIT'):
         imported(tmp_path, file)

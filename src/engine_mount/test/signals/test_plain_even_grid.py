@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from engine_mount.signals.even_grid import evenly_spaced
-from engine_mount.signals.resampling import resampled
 from engine_mount.signals.signal import SignalError, signal_of
 
 PERIOD = 0.01
@@ -52,62 +51,19 @@ def test_even_stamps_change_nothing():
     assert found.notes == ()
 
 
-@pytest.mark.parametrize(
-    'times',
-    [
-        changed(1000, TIMES[999] + 1e-6),
-        changed(1000, TIMES[1001] - 1e-6),
-        changed(1000, TIMES[999]),
-        changed(1000, TIMES[1000] + 0.006),
-    ],
-    ids=['1 us after the one before', '1 us before the next', 'equal', 'late'],
-)
-def test_one_wrong_stamp_changes_no_sample(times):
-    found = even(times)
+def test_stamps_that_jitter_about_even_samples_change_none():
+    found = even(TIMES + random().uniform(-0.3, 0.3, COUNT) * PERIOD)
     np.testing.assert_array_equal(found.values, VALUES)
-    assert found.rate == pytest.approx(100.0, rel=1e-5)
+    assert found.rate == pytest.approx(100.0, rel=1e-3)
     assert 'taken as evenly spaced at 100 Hz' in found.notes[0]
 
 
-@pytest.mark.parametrize('burst', [2, 5, 20])
-@pytest.mark.parametrize('inside', [0.0, 1e-4])
-def test_samples_that_arrive_in_bursts_are_even(burst, inside):
-    arrival = PERIOD * (NUMBERS // burst * burst + burst - 1) + inside * (NUMBERS % burst)
-    late = random().uniform(0.0, 0.004, COUNT)[NUMBERS // burst]
-    found = even(arrival + late)
-    np.testing.assert_array_equal(found.values, VALUES)
-    assert found.rate == pytest.approx(100.0, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    'late',
-    [
-        random().uniform(-0.3, 0.3, COUNT) * PERIOD,
-        random().exponential(0.003, COUNT),
-        np.round(TIMES * 0.97, 2) - TIMES * 0.97,
-    ],
-    ids=['jitter', 'latency', 'coarse'],
-)
-def test_stamps_that_jitter_about_even_samples_change_none(late):
-    found = even(TIMES + late)
-    np.testing.assert_array_equal(found.values, VALUES)
-    assert found.rate == pytest.approx(100.0, rel=1e-3)
-
-
 def test_samples_taken_at_uneven_times_are_brought_onto_the_grid():
-    times = TIMES + random().uniform(-0.3, 0.3, COUNT) * PERIOD
+    times = TIMES + 0.5 * PERIOD * np.sin(2.0 * np.pi * 0.1 * TIMES)  # a clock that runs unevenly
     found = even(times, np.sin(2.0 * np.pi * 8.0 * times))
     at = times[0] + found.period * np.arange(len(found.values))
-    assert np.abs(found.values - np.sin(2.0 * np.pi * 8.0 * at)).max() < 0.02
-
-
-def test_a_sample_too_many_is_averaged_with_the_one_beside_it():
-    times, values = np.insert(TIMES, 1001, TIMES[1000] + 1e-6), np.insert(VALUES, 1001, VALUES[1000] + 0.2)
-    found = even(times, values)
-    expected = VALUES.copy()
-    expected[1000] += 0.1
-    np.testing.assert_allclose(found.values, expected, atol=1e-3)
-    assert '1 samples within 2.5 ms of the one before are averaged with it' in found.notes[0]
+    assert np.abs(found.values - np.sin(2.0 * np.pi * 8.0 * at)).max() < 0.002
+    assert 'brought from uneven stamps' in found.notes[0]
 
 
 def test_samples_recorded_twice_count_once():
@@ -116,12 +72,6 @@ def test_samples_recorded_twice_count_once():
         (np.insert(TIMES, 5, TIMES[5]), np.insert(VALUES, 5, VALUES[5])),
     ):
         np.testing.assert_array_equal(even(times, values).values, VALUES)
-
-
-def test_a_sample_that_comes_late_in_the_file_is_put_in_its_place():
-    order = NUMBERS.copy()
-    order[[700, 701]] = order[[701, 700]]
-    np.testing.assert_array_equal(even(TIMES[order], VALUES[order]).values, VALUES)
 
 
 def test_lost_samples_are_interpolated_and_move_no_other():
@@ -149,7 +99,12 @@ def test_what_fills_a_gap_stays_near_the_samples_beside_it():
         (TIMES + 0.12 * (NUMBERS > 500), 'has a gap of 0.130 s at 5.000 s; up to 0.125 s are interpolated'),
         (TIMES + 3.0 * (NUMBERS > 500), 'has a gap of 3.010 s at 5.000 s'),
         (TIMES + 0.2 * (NUMBERS > COUNT - 10), 'has a gap of 0.210 s at 29.900 s'),
-        (changed(9, TIMES[8] + 1e-6) + 0.2 * (NUMBERS > COUNT - 10), 'has a gap of 0.210 s at 29.900 s'),
+        (
+            changed(1000, TIMES[999] + 1e-6),
+            'samples 999 and 1000 are 0.001 ms apart at 9.990 s, less than 2.5 ms: say their --rate',
+        ),
+        (PERIOD * (NUMBERS // 5 * 5 + 4), 'say their --rate if they were taken evenly'),
+        (PERIOD * (NUMBERS // 20 * 20 + 19), 'has a gap of 0.200 s'),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_the_place(times, reason):
@@ -161,12 +116,3 @@ def test_a_clock_that_runs_a_little_slow_has_the_rate_of_its_name():
     assert evenly_spaced(signal, 0.125, 100.0).rate == pytest.approx(99.6, rel=1e-3)
     with pytest.raises(SignalError, match='at least 101 are needed'):
         evenly_spaced(signal, 0.125, 101.0)
-
-
-def test_no_error_of_a_stamp_makes_a_spike():
-    """Two stamps 1 us apart, anywhere, leave what is resampled nearly as it was."""
-    clean = resampled(even(TIMES), 1e-3)[:]
-    for place in random(5).integers(1, COUNT, 30).tolist():
-        wrong = resampled(even(changed(place, TIMES[place - 1] + 1e-6)), 1e-3)[:]
-        length = min(len(wrong), len(clean))
-        assert np.abs(wrong[:length] - clean[:length]).max() < 0.02

@@ -7,9 +7,8 @@ import pytest
 
 from engine_mount.signals import resampling
 from engine_mount.signals.even_grid import EvenSignal
-from engine_mount.signals.plausibility import OVERSHOOT, check_size
 from engine_mount.signals.resampling import HALF_LENGTH, has_step, resampled
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError, check_size
 
 STEP = 5e-5
 
@@ -80,18 +79,7 @@ def test_a_step_overshoots_by_no_more_than_stated():
     assert found.min() > -0.13
 
 
-SHARES = np.linspace(0.7, 1.0, 41)  # of the worst samples: some are refused, most pass without a closer look
-
-
-def _is_accepted(values):
-    try:
-        resampled(signal(values), STEP)
-    except SignalError:
-        return False
-    return True
-
-
-def test_the_worst_of_all_samples_stays_within_what_is_stated_and_is_refused(monkeypatch):
+def test_the_worst_of_all_samples_leaves_their_range_by_no_more_than_stated():
     kernel = resampling._kernel()
     worst = 0.0
     for offset in np.linspace(0.0, 1.0, 41):
@@ -100,28 +88,7 @@ def test_the_worst_of_all_samples_stays_within_what_is_stated_and_is_refused(mon
             distances < HALF_LENGTH, kernel[np.minimum((distances * 1024).astype(int), kernel.size - 1)], 0.0
         )
         worst = max(worst, (np.abs(weights).sum() / weights.sum() - 1.0) / 2.0)
-    assert OVERSHOOT < worst < 0.6
-    against = np.sign(
-        np.where(
-            distances < HALF_LENGTH, np.sinc(0.9 * (np.arange(-HALF_LENGTH, HALF_LENGTH + 1) - 0.5)), 0.0
-        )
-    )
-    values = np.concatenate([np.zeros(300), against, np.zeros(300)])
-    told = r'^z: resampled it is .* at 3\.26.* s, near sample 326; its samples are -1 .. 1'
-    with pytest.raises(SignalError, match=told):
-        resampled(signal(values), 1e-3)
-    accepted = [_is_accepted(np.where(np.arange(653) == 100, 1.0, k * values)) for k in SHARES]
-    monkeypatch.setattr(resampling, '_check', lambda *_: None)
-    farthest = [np.abs(resampled(signal(k * values), STEP)[:]).max() for k in SHARES]
-    # The samples reach from -k to 1, and from there one half of that further.
-    assert accepted == [peak <= 1.0 + 0.5 * (1.0 + k) for k, peak in zip(SHARES, farthest, strict=True)]
-    assert 0 < sum(accepted) < len(accepted)
-
-
-@pytest.mark.parametrize('seed', [1, 2, 3])
-def test_noise_is_not_refused(seed):
-    values = np.random.default_rng(seed).uniform(-1.0, 1.0, 5000)
-    assert np.abs(resampled(signal(values), STEP)[:]).max() < 2.0
+    assert 0.5 < worst < 0.6
 
 
 def test_a_value_beyond_its_limit_is_named():

@@ -1,26 +1,40 @@
-"""Recordings out of real stores: what comes is what lies there, once, and only as much as is needed."""
+"""Recordings out of stores: what comes is whole and right, or nothing comes, with one sentence."""
 
 import shutil
+import subprocess
+import sys
+import threading
 
 import pytest
-from served_stores import SECRET_KEY, HttpStore
+from served_stores import SECRET_KEY, BreakingWay, HttpStore, know_host
 
-from engine_mount.recordings.place import open_run
-from engine_mount.recordings.session import recorded_session
-from engine_mount.signals.sources import looking, outlines
-from engine_mount.signals.sources.source import SourceError
-from engine_mount.signals.sources.stores import entries, fetched, local_copy, outline, traffic, uri_of
+from engine_mount.signals.sources import remote
+from engine_mount.signals.sources.source import SourceError, StoreAwayError
+from engine_mount.signals.sources.stores import entries, fetched, local_copy, uri_of
+
+DATA = bytes(range(256)) * 8192  # 2 MB
+FETCH = 'import sys; from engine_mount.signals.sources.stores import fetched; print(fetched(sys.argv[1]))'
+
+
+@pytest.fixture(autouse=True)
+def _short_pauses(monkeypatch):
+    monkeypatch.setattr(remote, 'ATTEMPTS', 4)
+    monkeypatch.setattr(remote, 'FIRST_PAUSE', 1e-3)
+
+
+@pytest.fixture
+def copies(own_home):
+    return own_home / 'copies'
 
 
 def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob('*') if path.is_file()}
 
 
-def of_a_list(path):
-    """Return what a list tells of a recording, and whether it is whole once that was read."""
-    recording = open_run(path)
-    counts = {name: topic.message_count for name, topic in recording.topics.items()}
-    return recorded_session(recording), counts, recording.time_range, recording.whole
+def wait_for(condition):
+    pause = threading.Event()
+    while not condition():
+        pause.wait(0.01)
 
 
 @pytest.fixture(params=['s3', 'sftp', 'http', 'memory'])
@@ -42,33 +56,48 @@ def store(request, reference):
     yield f'sftp://127.0.0.1:{served}/drives' if request.param == 'sftp' else f'{served.uri}/drives'
 
 
-def test_a_file_comes_as_it_lies_in_the_store_and_once(store, reference):
-    file = fetched(f'{store}/run/gap/gap_0.mcap')
-    assert file.name == 'gap_0.mcap'
-    assert file.read_bytes() == (reference / 'gap_0.mcap').read_bytes()
-    before = traffic().bytes
-    assert fetched(f'{store}/run/gap/gap_0.mcap') == file
-    assert traffic().bytes == before
+@pytest.fixture(params=['sftp', 'http', 's3'])
+def breaking(request, own_home, monkeypatch):
+    """Return a way that can break to a store with the file `a.bin`, and its URI by that way."""
+    served = request.getfixturevalue({'sftp': 'sftp', 'http': 'web', 's3': 's3'}[request.param])
+    if request.param == 's3':
+        served.put('a.bin', DATA)
+        way = BreakingWay(served.port, None)
+        monkeypatch.setenv('AWS_ENDPOINT_URL', f'http://127.0.0.1:{way.port}')
+        yield way, 's3://drives/a.bin'
+    else:
+        server, folder = served
+        (folder / 'a.bin').write_bytes(DATA)
+        way = BreakingWay(server if request.param == 'sftp' else server.port, None)
+        if request.param == 'sftp':
+            know_host(own_home, way.port)
+        yield way, f'{request.param}://127.0.0.1:{way.port}/a.bin'
+    way.close()
 
 
-def test_a_folder_comes_whole(store, reference):
+def test_a_folder_and_a_file_of_it_come_whole_and_once(store, reference, monkeypatch):
     folder = fetched(f'{store}/run/gap/')
     assert folder.name == 'gap'
     assert files_of(folder) == files_of(reference)
     assert uri_of(folder / 'gap_0.mcap') == f'{store}/run/gap/'
     assert not uri_of(reference)
+    done = []
+    file = fetched(f'{store}/run/gap/gap_0.mcap', lambda *progress: done.append(progress))
+    assert file.read_bytes() == (reference / 'gap_0.mcap').read_bytes()
+    assert done[-1] == (file.stat().st_size, file.stat().st_size)
+    monkeypatch.setattr(remote, '_fetch', None)
+    assert fetched(f'{store}/run/gap/gap_0.mcap') == file
 
 
 def test_the_files_of_a_store_are_listed_by_their_uris(store, reference):
     found = list(entries(f'{store}/run/'))
-    assert [entry.uri for entry in found] == [
-        f'{store}/run/gap/{name}' for name in ('accepted.yaml', 'gap_0.mcap', 'metadata.yaml')
-    ]
-    assert [entry.size for entry in found] == [
-        (reference / entry.uri.split('/')[-1]).stat().st_size for entry in found
-    ]
-    assert all(entry.etag or entry.modified > 0 for entry in found)
-    assert fetched(found[1].uri).read_bytes() == (reference / 'gap_0.mcap').read_bytes()
+    names = ('accepted.yaml', 'gap_0.mcap', 'metadata.yaml')
+    assert [entry.uri for entry in found] == [f'{store}/run/gap/{name}' for name in names]
+    assert [entry.size for entry in found] == [(reference / name).stat().st_size for name in names]
+    assert all(entry.etag for entry in found)
+    for uri in (f'{store}/run/nothing.mcap', f'{store}/nothing'):
+        with pytest.raises(SourceError, match='nothing of this name is there'):
+            fetched(uri)
 
 
 def test_what_is_changed_in_the_store_comes_anew(s3):
@@ -79,63 +108,57 @@ def test_what_is_changed_in_the_store_comes_anew(s3):
     assert first.read_bytes() == b'one'
 
 
-def test_what_is_not_there_is_told(store):
-    for uri in (f'{store}/run/nothing.mcap', f'{store}/nothing'):
-        with pytest.raises(SourceError, match='nothing of this name is there'):
-            fetched(uri)
+def test_a_file_in_parts_comes_whole(s3):
+    s3.put_in_parts('a.bin', DATA * 4, 5 << 20)
+    assert fetched('s3://drives/a.bin').read_bytes() == DATA * 4
 
 
-def test_an_outline_lists_as_the_recording_does_and_reads_less(store, reference):
-    before = traffic().bytes
-    with outline(f'{store}/run/gap/') as folder:
-        assert of_a_list(folder) == of_a_list(reference)
-    read = traffic().bytes - before
-    assert read < 0.6 * (reference / 'gap_0.mcap').stat().st_size  # a session and a summary of a short one
-    assert not folder.exists()
+def test_a_connection_that_breaks_is_tried_again(breaking, copies):
+    way, uri = breaking
+    way.bytes_each = 500_000
+
+    def mend(done, of):
+        way.bytes_each = None
+
+    wait = threading.Thread(target=lambda: (wait_for(lambda: way.broken), mend(0, 0)))
+    wait.start()
+    assert fetched(uri).read_bytes() == DATA
+    wait.join()
+    assert way.broken
 
 
-@pytest.mark.parametrize('kept', [0.5, 0.97])
-def test_a_recording_without_its_end_is_given_whole(s3, reference, kept):
-    data = (reference / 'gap_0.mcap').read_bytes()
-    s3.put('cut/cut_0.mcap', data[: int(kept * len(data))])
-    with outline('s3://drives/cut') as folder:
-        assert (folder / 'cut_0.mcap').read_bytes() == data[: int(kept * len(data))]
+def test_a_store_that_stays_away_ends_in_a_sentence_and_leaves_nothing(breaking, copies):
+    way, uri = breaking
+    way.bytes_each = 500_000  # of a file of 2 MB
+    with pytest.raises(
+        StoreAwayError, match=r'a\.bin: .+ \(4 attempts within .*\); is the store reachable'
+    ) as end:
+        fetched(uri)
+    assert str(end.value).startswith(uri)
+    assert not files_of(copies)
+    way.away = True
+    with pytest.raises(StoreAwayError, match='4 attempts'):
+        fetched(uri)
+    assert way.refused >= 3  # one attempt by the connection that was there
 
 
-def test_an_outline_reads_the_session_behind_the_beginning_of_a_long_file(s3, reference, monkeypatch):
-    monkeypatch.setattr(outlines, '_TAIL', 512)  # the summary is longer
-    s3.put_folder(reference, 'gap')
-    before = traffic().bytes
-    with outline('s3://drives/gap') as folder:
-        assert of_a_list(folder) == of_a_list(reference)
-    assert traffic().bytes - before < 0.6 * (reference / 'gap_0.mcap').stat().st_size
+@pytest.mark.parametrize('status', [403, 404, 503])
+def test_only_what_may_pass_is_tried_again(web, status):
+    server, _ = web
+    server.status = status
+    with pytest.raises(SourceError) as refusal:
+        fetched(f'{server.uri}/a.bin')
+    assert ('attempts' in str(refusal.value)) == (status == 503)
+    assert ('fsspec' in str(refusal.value)) == (status == 403)
 
 
-def test_a_recording_with_a_damaged_summary_is_given_whole(s3, reference):
-    data = bytearray((reference / 'gap_0.mcap').read_bytes())
-    data[-1000] ^= 1
-    s3.put('bad/bad_0.mcap', bytes(data))
-    with outline('s3://drives/bad') as folder:
-        assert (folder / 'bad_0.mcap').read_bytes() == data
-
-
-def test_a_server_that_knows_no_stretches_serves_all_the_same(tmp_path, reference):
-    store = HttpStore(reference, stretches=False)
-    try:
-        assert files_of(fetched(f'{store.uri}/').parent)
-        with outline(f'{store.uri}/gap_0.mcap') as file:
-            assert of_a_list(file) == of_a_list(reference)
-    finally:
-        store.close()
-
-
-def test_a_server_that_tells_no_size_is_refused(tmp_path, reference):
-    store = HttpStore(reference, sizes=False)
-    try:
-        with pytest.raises(SourceError, match='does not tell the size'):
-            fetched(f'{store.uri}/gap_0.mcap')
-    finally:
-        store.close()
+def test_nobody_may_read_without_keys(s3, monkeypatch):
+    s3.put('a.bin', b'x')
+    for name in ('AWS_ACCESS_KEY_ID', 'AWS_SECRET_ACCESS_KEY'):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv('AWS_EC2_METADATA_DISABLED', 'true')
+    with pytest.raises(SourceError, match=r'AWS_ACCESS_KEY_ID'):
+        fetched('s3://drives/a.bin')
 
 
 def test_a_host_whose_key_is_not_known_is_refused(sftp, own_home):
@@ -144,15 +167,59 @@ def test_a_host_whose_key_is_not_known_is_refused(sftp, own_home):
         fetched(f'sftp://127.0.0.1:{sftp[0]}/a')
 
 
+@pytest.mark.parametrize('change', ['a.bin', 'b.bin'])
+def test_a_folder_that_changes_while_it_is_fetched_is_refused(sftp, copies, change):
+    port, folder = sftp
+    (folder / 'run').mkdir()
+    (folder / 'run' / 'a.bin').write_bytes(DATA)
+    changes = iter([b'xyz'])
+
+    def write(done, of):
+        for content in changes:
+            (folder / 'run' / change).write_bytes(DATA + content)
+
+    with pytest.raises(SourceError, match=r'was changed while it was fetched|bytes came instead of'):
+        fetched(f'sftp://127.0.0.1:{port}/run', write)
+    assert not files_of(copies)
+
+
+def test_a_file_that_is_shorter_than_its_size_is_refused(web, copies, monkeypatch):
+    server, folder = web
+    (folder / 'a.bin').write_bytes(DATA)
+    plain = remote._filesystem
+
+    def cut(uri):
+        files, path = plain(uri)
+        files.get_file = lambda path, target, callback: remote.Path(target).write_bytes(DATA[:-1])
+        return files, path
+
+    monkeypatch.setattr(remote, '_filesystem', cut)
+    with pytest.raises(StoreAwayError, match='2097151 bytes came instead of 2097152'):
+        fetched(f'{server.uri}/a.bin')
+    assert not files_of(copies)
+
+
+def test_a_server_that_tells_no_size_is_refused(reference):
+    server = HttpStore(reference, sizes=False)
+    try:
+        with pytest.raises(SourceError, match='does not tell the size'):
+            fetched(f'{server.uri}/gap_0.mcap')
+    finally:
+        server.close()
+
+
 def test_hidden_names_and_those_that_lead_out_of_the_folder_are_left_out(monkeypatch):
     class Files:
+        def info(self, path):
+            return {'type': 'directory'}
+
         def find(self, path, detail):
             return {
                 f'drives/run/{name}': {'type': 'file', 'size': 1} for name in ('../../b', '.part/c', 'd/e')
             }
 
-    monkeypatch.setattr(looking, 'filesystem', lambda uri: (Files(), 'drives/run'))
-    assert [found.entry.uri for found in looking.look_inside('s3://drives/run')] == ['s3://drives/run/d/e']
+    monkeypatch.setattr(remote, '_filesystem', lambda uri: (Files(), 'drives/run'))
+    assert [entry.uri for entry in entries('s3://drives/run')] == ['s3://drives/run/d/e']
 
 
 def test_keys_are_written_nowhere(s3, own_home, caplog):
@@ -165,28 +232,24 @@ def test_keys_are_written_nowhere(s3, own_home, caplog):
     assert SECRET_KEY not in caplog.text
 
 
-def test_links_of_sftp_are_followed_to_files(sftp):
+def test_links_of_sftp_are_followed_and_letters_of_names_stay_as_they_are(sftp):
     port, folder = sftp
     (folder / 'run').mkdir()
-    (folder / 'a.txt').write_bytes(b'behind the link')
-    (folder / 'run' / 'link.txt').symlink_to('../a.txt')
-    assert files_of(fetched(f'sftp://127.0.0.1:{port}/run')) == {'link.txt': b'behind the link'}
-
-
-def test_letters_of_names_stay_as_they_are(sftp):
-    port, folder = sftp
     name = 'what? #1 100%25 é.txt'
-    (folder / name).write_bytes(b'x')
-    (entry,) = entries(f'sftp://127.0.0.1:{port}/')
+    (folder / 'a.txt').write_bytes(b'behind the link')
+    (folder / 'run' / name).symlink_to('../a.txt')
+    assert files_of(fetched(f'sftp://127.0.0.1:{port}/run')) == {name: b'behind the link'}
+    (entry,) = entries(f'sftp://127.0.0.1:{port}/run')
     assert fetched(entry.uri).name == name
 
 
-def test_the_recordings_of_a_folder_in_a_store_are_found(s3):
-    for key in (
-        'day/a/metadata.yaml', 'day/a/a_0.mcap', 'day/b/recording/metadata.yaml', 'day/b/summary.json',
-        'day/b/log/x.txt', 'day/c/notes.txt', 'day/d/deeper/d_0.mcap', 'day/e.csv',
-    ):  # fmt: skip
-        s3.put(key, b'x')
-    assert outlines.recordings_at('s3://drives/day') == ['s3://drives/day/a', 's3://drives/day/b']
-    assert outlines.recordings_at('s3://drives/day/b') == ['s3://drives/day/b']
-    assert outlines.recordings_at('s3://drives/day/a/a_0.mcap') == ['s3://drives/day/a/a_0.mcap']
+def test_what_a_killed_process_left_is_not_taken_for_a_file(web, copies):
+    server, folder = web
+    (folder / 'a.bin').write_bytes(DATA)
+    server.gate.clear()
+    with subprocess.Popen([sys.executable, '-c', FETCH, f'{server.uri}/a.bin']) as process:
+        wait_for(lambda: server.asked['GET'] >= 1)
+        process.kill()
+    server.gate.set()
+    assert [name.startswith('.part-') for name in files_of(copies)] == [True]
+    assert fetched(f'{server.uri}/a.bin').read_bytes() == DATA

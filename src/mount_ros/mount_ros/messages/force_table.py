@@ -1,21 +1,19 @@
-"""The current-force table as a `std_msgs/Float64MultiArray`, built and read in this one file.
+"""The current-force table as a `std_msgs/Float64MultiArray`, written and read in this one file.
 
 Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)`; dimension 1: label
 `activation <stamp>`, the stamp in ns of the `air_gap` message that belongs to the table.
 """
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from mount_ros.messages.scalars import MessageError
-
-if TYPE_CHECKING:  # loading messages and middleware takes a fifth of a second, which readers do without
-    from std_msgs.msg import Float64MultiArray
-
 from mount_models.sampling import HIGHEST_CURRENT
+from mount_ros.messages.cdr import CdrWriter, deserialised
+from mount_ros.messages.scalars import MessageError
+from mount_ros.topics import CURRENT_FORCE_TABLE
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -31,26 +29,22 @@ class ForceTable(NamedTuple):
     normal_force: FloatArray
 
 
-def to_message(stamp: int, table: npt.ArrayLike) -> 'Float64MultiArray':
-    """Return the message of a table of shape (2, N), rows current (A) and normal force (N).
+def table_message(stamp: int, table: npt.ArrayLike) -> bytes:
+    """Return the serialised message of a table of shape (2, N), rows current (A) and normal force (N).
 
     `stamp` (ns) is that of the `air_gap` message. Raises `MessageError` for a table
     that `from_message` would refuse.
     """
-    from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
-
     rows = np.asarray(table, float)
     _check(rows)
     count = int(rows.shape[1])
-    dimensions = [
-        MultiArrayDimension(label=_ROWS_LABEL, size=2, stride=2 * count),
-        MultiArrayDimension(label=f'{_ACTIVATION_LABEL}{stamp}', size=count, stride=count),
-    ]
-    return Float64MultiArray(layout=MultiArrayLayout(dim=dimensions), data=rows.ravel().tolist())
+    layout = CdrWriter().numbers('I', 2).texts(_ROWS_LABEL).numbers('I', 2, 2 * count)
+    layout.texts(f'{_ACTIVATION_LABEL}{stamp}').numbers('I', count, count, 0)
+    return layout.sequence('d', rows.ravel().tolist()).raw
 
 
-def from_message(message: 'Float64MultiArray') -> ForceTable:
-    """Return activation stamp and table of `message`, or raise `MessageError`."""
+def from_message(message: Any) -> ForceTable:
+    """Return activation stamp and table of a `Float64MultiArray`, or raise `MessageError`."""
     shape = [(dimension.size, dimension.stride) for dimension in message.layout.dim]
     offset, numbers = message.layout.data_offset, np.array(message.data, float)
     count = numbers.size // 2
@@ -75,10 +69,7 @@ def from_message(message: 'Float64MultiArray') -> ForceTable:
 
 def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
-    from rclpy.serialization import deserialize_message
-    from std_msgs.msg import Float64MultiArray
-
-    return from_message(deserialize_message(raw, Float64MultiArray))
+    return from_message(deserialised(raw, CURRENT_FORCE_TABLE.type))
 
 
 def _check(rows: FloatArray) -> None:

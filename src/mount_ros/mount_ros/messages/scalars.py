@@ -6,19 +6,16 @@ bytes are made once and afterwards only the stamp and the numbers are replaced, 
 deserialiser, by names.
 """
 
-import functools
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
 
-from mount_ros.messages.cdr import serialised
-from mount_ros.topics import Topic, control_trace
+from mount_ros.messages.cdr import deserialised, joint_state
+from mount_ros.topics import COIL_TEMPERATURE, JOINT_STATE, Topic, control_trace
 
 _STAMP = struct.Struct('<iI')
 _NUMBER = struct.Struct('<d')
@@ -48,9 +45,9 @@ def stamp_of(raw: bytes) -> int:
 class _Layout:
     """The bytes of a stamped message in which only the stamp and some runs of numbers ever change."""
 
-    def __init__(self, message: Any, *runs: list[float]):
+    def __init__(self, message: bytes, *runs: list[float]):
         """Take the message to repeat, with `runs` of marks where the numbers stand."""
-        self._template = bytearray(serialised(message))
+        self._template = bytearray(message)
         self._numbers = struct.Struct(f'<{len(runs[0])}d')
         self._offsets = [self._template.index(self._numbers.pack(*run)) for run in runs]
 
@@ -84,8 +81,7 @@ class ScalarsLayout(_Layout):
         self.names = topic.names
         count = len(self.names)
         runs = [_marks(count, 0), _marks(count, count)][: 1 + topic.has_derivatives]
-        message = JointState(name=list(self.names), position=runs[0], velocity=runs[-1] if runs[1:] else [])
-        super().__init__(message, *runs)
+        super().__init__(joint_state(self.names, *runs), *runs)
         self._begin, self._velocity_offset = self._offsets[0], self._offsets[-1] if runs[1:] else 0
         self._head = bytes(self._template[_STAMP_END : self._begin])
 
@@ -165,12 +161,10 @@ class ScalarsReader:
 class OneNumberLayout(_Layout):
     """Packs a stamped message of any type in which only the stamp and one number ever change."""
 
-    def __init__(self, message: Any, path: str):
-        """Take the message to repeat; `path` names the number, such as `wrench.force.z`."""
-        *owners, field = path.split('.')
+    def __init__(self, build: Callable[[float], bytes]):
+        """Take the function that builds the message of a number, such as `mount_ros.messages.cdr.wrench`."""
         mark = _marks(1, 0)
-        setattr(functools.reduce(getattr, owners, message), field, mark[0])
-        super().__init__(message, mark)
+        super().__init__(build(mark[0]), mark)
 
     def pack(self, stamp: int, number: float) -> bytes:
         """Return the message of time `stamp` (ns) with this number."""
@@ -179,9 +173,14 @@ class OneNumberLayout(_Layout):
         return bytes(self._template)
 
 
-def _decoded(raw: bytes) -> JointState:
+def temperature_of(raw: bytes) -> tuple[int, float]:
+    """Return stamp (ns) and temperature (degC) of a serialised message."""
+    return stamp_of(raw), float(deserialised(raw, COIL_TEMPERATURE.type).temperature)
+
+
+def _decoded(raw: bytes) -> Any:
     try:
-        return deserialize_message(raw, JointState)
+        return deserialised(raw, JOINT_STATE)
     except (RuntimeError, ValueError) as error:  # of the middleware; of a name that is no UTF-8
         raise MessageError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
 

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from mount_ros.messages.cdr import deserialised
+from mount_ros.topics import DIAGNOSTICS
+
 
 class Level(IntEnum):
     """Severity, with the numbers of `diagnostic_msgs/DiagnosticStatus`."""
@@ -50,10 +53,7 @@ class NodeVerdict(NamedTuple):
 
 def verdicts_of(raw: bytes) -> list[NodeVerdict]:
     """Return the verdicts in a serialised `DiagnosticArray`."""
-    from diagnostic_msgs.msg import DiagnosticArray  # readers of recordings have it decoded without rclpy
-    from rclpy.serialization import deserialize_message
-
-    return verdicts_in(deserialize_message(raw, DiagnosticArray))
+    return verdicts_in(deserialised(raw, DIAGNOSTICS.type))
 
 
 def verdicts_in(report: Any) -> list[NodeVerdict]:

@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from engine_mount.cli.bench.bench import BenchOrder, Comparison, Figures, Report, median_times
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import run_core
-from engine_mount.drives.what_if import what_if
+from engine_mount.drives.replay import replay
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw, Controller
 from mount_control.force_maker import resample
@@ -83,9 +83,9 @@ def _drive_and_replay() -> Figures:
     driven = _median_time(drive) / samples
     with TemporaryDirectory() as folder:
         record_core(Path(folder) / 'recording', order, '')
-        runs = [what_if(Path(folder) / 'recording') for _ in range(_ROUNDS)]
+        runs = [replay(Path(folder) / 'recording') for _ in range(_ROUNDS)]
         assert all(run.held for run in runs)
-        replayed = median(run.computing_time / sum(len(r.stamps) for r in run.replayed.runs) for run in runs)
+        replayed = median(run.replayed.control_time / run.samples for run in runs)
     return {
         'core': Comparison('one sample, plant and control', driven, 'real time', SAMPLE_TIME),
         'replay': Comparison('replay one sample', replayed, 'real time', SAMPLE_TIME),

@@ -8,10 +8,7 @@ import typer
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
-    from engine_mount.signals.units.mapping import ColumnChoice, Mapping
-
-_CHANNELS = ('gap', 'current', 'force', 'inductance', 'current_rate', 'flux_rate', 'coil_temperature')
-_MAPPED = {'air_gap': 'gap', 'temperature': 'coil_temperature'}
+    from engine_mount.signals.mapping import Mapping
 
 
 def orders_of(text: str) -> tuple[int, int, int, int, int]:
@@ -23,26 +20,12 @@ def orders_of(text: str) -> tuple[int, int, int, int, int]:
     return a, b, c, d, e
 
 
-def columns_of(settings: list[str], mapping: 'Mapping') -> dict[str, 'ColumnChoice']:
-    """Return the column of each channel, of a mapping and of `--column`, which goes before it.
+def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
+    """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
+    from engine_mount.identification.rack.columns import RACK
+    from engine_mount.signals.mapping import with_options
 
-    Raises `typer.BadParameter`.
-    """
-    from engine_mount.signals.units.mapping import ColumnChoice
-
-    said = {
-        _MAPPED.get(name, name): choice
-        for name, choice in (*mapping.others.items(), *mapping.columns.items())
-    }
-    chosen = {name: choice for name, choice in said.items() if name in _CHANNELS}
-    for setting in settings:
-        name, equals, header = setting.partition('=')
-        if not (equals and name and header):
-            raise typer.BadParameter(f'--column {setting}: write NAME=HEADER:UNIT, as in gap=Spalt:um')
-        if name not in _CHANNELS:
-            raise typer.BadParameter(f'--column {setting}: {name!r} is none of {", ".join(_CHANNELS)}')
-        chosen[name] = ColumnChoice(header)
-    return chosen
+    return with_options(mapping.of(RACK), columns, known=RACK, stated=stated)
 
 
 def per_file(settings: list[str], files: list[Path], option: str, factor: float) -> dict[Path, float]:
@@ -66,7 +49,7 @@ def per_file(settings: list[str], files: list[Path], option: str, factor: float)
     return values
 
 
-def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str], stated: 'Stated') -> Any:
+def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
     """Return what the caller says of gaps (um) and temperatures (degC) as `GivenValues`."""
     from engine_mount.identification.rack.given import GivenValues
 
@@ -80,7 +63,7 @@ def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str], st
             raise typer.BadParameter(
                 f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
             )
-    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None, stated)
+    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
 
 
 def positive(value: float | None, option: str, unit: str) -> float | None:

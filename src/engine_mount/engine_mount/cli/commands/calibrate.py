@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from engine_mount.cli.calibration.given import columns_of, given_ripple, orders_of, per_file, positive
+from engine_mount.cli.calibration.given import given_ripple, orders_of, per_file, positive, rack_mapping
 from engine_mount.cli.calibration.written import write_results
 from engine_mount.cli.commands.options import Dbc, Decimal, Delimiter, MapFile, mapping_of, stated
 from engine_mount.cli.fetching import local
@@ -109,20 +109,18 @@ def actuator(
     from engine_mount.identification.rack.force_points import read_force
     from engine_mount.identification.rack.given import GivenValues
     from engine_mount.identification.specimen import check_targets, with_force_law
-    from engine_mount.signals.units.columns import stated_with
     from mount_models.specimen import chosen_specimen
 
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     places = [local(file, console) for file in files]
-    mapping = mapping_of(map_file)
-    told = stated_with(mapping, stated(dbc, decimal, delimiter))
-    given = GivenValues(per_file(gaps or [], places, '--gap', 1e-6), {}, None, told)
+    mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
+    given = GivenValues(per_file(gaps or [], places, '--gap', 1e-6), {})
     chosen_orders = orders_of(orders)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=None)
-        points = read_force(places, columns_of(columns or [], mapping), given)
+        points = read_force(places, mapping, given)
         progress.update(task, description='fitting')
         fit = fit_force_law(
             points.gap,
@@ -210,7 +208,6 @@ def inductance(
     from engine_mount.identification.coil.inductance import GapOrder, calibrate_inductance
     from engine_mount.identification.rack.ripple_recordings import read_ripple
     from engine_mount.identification.specimen import check_targets, with_gap_curves
-    from engine_mount.signals.units.columns import stated_with
     from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen
 
@@ -226,12 +223,11 @@ def inductance(
         held_out=tuple(held_out or ()),
     )
     area = positive(turns_area, '--turns-area', 'm^2') or starting.turns_area
-    mapping = mapping_of(map_file)
-    told = stated_with(mapping, stated(dbc, decimal, delimiter))
-    given = given_ripple(places, gaps or [], temperatures or [], told)
+    mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
+    given = given_ripple(places, gaps or [], temperatures or [])
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=2)
-        recordings = read_ripple(places, columns_of(columns or [], mapping), given, area)
+        recordings = read_ripple(places, mapping, given, area)
         progress.update(task, description='fitting', completed=1)
         result = calibrate_inductance(recordings, starting.force_law, order)
         progress.update(task, completed=2)

@@ -1,6 +1,6 @@
 """`engine-mount drive`: the simulated car through the whole graph."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -27,18 +27,14 @@ from engine_mount.cli.commands.road_arguments import (
     Lateral,
     Repeat,
     SpeedText,
-    brought_road,
-    check_scenario,
     given_without_road,
     height_column,
+    road_excitation,
 )
 from engine_mount.cli.completion import faults, listed, named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import note, terminal
 from mount_bringup.graph.nodes import RESTART_LIMIT
-
-if TYPE_CHECKING:
-    from engine_mount.drives.brought import Brought
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, control active when the excitation began (0.5 s later at most), no fault, and the
@@ -55,7 +51,7 @@ Examples:
 
 `engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
 
-`engine-mount drive --scenario recorded --file drive.csv --column az:g --scale -1` - your own recording
+`engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
 `engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
@@ -73,9 +69,11 @@ def drive(
     scenario: Annotated[
         str,
         typer.Option(
-            metavar='NAME', help='motorway, bench, sweep, recorded or road', autocompletion=named('scenario')
+            metavar='NAME',
+            help='motorway, bench, sweep, recorded or road; default: that of a file, or motorway',
+            autocompletion=named('scenario'),
         ),
-    ] = 'motorway',
+    ] = '',
     mount: Annotated[
         str,
         typer.Option(
@@ -178,94 +176,71 @@ def drive(
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print what happened."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.drive import DriveOrder, record_drive, recorder_parameters
-    from engine_mount.drives.recorder_options import recorder_options
+    from engine_mount.drives.drive import CombinationError
+    from engine_mount.drives.drive import drive as run_drive
     from engine_mount.reports.drive.telling import tell_drive, tell_snapshots
     from engine_mount.reports.json_file import write_json
-    from engine_mount.settings.options import settings_of_options, with_sample_rate
-    from mount_bringup.graph.domain import chosen_domain
-    from mount_bringup.settings import SettingError, checked_settings
-    from mount_sim.mount_choice import with_control_of_mount
+    from engine_mount.settings.amounts import checked_recorder, recorder_options
+    from engine_mount.settings.options import settings_of_options
+    from mount_bringup.settings import SettingError
 
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
-    if lockstep and core:
-        raise typer.BadParameter('choose --lockstep or --core, not both')
-    if apart and not lockstep:
-        raise typer.BadParameter('--apart goes with --lockstep: in real time every node has its own process')
-    if composed and (lockstep or core):
-        raise typer.BadParameter('--composed is for real time: in lock-step the nodes share a process anyway')
     of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
     of_files |= {'decimal': decimal, 'delimiter': delimiter}
     if not file:
         given_without_file(**of_files, column=None if road else column)
-    if road:
-        check_scenario(scenario, file)
-        scenario = 'road'
-    else:
-        given_without_road(
-            speed=speed, lateral=lateral, distance=distance, contact_length=contact_length, repeat=repeat
-        )
+    of_roads = {'lateral': lateral, 'distance': distance, 'contact_length': contact_length, 'repeat': repeat}
+    if not road:
+        given_without_road(speed=speed, **of_roads)
+    elif file:
+        raise typer.BadParameter('--road is a scenario of its own; leave out --file')
     try:
         parameters = settings_of_options(settings or [])
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    given = {
-        'scenario': scenario,
-        'mount': mount or None,
-        'mounts': mounts or None,
-        'seed': seed,
-        'timeline.duration': duration,
-    }
-    sim = parameters.setdefault('mount_sim', {})
-    sim.update({name: value for name, value in given.items() if value is not None})
-    if fault:
-        sim['faults'] = [*sim.get('faults', []), *fault]
     recorder = recorder_options(split or [], snapshot)
     if on_full != 'stop':
         recorder['on_full'] = on_full
-    if recorder:
-        parameters.setdefault('mount_recorder', {}).update(recorder)
-    parameters = with_control_of_mount(with_sample_rate(checked_settings(parameters), sample_rate))
-    if core and parameters.get('mount_recorder', {}).get('snapshot'):
-        raise typer.BadParameter('--snapshot needs events, which only nodes tell of: not with --core')
-    mode = 'core' if core else 'lock-step' if lockstep else 'real time'
-    chosen = chosen_domain(domain)
-    brought: tuple[Brought, ...] = ()
+    parameters['mount_recorder'] = {**parameters.get('mount_recorder', {}), **recorder}
     console = terminal()
+    excitation = None
     if road:
-        how = {'lateral': lateral, 'column': height_column(column or []), 'distance': distance}
-        how |= {'contact_length': contact_length, 'repeat': repeat, 'sim': parameters['mount_sim']}
-        brought = (brought_road(road, speed, **how),)
+        length = duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0)
+        excitation = road_excitation(road, speed, height_column(column or []), length, **of_roads)
     elif file:
-        from engine_mount.drives.recorded_file import recorded_acceleration
+        from engine_mount.drives.external_excitation import recorded_acceleration
 
-        said = [f'{topic}.{name}' if topic else name for name in column or []]
-        how = {'time': time, 'rate': rate, 'scale': scale, 'mapping_file': map_file}
-        how['stated'] = stated(dbc, decimal, delimiter)
-        recorded, factor = recorded_acceleration(str(local(file, console)), said, **how)
-        brought = (recorded,)
-        parameters['mount_sim']['recorded.scale'] = factor
-    order = DriveOrder(
-        scenario, mode, parameters, chosen, namespace, out, priority, apart, composed, restarts, brought
-    )
+        columns = [f'{topic}.{name}' if topic else name for name in column or []]
+        excitation = recorded_acceleration(
+            str(local(file, console)), columns, time=time, rate=rate, scale=scale, mapping_file=map_file,
+            stated=stated(dbc, decimal, delimiter),
+        )  # fmt: skip
     screen = TerminalScreen(console)
-    folder, run, complaints = record_drive(order, screen)
-    recorder = recorder_parameters(order)
-    if recorder.snapshot:
-        told = tell_snapshots(folder, recorder, run, screen)
+    try:
+        driven = run_drive(
+            core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
+            mounts=mounts, duration=duration, sample_rate=sample_rate, seed=seed, faults=fault or (),
+            parameters=parameters, excitation=excitation, out=out, domain=domain, namespace=namespace,
+            priority=priority, restarts=restarts, screen=screen,
+        )  # fmt: skip
+    except CombinationError as error:
+        raise typer.BadParameter(str(error)) from None
+    recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
+    if recorded.snapshot:
+        told = tell_snapshots(driven.folder, recorded, driven.figures, screen)
     else:
-        told = tell_drive(folder, parameters, run, screen, report=report)
-    complaints += told.complaints
+        told = tell_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     if json_file is not None:
         write_json(told.figures, json_file)
     for figure in told.pictures:
         console.print(f'figure     {figure}', soft_wrap=True)
-    if folder.report.exists():
-        console.print(f'report     {folder.report}', soft_wrap=True)
+    if driven.folder.report.exists():
+        console.print(f'report     {driven.folder.report}', soft_wrap=True)
     for place in told.recordings:
         console.print(f'recording  {place}', soft_wrap=True)
+    complaints = [*driven.complaints, *told.complaints]
     for complaint in complaints:
         note(console, complaint)
     if complaints:

@@ -109,24 +109,24 @@ def friction(
     from engine_mount.cli.calibration.friction_screen import print_friction
     from engine_mount.cli.calibration.written import note_foreign
     from engine_mount.cli.screen import progress_bar
-    from engine_mount.identification.friction.channels import said
+    from engine_mount.identification.friction.channels import friction_mapping
     from engine_mount.identification.friction.figures import figures
     from engine_mount.identification.friction.found import IdentifyOrder
     from engine_mount.identification.friction.identify import identify
     from engine_mount.identification.specimen import check_targets, foreign_parts, with_friction
     from engine_mount.identification.specimen_file import save_specimen
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.units.mapping import with_options
+    from engine_mount.signals.mapping import with_options
     from mount_models.specimen import chosen_specimen, friction_contact
 
     console = terminal()
     check_targets(out, json_file, figure)
     starting = chosen_specimen(str(base) if base else '')
     mapping = with_options(mapping_of(map_file), (), time, rate)
-    told = said(channel or [], mapping, stated(dbc, decimal, delimiter))
+    mapping = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
     order = IdentifyOrder(
         *([local(each, console) for each in places or []] for places in (train, held_out, file)),
-        step, clamp, zero, told, seed, friction_contact(starting.friction),
+        step, clamp, zero, mapping, seed, friction_contact(starting.friction),
     )  # fmt: skip
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)

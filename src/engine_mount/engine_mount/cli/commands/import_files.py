@@ -69,13 +69,14 @@ def import_files(
     from engine_mount.cli.screen import progress_bar
     from engine_mount.reports.json_file import write_json
     from engine_mount.signals.importing.importing import ImportOrder, import_recording
-    from engine_mount.signals.units.mapping import with_options
+    from engine_mount.signals.mapping import with_options
 
     console = terminal()
-    mapping = with_options(mapping_of(map_file), column or [], time, rate)
+    told = stated(dbc, decimal, delimiter)
+    mapping = with_options(mapping_of(map_file), column or [], time, rate, stated=told)
     places = [str(local(file, console)) for file in files]
     name = map_file.name if map_file else ''
-    order = ImportOrder(places, out, mapping, name, first, last, stated(dbc, decimal, delimiter))
+    order = ImportOrder(places, out, mapping, name, first, last)
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
         imported = import_recording(

@@ -24,7 +24,7 @@ Examples:
 
 `engine-mount ls bags /data/drives --json recordings.json` - of several folders
 
-`engine-mount ls s3://bucket/drives` - by URI only the ends of the files are read
+`engine-mount ls s3://bucket/drives` - in a store names and sizes; `info URI` fetches one
 
 The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
 nothing of its files is missing; `engine-mount audit` tells more.
@@ -55,9 +55,7 @@ def ls(
     """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
     from engine_mount.reports.json_file import write_json
     from engine_mount.reports.listing import listed
-    from engine_mount.signals.sources.local import local_path
-    from engine_mount.signals.sources.stores import is_local
-    from engine_mount.signals.sources.uris import shown
+    from engine_mount.signals.sources.uris import is_local, local_path, shown
 
     console = terminal()
     places = folders or ['bags']

@@ -9,7 +9,7 @@ from engine_mount.cli.completion import recordings, setting
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
-    from engine_mount.signals.units.mapping import Mapping
+    from engine_mount.signals.mapping import Mapping
 
 
 def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
@@ -89,8 +89,8 @@ Delimiter = Annotated[
 
 
 def mapping_of(map_file: Path | None) -> 'Mapping':
-    """Return what a mapping file says, nothing without one; raises `MappingError`."""
-    from engine_mount.signals.units.mapping import Mapping, mapping_in_file
+    """Return what a mapping file says, nothing without one; raises `SignalError`."""
+    from engine_mount.signals.mapping import Mapping, mapping_in_file
 
     return mapping_in_file(map_file) if map_file else Mapping()
 

@@ -55,26 +55,24 @@ def record(
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.record import RecordOrder
     from engine_mount.drives.record import record as run_record
-    from engine_mount.drives.recorder_options import checked_recorder, recorder_options
+    from engine_mount.settings.amounts import checked_recorder, recorder_options
     from engine_mount.settings.run_folder import new_place
     from mount_bringup.graph.domain import chosen_domain
-    from mount_recorder.parameters import RecorderParameters
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
     options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
-    order = RecordOrder(
-        out=out if out is not None else new_place('record'),
-        topics=tuple(topics or ()),
-        parameters=checked_recorder(RecorderParameters(), options),
+    console = terminal()
+    outcome = run_record(
+        out if out is not None else new_place('record'),
+        checked_recorder(options),
+        TerminalScreen(console),
+        topics=topics or (),
+        duration=duration,
         domain=chosen_domain(domain),
         namespace=namespace,
-        duration=duration,
     )
-    console = terminal()
-    outcome = run_record(order, TerminalScreen(console))
     if outcome.failure:
         _print('note', outcome.failure, console)
     sound = [_told(folder, console) for folder in outcome.folders]

@@ -1,10 +1,8 @@
 """`engine-mount replay`: a recorded displacement through the same controller again."""
 
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from engine_mount.cli.commands.options import (
     RATE,
@@ -20,7 +18,7 @@ from engine_mount.cli.commands.options import (
     stated,
 )
 from engine_mount.cli.commands.other_than_recorded import OtherThanRecorded, changes_of
-from engine_mount.cli.completion import listed, named
+from engine_mount.cli.completion import named
 from engine_mount.cli.fetching import local
 from engine_mount.cli.terminal import terminal
 
@@ -96,15 +94,6 @@ def replay(
     ] = '',
     rate: Annotated[float | None, typer.Option(help=f'live: factor on the speed of time; {RATE}')] = None,
     start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
-    topic_names: Annotated[
-        str,
-        typer.Option(
-            '--topics',
-            metavar='NAME,...',
-            help='live: names, or all',
-            autocompletion=listed('topic'),
-        ),
-    ] = '',
     with_control: Annotated[
         bool,
         typer.Option('--with-control', help='live: mount_control answers, not the recording'),
@@ -116,34 +105,30 @@ def replay(
 
     Equal is to the last bit; parameters and tables can be other than recorded.
     """
-    from mount_bringup.graph.domain import chosen_domain
-
     if core + lockstep + live > 1:
         raise typer.BadParameter('choose one of --core, --lockstep and --live')
     console = terminal()
     changes = changes_of(settings or [])
     if live:
         from engine_mount.cli.screen import TerminalScreen
-        from engine_mount.drives.live.live import LiveOrder, play_live
+        from engine_mount.drives.live import play_live
+        from mount_bringup.graph.domain import chosen_domain
 
         if maps or map_file or table or out or json_file:
             raise typer.BadParameter('--live only shows; --map, --table, --out and --json do not go with it')
-        order = LiveOrder(
-            local(recording, console),
-            1.0 if rate is None else rate,
-            start,
-            topic_names,
-            with_control,
-            changes,
-            chosen_domain(domain),
-            namespace,
-            mount,
-        )
-        play_live(order, TerminalScreen(console))
+        play_live(
+            local(recording, console), TerminalScreen(console), mount=mount,
+            rate=1.0 if rate is None else rate, begin=start, with_control=with_control,
+            changes=changes, domain=chosen_domain(domain), namespace=namespace,
+        )  # fmt: skip
         return
-    if start or topic_names or with_control or namespace:
-        raise typer.BadParameter('--from, --topics, --with-control and --namespace go with --live')
-    from engine_mount.drives.replay import CORE, LOCKSTEP, ReplayOrder
+    if start or with_control or namespace:
+        raise typer.BadParameter('--from, --with-control and --namespace go with --live')
+    from engine_mount.cli.screen import TerminalScreen, progress_bar
+    from engine_mount.drives.replay import replay as run_replay
+    from engine_mount.recordings.screen import Table
+    from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.run_folder import new_place
 
     foreign = None
     if maps or map_file:
@@ -155,31 +140,23 @@ def replay(
         )  # fmt: skip
     elif rate is not None or scale is not None or offset or time:
         raise typer.BadParameter('--scale, --offset, --time and --rate go with --map or --map-file')
-    mode = LOCKSTEP if lockstep else CORE
+    mode = 'lock-step' if lockstep else 'core'
     place, table = local(recording, console), table and str(local(table, console))
-    order = ReplayOrder(place, mode, changes, table, foreign, out, chosen_domain(domain), mount)
-    _replay(order, json_file, console)
-
-
-def _replay(
-    order: Any,
-    json_file: Path | None,
-    console: Console,
-) -> None:
-    from engine_mount.cli.screen import TerminalScreen, progress_bar
-    from engine_mount.drives.replay import replay as run_replay
-    from engine_mount.drives.summary import print_replay, replay_figures
-    from engine_mount.reports.json_file import write_json
-
     with progress_bar(console, transient=True) as progress:
-        task = progress.add_task(f'replaying ({order.mode})', total=1.0)
-        outcome = run_replay(order, lambda share: progress.update(task, completed=share))
-    figures = replay_figures(outcome)
-    print_replay(outcome, figures, TerminalScreen(console))
-    assert outcome.folder is not None
-    write_json(figures, outcome.folder.summary)
+        task = progress.add_task(f'replaying ({mode})', total=1.0)
+        replayed = run_replay(
+            place, changes, lockstep=lockstep, table=table, foreign=foreign, mount=mount,
+            out=out or new_place(f'replay_{mode}'), domain=domain,
+            progress=lambda share: progress.update(task, completed=share),
+        )  # fmt: skip
+    figures, screen = replayed.figures, TerminalScreen(console)
+    screen.table(Table(f'replay of {figures["source"]}, {mode}', 'll', replayed.rows()))
+    for sentence in figures['notes']:
+        screen.note(sentence)
+    assert replayed.folder is not None
+    write_json(figures, replayed.folder.summary)
     if json_file is not None:
         write_json(figures, json_file)
-    console.print(f'recording  {outcome.folder.recording}', soft_wrap=True)
-    if not outcome.held:
+    console.print(f'recording  {replayed.recording}', soft_wrap=True)
+    if not replayed.held:
         raise typer.Exit(1)

@@ -62,9 +62,8 @@ def show(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
+    from engine_mount.signals.roads.driving import as_figures, as_rows, speed_of
     from engine_mount.signals.roads.iso8608 import unevenness
-    from engine_mount.signals.roads.speed import speed_of
-    from engine_mount.signals.roads.telling import as_figures, as_rows
 
     console = terminal()
     profile = road_of_options(file, lateral, column, distance)
@@ -104,18 +103,17 @@ def invert(
     acceleration cannot tell is said here and in the file.
     """
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.roads.inverting import UNKNOWN, inverted
-    from engine_mount.signals.roads.speed import speed_of
-    from engine_mount.signals.units.columns import read_chosen
-    from engine_mount.signals.units.mapping import Mapping, with_options
-    from engine_mount.signals.units.signals import signals
+    from engine_mount.signals.mapping import Mapping, with_options
+    from engine_mount.signals.roads.driving import speed_of
+    from engine_mount.signals.roads.inversion import UNKNOWN, inverted
+    from engine_mount.signals.selection import select
 
     if not column:
         raise typer.BadParameter('name the acceleration: --column NAME:UNIT, as in --column az:m/s^2')
     console = terminal()
     mapping = with_options(Mapping(), [column], time, rate, scale, 'acceleration')
     driven = speed_of(speed)
-    signal = signals(read_chosen(file, mapping), mapping)['acceleration']
+    signal = select(file, mapping).signals['acceleration']
     road = inverted(signal, driven)
     road.write(out, Path(file).name)
     for sentence in (*signal.notes, *road.notes, *(f'not known: {word}' for word in UNKNOWN)):

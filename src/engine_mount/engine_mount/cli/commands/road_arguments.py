@@ -1,14 +1,14 @@
 """Options that say which road, and how it is driven; for `drive` and `road`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from engine_mount.drives.brought import Brought
-    from engine_mount.signals.roads.profile import RoadProfile
+    from engine_mount.drives.external_excitation import ExternalExcitation
+    from engine_mount.signals.roads.iso8608 import RoadProfile
 
 Lateral = Annotated[
     float, typer.Option(metavar='M', help='road: track of an OpenCRG file, m left of its reference line')
@@ -32,7 +32,7 @@ Repeat = Annotated[bool, typer.Option('--repeat', help='road: drive it forth and
 
 def road_of_options(road: str, lateral: float, column: str, distance: str) -> 'RoadProfile':
     """Return the road that the options name."""
-    from engine_mount.signals.roads.reading import road_profile
+    from engine_mount.signals.roads.table import road_profile
 
     spacing = _number(distance)
     return road_profile(
@@ -44,25 +44,21 @@ def road_of_options(road: str, lateral: float, column: str, distance: str) -> 'R
     )
 
 
-def brought_road(
+def road_excitation(
     road: str,
     speed: str,
+    column: str,
+    duration: float,
     *,
     lateral: float,
-    column: str,
     distance: str,
     contact_length: float | None,
     repeat: bool,
-    sim: Mapping[str, Any],
-) -> 'Brought':
-    """Return the road that the options name, driven at their speed, as the simulator takes it.
-
-    `sim` are the parameters of mount_sim, for the duration.
-    """
-    from engine_mount.drives.brought import Brought
-    from engine_mount.signals.roads.driving import wheel_height
+) -> 'ExternalExcitation':
+    """Return the road that the options name as excitation: at their speed, for `duration` s (0: once)."""
+    from engine_mount.drives.external_excitation import ExternalExcitation
+    from engine_mount.signals.roads.driving import speed_of, wheel_height
     from engine_mount.signals.roads.iso8608 import unevenness
-    from engine_mount.signals.roads.speed import speed_of
 
     if not speed:
         raise typer.BadParameter(
@@ -73,11 +69,11 @@ def brought_road(
         profile,
         speed_of(speed),
         contact_length=contact_length,
-        duration=float(sim.get('timeline.duration', 0.0)),
+        duration=float(duration),
         repeat=repeat,
     )
     notes = (f'{profile.name}: {sentence}' for sentence in (*unevenness(profile).sentences(), *over.notes))
-    return Brought('road.file', over.write, over.told, tuple(notes))
+    return ExternalExcitation('road.file', over.write, over.told, tuple(notes))
 
 
 def height_column(columns: Sequence[str]) -> str:
@@ -92,13 +88,6 @@ def given_without_road(**options: Any) -> None:
     for name, value in options.items():
         if value not in (None, '', False, 0.0):
             raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
-
-
-def check_scenario(scenario: str, file: str) -> None:
-    """Refuse a road together with another scenario."""
-    if scenario not in ('motorway', 'road') or file:
-        other = '--file' if file else f'--scenario {scenario}'
-        raise typer.BadParameter(f'--road is a scenario of its own; leave out {other}')
 
 
 def _number(text: str) -> float:

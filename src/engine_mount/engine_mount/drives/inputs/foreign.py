@@ -1,16 +1,16 @@
-"""A displacement recorded by somebody else: chosen by column or field, checked, scaled, resampled."""
+"""A displacement recorded by somebody else: chosen by column or field, checked, resampled."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.drives.inputs.input import ControlRun, Messages, ReplayError, ReplayInput, dated
-from engine_mount.drives.inputs.ramps import MeasuredGap, measured_gaps
+from engine_mount.drives.inputs.consumed_samples import ControlRun, MeasuredGap, ReplayError
+from engine_mount.drives.inputs.input import Messages, ReplayInput, measured_gaps
 from engine_mount.recordings.place import open_run
 from engine_mount.settings.chosen import Parameters, chosen_specimen, control_parameters
-from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.one_grid import (
@@ -21,11 +21,10 @@ from engine_mount.signals.importing.one_grid import (
     displacement_on_grid,
     rate_text,
 )
-from engine_mount.signals.plausibility import check_size
-from engine_mount.signals.signal import SECOND
-from engine_mount.signals.units.columns import place, read_chosen
-from engine_mount.signals.units.mapping import MEAN, Mapping, checked_scale, mapping_in_file, with_options
-from engine_mount.signals.units.signals import ChosenSignal, chosen_signals
+from engine_mount.signals.mapping import MEAN, Mapping, mapping_in_file, with_options
+from engine_mount.signals.quantities import QUANTITIES
+from engine_mount.signals.selection import select
+from engine_mount.signals.signal import SECOND, check_size
 from mount_init.parameters import InitParameters
 from mount_models.arithmetic.averages import mean
 from mount_models.force_table import contact_force, current_force_table, offset_current
@@ -37,21 +36,18 @@ from mount_ros.messages.scalars import ScalarsLayout
 from mount_sim.plant.closing import ClosingMechanics
 
 DEFAULT_TABLE = 'default'
-_FIELDS = (DISPLACEMENT, ENGINE, CHASSIS)
+_QUANTITIES = {name: QUANTITIES[name] for name in (DISPLACEMENT, ENGINE, CHASSIS)}
 
 
 @dataclass(frozen=True)
 class ForeignOrder:
-    """How a foreign recording becomes a displacement in m: its columns in SI, less `offset`.
+    """How a foreign recording becomes a displacement in m: its columns in SI, less `offset` (m, or `mean`).
 
-    `mapping` names `displacement`, or `engine_displacement` and `chassis_displacement`. `offset` is in m, or
-    `mean`. `mapping_file` is where the mapping was read from, '' where options alone say it.
+    `mapping` names `displacement`, or `engine_displacement` and `chassis_displacement`.
     """
 
     mapping: Mapping
     offset: str = MEAN
-    mapping_file: str = ''
-    stated: Stated = field(default_factory=Stated)
 
 
 def foreign_order(
@@ -64,39 +60,28 @@ def foreign_order(
     rate: float | None = None,
     stated: Stated | None = None,
 ) -> ForeignOrder:
-    """Return the order that the options of the command describe, or raise `ReplayError`.
+    """Return the order that the options of the command describe, or raise a `ValueError`.
 
     `maps` are `NAME=COLUMN[:UNIT]`, `time` is `COLUMN[:UNIT]`. Without `offset` it is that of the mapping
     file, else the mean.
     """
-    for text in maps:
-        name, equals, place = text.partition('=')
-        if not (equals and place) or name not in _FIELDS:
-            raise ReplayError(
-                f'--map {text}: write displacement=/topic.field, or engine_displacement=/topic.field and '
-                'chassis_displacement=/topic.field'
-            )
     mapping = mapping_in_file(mapping_file) if mapping_file else Mapping()
-    mapping = with_options(mapping, maps, time, rate)
-    columns = {name: choice for name, choice in mapping.columns.items() if name in _FIELDS}
-    if set(columns) not in ({DISPLACEMENT}, {ENGINE, CHASSIS}):
+    mapping = replace(mapping.of(_QUANTITIES), option='--map {quantity}={column}:{unit}')
+    mapping = with_options(mapping, maps, time, rate, scale, known=_QUANTITIES, stated=stated)
+    if set(mapping.columns) not in ({DISPLACEMENT}, {ENGINE, CHASSIS}):
         raise ReplayError(
-            f'--map names {" and ".join(columns) or "nothing"}; needed is displacement, or '
+            f'--map names {" and ".join(mapping.columns) or "nothing"}; needed is displacement, or '
             'engine_displacement and chassis_displacement together: the displacement of the mount is their '
             'difference'
         )
-    if scale is not None:
-        columns = {
-            name: replace(choice, scale=checked_scale(scale, '--scale')) for name, choice in columns.items()
-        }
-    if offset not in ('', MEAN) and not _is_number(offset):
+    said = next((one.offset for one in mapping.columns.values() if one.offset is not None), MEAN)
+    offset = offset or str(said)
+    if offset != MEAN and not _is_number(offset):
         raise ReplayError(f'--offset {offset!r} must be a number of m, or mean')
-    said = next((choice.offset for choice in columns.values() if choice.offset is not None), MEAN)
-    options = '--map {quantity}={column}:{unit}'
+    # subtracted at the rate of the controller, from the difference of both
     return ForeignOrder(
-        replace(mapping, columns=columns, others={}, options=options), offset or str(said),
-        mapping_file.name if mapping_file else '', stated or Stated(),
-    )  # fmt: skip
+        mapping.only({name: replace(one, offset=None) for name, one in mapping.columns.items()}), offset
+    )
 
 
 def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: MeasuredGap) -> ReplayInput:
@@ -106,42 +91,44 @@ def foreign_input(path: Path, order: ForeignOrder, parameters: Parameters, gap: 
     interpolated; a longer one, or a rate below `LOWEST_RATE`, is refused. Raises `ReplayError` or
     `SignalError`.
     """
-    measured = read_chosen(str(path), order.mapping, order.stated)
-    notes = list(measured.notes)
-    chosen = chosen_signals(measured, order.mapping)
-    control = control_parameters(parameters)
-    even, scale, done = _even(order, chosen)
-    notes += done
+    selection, control = select(path, order.mapping), control_parameters(parameters)
+    columns = {name: choice.column for name, choice in order.mapping.columns.items()}
+    notes, even = list(selection.notes), {}
+    for name, signal in selection.signals.items():
+        even[name] = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
+        count, rate = len(signal.values), even[name].rate
+        notes.append(f'{columns[name]}: {count} samples at {rate:.4g} Hz, by their {signal.clock}')
+        notes += signal.notes
+        notes += [f'{columns[name]}: {note}' for note in even[name].notes[len(signal.notes) :]]
     stamps, values = displacement_on_grid(even, control.sample_rate, notes)
     if stamps[0] < SECOND:  # a time that begins at 0 leaves no room for an activation before it
         stamps = stamps - stamps[0] + SECOND
-    values = scale * values
     offset = mean(values) if order.offset == MEAN else float(order.offset)
+    scale = ' and '.join({f'{told["factor"]:g}': None for told in selection.columns.values()})
     notes.append(
-        f'factor {scale:g} to m; offset {1e3 * offset:.3f} mm removed '
+        f'factor {scale} to m; offset {1e3 * offset:.3f} mm removed '
         f'({"the mean" if order.offset == MEAN else "as given"})'
     )
     if order.offset == MEAN:
         notes.append('without its mean the rest position is taken as 0; --offset keeps another one')
     displacement = values - offset
-    largest = control.displacement_range
     check_size(
-        f'{place(measured)}: displacement at {rate_text(control.sample_rate)}', displacement,
-        1.0 / control.sample_rate, largest, 'm',
-        f'with factor {scale:g} to m: is its unit another one (--scale) or its zero (--offset), or is '
+        f'{selection.name}: displacement at {rate_text(control.sample_rate)}', displacement,
+        1.0 / control.sample_rate, control.displacement_range, 'm',
+        f'with factor {scale} to m: is its unit another one (--scale) or its zero (--offset), or is '
         'this sample a fault to cut or repair?',
     )  # fmt: skip
     notes.append(f'largest displacement {1e3 * float(np.max(np.abs(displacement))):.3f} mm')
-    run = ControlRun(stamps, displacement, dated(gap, int(stamps[0]) - SAMPLE_TIME_NS))
+    run = ControlRun(stamps, displacement, gap.dated(int(stamps[0]) - SAMPLE_TIME_NS))
     layout = ScalarsLayout(topics.DISPLACEMENT)
     pairs = zip(stamps.tolist(), displacement.tolist(), strict=True)
     messages = Messages('/' + DISPLACEMENT, [layout.pack(stamp, (value,)) for stamp, value in pairs], stamps)
-    given = {DISPLACEMENT: messages}
     name = f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
-    columns = order.mapping.columns.values()
-    source = f'{name}: ' + ', '.join(choice.column for choice in columns)
     plain = {node: dict(values) for node, values in parameters.items()}
-    return ReplayInput(source, [run], plain, None, given, int(stamps[0]), 0, {}, notes)
+    return ReplayInput(
+        f'{name}: {", ".join(columns.values())}', [run], plain, None, {DISPLACEMENT: messages},
+        int(stamps[0]), 0, {}, notes,
+    )  # fmt: skip
 
 
 def default_gap(parameters: Parameters) -> MeasuredGap:
@@ -176,29 +163,6 @@ def chosen_gap(table: str, parameters: Parameters) -> tuple[MeasuredGap, str]:
     if not gaps:
         raise ReplayError(f'--table {table}: that recording holds no air_gap with its current_force_table')
     return gaps[-1], f'current-force table: measured in {Path(table).name} at {gaps[-1].stamp / 1e9:.3f} s'
-
-
-# Signals.
-
-
-def _even(
-    order: ForeignOrder, chosen: dict[str, ChosenSignal]
-) -> tuple[dict[str, EvenSignal], float, list[str]]:
-    """Return the signals evenly spaced, the factor to m that they have in common, and what was done."""
-    factors = {one.factor for one in chosen.values()}
-    common = factors.pop() if len(factors) == 1 else None
-    even, notes = {}, []
-    for name, one in chosen.items():
-        signal = one.signal if common is not None else replace(one, offset=None).in_si()
-        found = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
-        column = order.mapping.columns[name].column
-        notes.append(
-            f'{column}: {len(signal.values)} samples at {found.rate:.4g} Hz, by their {signal.clock}'
-        )
-        notes += signal.notes
-        notes += [f'{column}: {note}' for note in found.notes[len(signal.notes) :]]
-        even[name] = found
-    return even, 1.0 if common is None else common, notes
 
 
 def _is_number(text: str) -> bool:

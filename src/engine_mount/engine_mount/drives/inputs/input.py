@@ -1,18 +1,18 @@
 """What a recording gives to replay: ramps of mount_init and runs of mount_control, with their samples."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from engine_mount.drives.inputs.parameter_changes import recorded_changes
-from engine_mount.drives.inputs.ramps import MeasuredGap, Ramp, measured_gaps, ramps_of
-from engine_mount.drives.inputs.taken import (
+from engine_mount.drives.inputs.consumed_samples import (
     BREAK,
     Column,
     ControlRun,
+    MeasuredGap,
     Notes,
+    Ramp,
     RecordedAnswers,
     ReplayError,
     Times,
@@ -27,13 +27,20 @@ from engine_mount.recordings.session import (
     session_content,
     session_parameters,
 )
-from engine_mount.settings.chosen import control_parameters, with_recorded_policy
+from engine_mount.settings.chosen import (
+    Parameters,
+    chosen_initialisation,
+    control_parameters,
+    with_recorded_policy,
+)
 from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.sampling import SAMPLE_TIME_NS
+from mount_models.specimen import SpecimenError
 from mount_ros import topics
-from mount_ros.messages.event import ParametersChanged
-from mount_ros.messages.force_table import ForceTable
+from mount_ros.messages.event import ParametersChanged, read_change
+from mount_ros.messages.force_table import from_message
+from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import Topic
 
 _INPUTS = (topics.DISPLACEMENT, topics.COIL_RIPPLE, topics.COIL_TEMPERATURE)
@@ -45,12 +52,13 @@ _READ = (
     topics.CURRENT_FORCE_TABLE,
     topics.SESSION,
 )
-_TAKEN_AS_BEFORE = ('policy', 'sample_rate')  # what sessions without them were made with is known
+_CONTROL = 'mount_control'
+_KNOWN_OF_OLDER = ('policy', 'sample_rate')  # what sessions without them were made with is known
 
 
 @dataclass(frozen=True)
 class Messages:
-    """The recorded messages of one topic by which a replay can be told again, with their log times in ns."""
+    """The recorded messages of one topic as a replay writes them again, with their log times in ns."""
 
     name: str  # with its namespace
     payloads: Sequence[bytes] | Payloads
@@ -59,7 +67,7 @@ class Messages:
 
 @dataclass
 class ReplayInput:
-    """Everything that goes into a replay; `notes` says in sentences what is not as one would expect.
+    """Everything that goes into a replay; `notes` are sentences on what is not as one would expect.
 
     `zero` is the stamp (ns) from which times are told, the zero of the recording's time axis; `log_shift`
     (ns) leads from stamps to log times. `messages` are those of displacement, coil ripple and coil
@@ -104,26 +112,55 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
     session = session_of(recording, notes)
     parameters = parameters_of(session, notes)
     first = int(displacement[0][0])
-    gaps = recorded_gaps(recording, None if gap is None else dated(gap, first - SAMPLE_TIME_NS))
-    answers = recorded_answers(recording, parameters['mount_control'], notes)
+    gaps = recorded_gaps(recording, None if gap is None else gap.dated(first - SAMPLE_TIME_NS))
+    answers = recorded_answers(recording, parameters[_CONTROL], notes)
     ramps = ramps_of(recording, parameters, gaps, notes)
     runs = control_runs(displacement, answers, ramps, gaps, control_parameters(parameters), notes)
     if not runs:
+        span = f'{notes.at(first)} .. {notes.at(int(displacement[0][-1]))}'
         raise ReplayError(
-            f'{recording.path}: no overlap of displacement ({_span(displacement[0], notes)}) and the time '
-            f'after the air_gap ({notes.at(gaps[0].stamp)}): the controller had nothing to do'
+            f'{recording.path}: no overlap of displacement ({span}) and the time after the air_gap '
+            f'({notes.at(gaps[0].stamp)}): the controller had nothing to do'
         )
     if gap is not None:
-        ramps, runs = [], [replace(run, gap=dated(gap, run.gap.stamp)) for run in runs]
-    parts = sorted([*ramps, *runs], key=lambda part: int(part.stamps[0]))
-    messages = {topic.name: _messages(recording, topic) for topic in _INPUTS if has(recording, topic)}
-    series = recording[topics.DISPLACEMENT.name]
-    log_shift = int(series.receive_times[0] - series.stamps[0])
-    name = recording.short_name
-    changes = recorded_changes(recording)
+        ramps, runs = [], [replace(run, gap=gap.dated(run.gap.stamp)) for run in runs]
+    series = {topic.name: recording[topic.name] for topic in _INPUTS if has(recording, topic)}
+    shaking = series[topics.DISPLACEMENT.name]
     return ReplayInput(
-        name, parts, parameters, answers, messages, notes.zero, log_shift, session, notes, changes
+        source=recording.short_name,
+        parts=sorted([*ramps, *runs], key=lambda part: int(part.stamps[0])),
+        parameters=parameters,
+        answers=answers,
+        messages={
+            name: Messages(each.topic, each.payloads, each.receive_times) for name, each in series.items()
+        },
+        zero=notes.zero,
+        log_shift=int(shaking.receive_times[0] - shaking.stamps[0]),
+        session=session,
+        notes=notes,
+        changes=recorded_changes(recording),
     )
+
+
+def measured_gaps(recording: Recording) -> list[MeasuredGap]:
+    """Return the results of all initialisations in the recording that have both their messages, by stamp."""
+    if topics.AIR_GAP.name not in recording or topics.CURRENT_FORCE_TABLE.name not in recording:
+        return []
+    tables = {}
+    for message in recording[topics.CURRENT_FORCE_TABLE.name].messages():
+        try:
+            table = from_message(message)
+        except MessageError:
+            continue  # a node does not take it either
+        tables[table.stamp] = table
+    series = recording[topics.AIR_GAP.name]
+    columns = {name: series[name] for name in topics.AIR_GAP.names}
+    gaps = {}
+    for place, stamp in enumerate(series.stamps.tolist()):
+        if stamp in tables:
+            numbers = {name: float(column[place]) for name, column in columns.items()}
+            gaps[stamp] = MeasuredGap(stamp, numbers, tables[stamp])
+    return [gaps[stamp] for stamp in sorted(gaps)]
 
 
 def recorded_gaps(recording: Recording, without: MeasuredGap | None = None) -> list[MeasuredGap]:
@@ -131,15 +168,44 @@ def recorded_gaps(recording: Recording, without: MeasuredGap | None = None) -> l
     gaps = measured_gaps(recording) or ([] if without is None else [without])
     if not gaps:
         raise ReplayError(
-            f'{recording.path} holds no air_gap with its current_force_table, so no current can be told; '
+            f'{recording.path} holds no air_gap with its current_force_table, so no current is known; '
             'engine-mount replay takes one of another recording with --table RECORDING, or --table default'
         )
     return gaps
 
 
-def dated(gap: MeasuredGap, stamp: int) -> MeasuredGap:
-    """Return the same result of an initialisation as of another time (ns)."""
-    return MeasuredGap(stamp, gap.numbers, ForceTable(stamp, gap.table.current, gap.table.normal_force))
+def ramps_of(
+    recording: Recording, parameters: Parameters, gaps: Sequence[MeasuredGap], notes: list[str]
+) -> list[Ramp]:
+    """Return the ramps that are in the recording from their first sample to their last."""
+    if not (has(recording, topics.COIL_RIPPLE) and has(recording, topics.CURRENT_SETPOINT) and gaps):
+        return []
+    try:
+        length = chosen_initialisation(parameters).length
+    except SpecimenError as error:
+        notes.append(f'initialisations are not replayed, their results are taken as recorded: {error}')
+        return []
+    ripple = recording[topics.COIL_RIPPLE.name]
+    stamps, first = np.unique(ripple.stamps, return_index=True)
+    answered = np.intersect1d(stamps, recording[topics.CURRENT_SETPOINT.name].stamps)
+    columns = ripple['coil_current'], *map(ripple.derivative, ('coil_current', 'flux_density'))
+    temperatures: list[tuple[int, float]] = []
+    if has(recording, topics.COIL_TEMPERATURE):
+        series = recording[topics.COIL_TEMPERATURE.name]
+        temperatures = list(zip(series.stamps.tolist(), series['temperature'].tolist(), strict=True))
+    ramps = []
+    for gap in gaps:
+        taken = answered[answered <= gap.stamp][-length:]
+        if len(taken) < length or taken[-1] != gap.stamp:
+            notes.append(
+                f'the ramp before the air_gap of stamp {gap.stamp / 1e9:.3f} s is not wholly in the '
+                'recording; its result is taken as recorded'
+            )
+            continue
+        places = first[np.searchsorted(stamps, taken)]
+        warm = tuple(each for each in temperatures if each[0] <= gap.stamp)
+        ramps.append(Ramp(taken, *(column[places] for column in columns), warm))
+    return ramps
 
 
 def recorded_answers(
@@ -155,17 +221,15 @@ def recorded_answers(
     setpoints = recording[topics.CURRENT_SETPOINT.name]
     # When mount_control is deactivated it answers its last sample once more, with 0 A.
     stamps, first = np.unique(setpoints.stamps, return_index=True)
+    currents = setpoints['coil_current'][first]
     if not has(recording, topics.CONTROL_TRACE):
         notes.append('the recording holds no control_trace: every sample with a setpoint counts as taken')
-        empty = np.empty(0)
-        traces = dict.fromkeys(topics.CONTROL_TRACE.names, empty)
-        return RecordedAnswers(stamps, setpoints['coil_current'][first], empty.astype(np.int64), traces)
+        empty = dict.fromkeys(topics.CONTROL_TRACE.names, np.empty(0))
+        return RecordedAnswers(stamps, currents, np.empty(0, np.int64), empty)
     series = recording[topics.CONTROL_TRACE.name]
     trace_stamps, places = np.unique(series.stamps, return_index=True)
     traces = {name: series[name][places] for name in series.names}
-    return RecordedAnswers(
-        stamps, setpoints['coil_current'][first], trace_stamps, traces, quiet_at_first(control)
-    )
+    return RecordedAnswers(stamps, currents, trace_stamps, traces, quiet_at_first(control))
 
 
 # Samples.
@@ -216,7 +280,7 @@ def parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str, 
     for node in ('mount_control', 'mount_init'):
         values = recorded.get(node, {})
         found[node] = {name: value for name, value in values.items() if name in known[node]}
-        new = [name for name in known[node] if name not in found[node] and name not in _TAKEN_AS_BEFORE]
+        new = [name for name in known[node] if name not in found[node] and name not in _KNOWN_OF_OLDER]
         if new and found[node] and len(new) < len(known[node]) // 2:
             notes.append(f'{node}: {", ".join(new)} is not in the session; the default is taken')
     was_controlled = bool(session) and session.get('scenario') != SCENARIO
@@ -233,10 +297,30 @@ def has(recording: Recording, topic: Topic) -> bool:
     return topic.name in recording and recording.topics[recording.resolve(topic.name)].message_count > 0
 
 
-def _messages(recording: Recording, topic: Topic) -> Messages:
-    series = recording[topic.name]
-    return Messages(series.topic, series.payloads, series.receive_times)
+# Changes of parameters while the recording ran: mount_control reports them on `event`.
 
 
-def _span(stamps: Times, notes: Notes) -> str:
-    return f'{notes.at(int(stamps[0]))} .. {notes.at(int(stamps[-1]))}' if len(stamps) else 'no sample'
+def recorded_changes(recording: Recording) -> list[ParametersChanged]:
+    """Return the changes of parameters of mount_control in the order of their stamps."""
+    if topics.EVENT.name not in recording:
+        return []
+    found = (read_change(message.data) for message in recording[topics.EVENT.name].messages())
+    changes = [change for change in found if change is not None and change.node == _CONTROL]
+    return sorted(changes, key=lambda change: change.time)
+
+
+def without(changes: Sequence[ParametersChanged], names: Collection[str]) -> list[ParametersChanged]:
+    """Return the changes of all parameters but `names`, which are to be other than recorded."""
+    kept = [
+        change._replace(values={name: value for name, value in change.values.items() if name not in names})
+        for change in changes
+    ]
+    return [change for change in kept if change.values]
+
+
+def with_recorded_changes(parameters: Parameters, changes: Sequence[ParametersChanged]) -> Parameters:
+    """Return the parameters of all nodes after these changes."""
+    own = dict(parameters.get(_CONTROL, {}))
+    for change in changes:
+        own |= change.values
+    return {**parameters, _CONTROL: own}

@@ -1,23 +1,24 @@
 """The messages of a run without middleware: those that the nodes would publish, packed many at a time."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 
 from mount_control.policy.contract import Policy, trace_dtype, trace_fields
 from mount_init.initialisation import OFF, InitialisationResult
-from mount_models.sampling import SAMPLE_RATE, sample_time_ns
+from mount_models.sampling import sample_time_ns
 from mount_ros import topics
-from mount_ros.messages.cdr import serialised
-from mount_ros.messages.force_table import to_message
+from mount_ros.messages.cdr import accelerometer, temperature, wrench
+from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
-from mount_ros.messages.sensors import level_imu, temperature_layout
 from mount_ros.topics import Topic
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.plant import TRUTH
+from mount_sim.plant.simulated_car import mount_parameters
+from mount_sim.quantisation import quantised_coil_temperature
 
 Write = Callable[[Topic, bytes, int], None]
 """Takes (topic, serialised message, stamp ns)."""
@@ -51,24 +52,26 @@ class CoreMessages:
 
     def __init__(
         self,
+        sim: Mapping[str, Any],
         write: Write,
-        coil_celsius: float,
         write_columns: WriteColumns | None = None,
-        sample_rate: float = SAMPLE_RATE,
+        mount: str = '',
     ):
-        """Without `write_columns` every message goes to `write`; `coil_celsius` is what each status says."""
-        self._coil_celsius = coil_celsius
-        self._status_period = status_every(sample_rate) * sample_time_ns(sample_rate)
+        """`sim`: parameters of mount_sim. Without `write_columns` every message goes to `write`."""
+        parameters = mount_parameters(sim, mount)
+        self._coil_celsius = quantised_coil_temperature(parameters.electronics.coil_temperature)
+        rate = parameters.sample_rate
+        self._status_period = status_every(rate) * sample_time_ns(rate)
         self._write = write
         self._write_columns = write_columns or self._one_by_one
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
-        self._temperature = temperature_layout()
+        self._temperature = OneNumberLayout(temperature)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
-        self._acceleration = OneNumberLayout(level_imu(), 'linear_acceleration.z')
-        self._force = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        self._acceleration = OneNumberLayout(accelerometer)
+        self._force = OneNumberLayout(wrench)
 
     def write_samples(self, samples: Samples) -> None:
         """Write all samples and empty the block."""
@@ -86,7 +89,7 @@ class CoreMessages:
         """Write what an initialisation found."""
         numbers = [getattr(result, name) for name in self._air_gap.names]
         self._write(topics.AIR_GAP, self._air_gap.pack(stamp, numbers), stamp)
-        table = serialised(to_message(stamp, result.table))
+        table = table_message(stamp, result.table)
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
 
     def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
@@ -109,7 +112,7 @@ class CoreMessages:
             (topics.DISPLACEMENT, self._displacement.pack_rows(stamps, readings[:, :1])),
             (topics.COIL_RIPPLE, ripple),
             (topics.CURRENT_SETPOINT, self._setpoint.pack_rows(stamps, samples.setpoints[part, None])),
-            (topics.SIM_TRUTH, self._truth.pack_rows(stamps, _numbers(samples.truths[part]))),
+            (topics.SIM_TRUTH, self._truth.pack_rows(stamps, samples.truths[part].view(np.float64))),
             (
                 topics.SIM_CHASSIS_ACCELERATION,
                 self._acceleration.pack_rows(stamps, truth['chassis_acceleration']),
@@ -118,7 +121,7 @@ class CoreMessages:
         ]
         if samples.traced[part.start]:
             layout = ScalarsLayout(samples.trace_topic)
-            traces = layout.pack_rows(stamps, _numbers(samples.traces[part]))
+            traces = layout.pack_rows(stamps, samples.traces[part].view(np.float64))
             columns.append((topics.CONTROL_TRACE, traces))
         return columns
 
@@ -126,10 +129,6 @@ class CoreMessages:
         for place, stamp in enumerate(stamps.tolist()):
             for topic, rows in columns:
                 self._write(topic, rows[place].tobytes(), stamp)
-
-
-def _numbers(records: NDArray[np.uint8]) -> NDArray[np.float64]:
-    return records.view(np.float64)
 
 
 def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -1,7 +1,6 @@
 """The suite driven: orders checked before the first manoeuvre, in core several at a time."""
 
 import functools
-import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -9,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.drives.drive import Drive, check_drive, drive
 from engine_mount.drives.loop.run import run_core_into
-from engine_mount.drives.preflight import preflight
 from engine_mount.experiments.check.suite import BANDS, RACK, Manoeuvre
-from engine_mount.experiments.harness.contract import Settings, Values
+from engine_mount.experiments.harness.contract import Settings
 from engine_mount.experiments.harness.many_runs import TruthOnly
 from engine_mount.experiments.harness.measures import first_extremum, rms_in_bands
 from engine_mount.fleet.runner import run_tasks
@@ -201,17 +199,16 @@ def run_trial(trial: Trial) -> Result:
 
     One that breaks down, or whose recording cannot be judged, is `broken_down`: the others go on.
     """
-    order = DriveOrder(
-        scenario=str(trial.parameters['mount_sim']['scenario']),
-        mode=MODES[trial.through],
-        parameters={node: dict(values) for node, values in trial.parameters.items()},
-        domain=trial.domain,
-        out=trial.out / trial.manoeuvre.name,
-        priority=trial.priority,
-    )
     try:
-        folder, run, complaints = record_drive(order, Screen(io.StringIO()))
-        return _result(trial, open_recording(folder.recording), run, complaints)
+        run = drive(
+            core=trial.through == CORE,
+            lockstep=trial.through == LOCKSTEP,
+            parameters=trial.parameters,
+            domain=trial.domain,
+            out=trial.out / trial.manoeuvre.name,
+            priority=trial.priority,
+        )
+        return _result(trial, open_recording(run.recording), run)
     except (GraphError, ValueError) as error:
         return broken_down(str(error))
 
@@ -221,21 +218,21 @@ def broken_down(reason: str) -> Result:
     return Result({}, (), Shown(), reason)
 
 
-def _result(trial: Trial, recording: Recording, run: Values, complaints: list[str]) -> Result:
+def _result(trial: Trial, recording: Recording, run: Drive) -> Result:
     audits = audit(recording)
     found = losses(recording, audits)
-    remarks = [*complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run['samples'])]
+    remarks = [*run.complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run.samples)]
     beside = {other: _alone(trial.parameters, mount) for other, mount in MOUNT_OF.items()}
-    drive = load_drive(recording, float(run['excitation_start']))
-    remarks += _late_control(recording, drive.zero)
-    truth = at_samples(drive.truth, beside['undamped'].displacement.size)
-    driven = Driven(drive, truth, trial.parameters)
+    signals = load_drive(recording, run.excitation_start)
+    remarks += _late_control(recording, signals.zero)
+    truth = at_samples(signals.truth, beside['undamped'].displacement.size)
+    driven = Driven(signals, truth, trial.parameters)
     figures = {
         **figures_of(driven, beside, trial.manoeuvre),
         **_gap_errors(recording),
         **_of_losses(found),
         'remarks': float(len(remarks)),
-        'latency_p99_us': 1e6 * run['latency_p99_s'] if trial.through == GRAPH else math.nan,
+        'latency_p99_us': 1e6 * run.latency_p99 if trial.through == GRAPH else math.nan,
     }
     told = [*remarks, *found.complaints()]
     return Result(figures, tuple(told), _shown(driven, beside))
@@ -394,7 +391,7 @@ def _checked_duration(trial: Trial) -> float:
     """Return how long (s) a drive is, start and end of its graph included, or raise `CheckError`."""
     manoeuvre = trial.manoeuvre
     try:
-        excitation = preflight(trial.parameters, core=trial.through == CORE)
+        excitation = check_drive(trial.parameters, core=trial.through == CORE)
     except ParameterError as error:
         raise CheckError(f'{manoeuvre.name}: {error}') from None
     if manoeuvre.evaluated_from >= excitation.duration:

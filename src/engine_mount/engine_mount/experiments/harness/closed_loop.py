@@ -1,14 +1,11 @@
 """Controller and plant together, once through: driven, recorded, and read back."""
 
-import io
 from dataclasses import replace
 
-from engine_mount.drives.drive import DriveOrder, record_drive
+from engine_mount.drives.drive import drive
 from engine_mount.experiments.harness.contract import ExperimentError, Order, Settings, Values
 from engine_mount.recordings.recording import open_recording
-from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
-from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import defaults_of_nodes
 from mount_sim.mount_choice import with_control_of_mount
 
@@ -42,20 +39,11 @@ def driven(order: Order, label: str, own: Settings, experiment: str) -> DriveSig
     `own` holds the parameters that the experiment sets, `mount_sim.scenario` among them.
     """
     parameters = settings_of_run(order, own, experiment)
-    drive_order = DriveOrder(
-        scenario=str(own['mount_sim']['scenario']),
-        mode=mode_of(order),
-        parameters=parameters,
-        domain=chosen_domain(None) if order.graph else 0,
-        out=order.out / label,
-    )
-    # the experiments' own bar is on the screen
-    folder, run, complaints = record_drive(drive_order, Screen(io.StringIO()))
-    recording = open_recording(folder.recording)
-    complaints += recording.warnings
-    if complaints:
+    run = drive(core=not order.graph, lockstep=order.graph, parameters=parameters, out=order.out / label)
+    recording = open_recording(run.recording)
+    if complaints := [*run.complaints, *recording.warnings]:
         raise ExperimentError(
-            f'run {label} in {folder.path} was not as it should be: {"; ".join(complaints)}'
+            f'run {label} in {run.folder.path} was not as it should be: {"; ".join(complaints)}'
         )
-    drive = load_drive(recording, float(run['excitation_start']))
-    return replace(drive, recording=folder.recording, truth=drive.truth.since(0.0))
+    signals = load_drive(recording, run.excitation_start)
+    return replace(signals, recording=run.recording, truth=signals.truth.since(0.0))

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from geometry_msgs.msg import WrenchStamped
-
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import new_session, session_message, session_text
+from mount_ros.messages.cdr import wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
     DISPLACEMENT,
@@ -45,7 +44,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
         writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
-        forces = OneNumberLayout(WrenchStamped(), 'wrench.force.z')
+        forces = OneNumberLayout(wrench)
         channels = measured.displacement, measured.friction_force, measured.normal_force
         rows = zip(*(channel.tolist() for channel in channels), strict=True)
         for sample, (x, friction, clamp) in enumerate(rows):

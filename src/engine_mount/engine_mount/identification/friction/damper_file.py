@@ -1,12 +1,13 @@
 """The JSON of a measured friction damper: a band round a drum, an actuator pulls at either end."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.identification.friction.channels import DESIRED, NEEDED, Said, columns_in_si
+from engine_mount.identification.friction.channels import DESIRED, FRICTION, NEEDED
 from engine_mount.identification.friction.recording import (
     COEFFICIENT_RANGE,
     DIRECTION_SPREAD,
@@ -15,8 +16,11 @@ from engine_mount.identification.friction.recording import (
     IdentificationError,
     checked_recording,
 )
-from engine_mount.signals.table import Table, read_json
-from engine_mount.signals.units.unit import unit_of
+from engine_mount.signals.formats.headers import name_and_unit
+from engine_mount.signals.formats.measured import Measured, MeasuredColumn, Provenance
+from engine_mount.signals.mapping import Mapping
+from engine_mount.signals.selection import select_rows
+from engine_mount.signals.units import unit_of
 
 CLAMPS = ('sliding', 'rest', 'none')
 _RIG_HEADER = ('time_s', 'displacement_in', 'friction_force_kip', 'velocity_in_per_s')
@@ -26,10 +30,10 @@ _BAND_SPREAD = 0.8
 """Deviation of ln(mu_p / mu_n) of a band whose taut ends are not told (chosen): it tightens itself."""
 
 
-def read_damper(path: Path, said: Said, clamp: str) -> FrictionRecording:
+def read_damper(path: Path, mapping: Mapping, clamp: str) -> FrictionRecording:
     """Return a test of the measured friction damper: a band round a drum, an actuator pulls at either end.
 
-    Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `said` may name others, by name
+    Columns: `_RIG_HEADER`, others by their number, and last `_RIG_PULLS`; `mapping` may name others, by name
     or number. The zero of its cell is not known; the loop tells it (`looks/force_zero.py`).
 
     What presses the band onto the drum is its tension. At rest that is the clamp that was set, but a band
@@ -47,13 +51,13 @@ def read_damper(path: Path, said: Said, clamp: str) -> FrictionRecording:
     if clamp not in CLAMPS:
         raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
     table = _rig_table(path)
-    columns = columns_in_si(table, said, NEEDED[:2])
+    columns = select_rows(table, mapping, FRICTION, NEEDED[:2], timed=True)
     time, displacement, force = columns['time'], columns['displacement'], columns['friction_force']
     notes = []
     quiet = time <= time[0] + _REST
     measured = columns.get('normal_force')
     if measured is None:
-        pulls = unit_of('lbf').factor * table.columns(*map(table.place, _RIG_PULLS)).T
+        pulls = np.column_stack([unit_of('lbf').to_si(table.column(each).values) for each in _RIG_PULLS])
         normal = _rig_normal_force(path.name, clamp, np.gradient(displacement, time), pulls, quiet)
         notes.append(
             f'normal force ({clamp}): {normal[0]:.0f} N to the positive, {normal[1]:.0f} N to the negative '
@@ -82,16 +86,28 @@ def is_damper(path: Path) -> bool:
     return re.match(rb'\s*\{\s*"data"\s*:\s*\[\s*\[', head) is not None
 
 
-def _rig_table(path: Path) -> Table:
-    table = read_json(path)
-    width, known = len(table.header), (*_RIG_HEADER, *_RIG_PULLS)
-    if width < len(known):
+def _rig_table(path: Path) -> Measured:
+    try:
+        data = np.array(json.loads(path.read_text(encoding='utf-8'))['data'], float)
+    except (ValueError, KeyError, TypeError) as error:
         raise IdentificationError(
-            f'{path.name} holds data of shape ({len(table.rows)}, {width}); at least 50 rows of {len(known)} '
-            f'numbers are needed: {", ".join(known)}'
+            f'{path.name} is no table ({error!r}); expected is {{"data": [[number, ...], ...]}}'
+        ) from None
+    known = (*_RIG_HEADER, *_RIG_PULLS)
+    if data.ndim != 2 or data.shape[1] < len(known):
+        raise IdentificationError(
+            f'{path.name} holds data of shape {data.shape}; at least 50 rows of {len(known)} numbers are '
+            f'needed: {", ".join(known)}'
         )
-    between = table.header[len(_RIG_HEADER) : -len(_RIG_PULLS)]
-    return replace(table, header=(*_RIG_HEADER, *between, *_RIG_PULLS))
+    between = map(str, range(len(_RIG_HEADER), data.shape[1] - len(_RIG_PULLS)))
+    columns = [
+        MeasuredColumn(*name_and_unit(header)[:1], header, name_and_unit(header)[1], number, values=values)
+        for number, (header, values) in enumerate(
+            zip((*_RIG_HEADER, *between, *_RIG_PULLS), data.T, strict=True)
+        )
+    ]
+    provenance = Provenance(str(path), '', path.stat().st_size, 'JSON', 'json')
+    return Measured({column.name: column for column in columns}, provenance)
 
 
 def _rig_normal_force(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.identification.friction.channels import Said
+from engine_mount.identification.friction.channels import friction_mapping
 from engine_mount.identification.friction.ladder import Rung
 from engine_mount.identification.friction.looks.cases import Case, explained
 from engine_mount.identification.friction.looks.first_look import FirstLook
@@ -17,6 +17,7 @@ from engine_mount.identification.friction.steps.coefficient_fit import Coefficie
 from engine_mount.identification.friction.steps.ramp_hold import RampHoldFit
 from engine_mount.identification.friction.steps.sawtooth import StrokeLine
 from engine_mount.identification.friction.steps.validation import ModelValidation
+from engine_mount.signals.mapping import Mapping
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 
@@ -34,7 +35,7 @@ class IdentifyOrder:
     step: str = 'auto'
     clamp: str = 'sliding'
     zero: str = ''
-    said: Said = field(default_factory=Said)
+    mapping: Mapping = field(default_factory=friction_mapping)
     seed: int = 0
     contact: FrictionContact = field(default_factory=FrictionContact)
     """Taken by step 2 where no ramp and hold tells it."""

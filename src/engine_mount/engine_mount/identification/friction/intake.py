@@ -40,7 +40,7 @@ def taken(
     """Return the recordings with their kinds; hash, first look, cases and notes go into `found`."""
     result = []
     for path in paths:
-        recording = read_recording(path, order.said, order.clamp)
+        recording = read_recording(path, order.mapping, order.clamp)
         kind = recognised(recording)
         if order.step in (RAMP, SAWTOOTH) and part == 'train':
             _check_kind(recording.name, kind, order.step)

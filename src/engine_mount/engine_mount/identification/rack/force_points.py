@@ -1,6 +1,6 @@
 """Force of the actuator over gap and current, from files of every format and MCAP, for its calibration."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,9 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.identification.rack.columns import (
-    CURRENT,
-    FORCE,
-    GAP,
     RackRecordingError,
     check_alive,
     read_columns,
@@ -24,7 +21,7 @@ from engine_mount.identification.rack.given import (
     topic_in,
 )
 from engine_mount.recordings.place import open_run
-from engine_mount.signals.units.mapping import ColumnChoice
+from engine_mount.signals.mapping import Mapping
 from mount_ros.topics import COIL_RIPPLE
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +38,7 @@ class ForcePoints:
     force: FloatArray
 
 
-def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given: GivenValues) -> ForcePoints:
+def read_force(files: Sequence[Path], mapping: Mapping, given: GivenValues) -> ForcePoints:
     """Return the points of all files, each with a gap by column, by option or by its name.
 
     Raises `RackRecordingError` and the readers' errors.
@@ -50,13 +47,12 @@ def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given:
     for file in checked_files(files):
         if is_table(file):
             known = given.gap.get(file)
-            columns = read_columns(
-                file, (*([] if known is not None else [GAP]), CURRENT, FORCE), (), chosen, given.stated
-            )
+            needed = ('current', 'force') if known is not None else ('gap', 'current', 'force')
+            columns = read_columns(file, mapping, needed)
             current, force = columns['current'], columns['force']
             gap = columns['gap'] if known is None else np.full(current.shape, known)
         else:
-            gap, current, force = _force_from_bag(file, chosen, given)
+            gap, current, force = _force_from_bag(file, mapping, given)
         if force.size < FEWEST:
             raise RackRecordingError(
                 f'{file} holds {force.size} points, at least {FEWEST} are needed; measure more currents'
@@ -68,12 +64,13 @@ def read_force(files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given:
 
 
 def _force_from_bag(
-    file: Path, chosen: Mapping[str, ColumnChoice], given: GivenValues
+    file: Path, mapping: Mapping, given: GivenValues
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return up to `_BINS` points of a recorded ramp: means over small steps of the current."""
     recording = open_run(file)
     ripple = topic_in(recording, COIL_RIPPLE.name)
-    topic, colon, signal = chosen.get('force', ColumnChoice(FORCE_SIGNAL)).column.partition(':')
+    chosen = mapping.columns.get('force')
+    topic, colon, signal = (chosen.column if chosen else FORCE_SIGNAL).partition(':')
     if not colon:
         raise RackRecordingError(
             f'--column force={topic}: of an MCAP recording write TOPIC:FIELD, as {FORCE_SIGNAL}'

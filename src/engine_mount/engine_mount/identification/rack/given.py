@@ -2,15 +2,14 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from engine_mount.identification.rack.columns import RackRecordingError
-from engine_mount.identification.rack.measured_table import in_topics
-from engine_mount.recordings.place import open_run, recording_hash
+from engine_mount.recordings.place import open_run, recording_hash, recording_place
 from engine_mount.recordings.recording import Recording
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.bag import is_recording
 from mount_ros.topics import COIL_RIPPLE
 
 FEWEST = 8  # chosen: fewer points are no measurement
@@ -20,15 +19,11 @@ _CELSIUS_IN_NAME = re.compile(r'([+-]?\d+(?:\.\d+)?)degC', re.IGNORECASE)
 
 @dataclass(frozen=True)
 class GivenValues:
-    """What the caller says of single files, by their names as given: gap (m), coil temperature (degC).
-
-    `stated` is what no file tells of itself.
-    """
+    """What the caller says of single files, by their names as given: gap (m), coil temperature (degC)."""
 
     gap: Mapping[Path, float]
     celsius: Mapping[Path, float]
     celsius_of_others: float | None = None
-    stated: Stated = field(default_factory=Stated)
 
 
 def described(files: Sequence[Path]) -> list[dict[str, str]]:
@@ -53,7 +48,7 @@ def checked_files(files: Sequence[Path]) -> Sequence[Path]:
 
 def is_table(file: Path) -> bool:
     """Return whether a file holds columns: no recording of this project, whose topics tell what is what."""
-    return not in_topics(file) or COIL_RIPPLE.name not in open_run(file)
+    return not is_recording(recording_place(file)) or COIL_RIPPLE.name not in open_run(file)
 
 
 def gap_of(file: Path, given: Mapping[Path, float]) -> float:

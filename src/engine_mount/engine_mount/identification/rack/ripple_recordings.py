@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 from engine_mount.identification.actuator.points import gap_groups
 from engine_mount.identification.coil.gap_point import RippleRecording
 from engine_mount.identification.rack.columns import (
-    CURRENT,
-    CURRENT_RATE,
-    FLUX_RATE,
-    GAP,
-    INDUCTANCE,
-    TEMPERATURE,
+    RACK,
     RackRecordingError,
     check_alive,
     read_columns,
@@ -30,7 +25,7 @@ from engine_mount.identification.rack.given import (
 )
 from engine_mount.recordings.place import open_run
 from engine_mount.recordings.recording import Recording
-from engine_mount.signals.units.mapping import ColumnChoice
+from engine_mount.signals.mapping import Mapping as ColumnMapping
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
 
@@ -41,7 +36,7 @@ _LARGEST_DRIFT = 10.0  # K, chosen: 1 um or two of the gap to either side
 
 
 def read_ripple(
-    files: Sequence[Path], chosen: Mapping[str, ColumnChoice], given: GivenValues, turns_area: float
+    files: Sequence[Path], mapping: ColumnMapping, given: GivenValues, turns_area: float
 ) -> list[RippleRecording]:
     """Return one recording for each file and gap; `turns_area` (m^2) makes inductances of slopes.
 
@@ -50,7 +45,7 @@ def read_ripple(
     recordings = []
     for file in checked_files(files):
         if is_table(file):
-            recordings += _ripple_from_table(file, chosen, given, turns_area)
+            recordings += _ripple_from_table(file, mapping, given, turns_area)
         else:
             recordings.append(_ripple_from_bag(file, given, turns_area))
     for recording in recordings:
@@ -65,10 +60,9 @@ def read_ripple(
 
 
 def _ripple_from_table(
-    file: Path, chosen: Mapping[str, ColumnChoice], given: GivenValues, turns_area: float
+    file: Path, mapping: ColumnMapping, given: GivenValues, turns_area: float
 ) -> list[RippleRecording]:
-    optional = (INDUCTANCE, CURRENT_RATE, FLUX_RATE, GAP, TEMPERATURE)
-    columns = read_columns(file, (CURRENT,), optional, chosen, given.stated)
+    columns = read_columns(file, mapping, ('current',), set(RACK) - {'current', 'force'})
     current = columns['current']
     if current.size < FEWEST:
         raise RackRecordingError(

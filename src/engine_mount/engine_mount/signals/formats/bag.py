@@ -1,18 +1,17 @@
 """MCAP files and rosbag2 folders: every number of every topic as `/topic.field`."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.recording import ReadingError, open_recording
+from engine_mount.recordings.recording import ReadingError, Recording, open_recording
 from engine_mount.recordings.series import Series, SeriesError
-from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.formats.content import Content, Leaf, Stated
+from engine_mount.signals.formats.measured import FloatArray, TimeBase
+from engine_mount.signals.signal import SECOND, SignalError
 
-_SECOND = 1_000_000_000  # ns
-_STAMP = 'header.stamp.'
 UNITS = {
     'sensor_msgs/msg/Imu': {'linear_acceleration.': 'm/s^2', 'angular_velocity.': 'rad/s'},
     'geometry_msgs/msg/AccelStamped': {'accel.linear.': 'm/s^2', 'accel.angular.': 'rad/s^2'},
@@ -27,58 +26,66 @@ UNITS = {
 """Units by beginnings of paths, as the definitions of common_interfaces (Jazzy) and REP 103 say."""
 
 
-class Bag:
-    """A recording of ROS 2, whole or in part; raises `SignalError`."""
+def is_recording(path: Path) -> bool:
+    """Return whether `path` is a bag: its folder, or one of its files, compressed or not."""
+    names = [file.name for file in path.iterdir()] if path.is_dir() else [path.name]
+    return any(kind in Path(name).suffixes for name in names for kind in ('.mcap', '.db3'))
 
-    def __init__(self, path: Path, stated: Stated):
-        self.format, self.reader = 'rosbag2', 'engine_mount.recordings'
-        self._path = path
-        try:
-            self._recording = open_recording(path)
-            self._places = list(self._found())
-        except ReadingError as error:
-            raise SignalError(str(error)) from None
-        self.notes: list[str] = self._recording.warnings
-        if not self._places:
-            raise SignalError(
-                f'{path} holds no message with numbers; its topics: {", ".join(self._recording) or "none"}'
-            )
-        self.headings: Sequence[Heading] = unique([
-            Heading(f'{topic}.{field}', field, unit, 0, timed=True) for topic, field, unit in self._places
-        ])  # fmt: skip
 
-    def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
-        """Return the chosen fields at the stamps of their messages, else at the times of arrival."""
+def open_bag(path: Path, stated: Stated) -> Content:
+    """Return the fields of a recording of ROS 2, whole or in part; raises `SignalError`."""
+    values: dict[tuple[str, str], FloatArray] = {}
+    clocks: dict[str, TimeBase] = {}
+    try:
+        recording = open_recording(path)
+        fields = list(_fields(recording))
+    except ReadingError as error:
+        raise SignalError(str(error)) from None
+
+    def prepare(numbers: Sequence[int]) -> None:
         wanted: dict[str, list[str]] = {}
-        for heading in chosen:
-            topic, field, _ = self._places[heading.number]
+        for number in numbers:
+            topic, field, _ = fields[number]
             wanted.setdefault(topic, []).append(field)
         try:
-            self._recording.load_columns(wanted)
-            times = {topic: _time(self._recording[topic]) for topic in wanted}
-            found = []
-            for heading in chosen:
-                topic, field, _ = self._places[heading.number]
-                values = np.asarray(self._recording[topic][field], np.float64)
-                found.append(heading.measured(values, times[topic]))
+            recording.load_columns(wanted)
+            for topic, names in wanted.items():
+                clocks[topic] = _clock(recording[topic])
+                values.update(
+                    {(topic, name): np.asarray(recording[topic][name], np.float64) for name in names}
+                )
         except (ReadingError, SeriesError) as error:
             raise SignalError(str(error)) from None
-        return found
 
-    def _found(self) -> Iterator[tuple[str, str, str]]:
-        """Yield topic, field and unit of all numbers, by the first message of each topic."""
-        for topic in self._recording:
-            try:
-                series = next(self._recording.parts([topic], 1), None)
-                names = () if series is None else series.names
-            except SeriesError:
-                continue
-            for field in names:
-                if series is not None and not field.startswith(_STAMP):
-                    yield topic, field, series.unit(field) or _unit(series.type, field)
+    leaves = [
+        Leaf(
+            f'{topic}.{field}', partial(values.__getitem__, (topic, field)), unit, field,
+            clock=partial(clocks.__getitem__, topic),
+        )
+        for topic, field, unit in fields
+    ]  # fmt: skip
+    notes = recording.warnings
+    if not fields:
+        notes = [*notes, f'its topics: {", ".join(recording) or "none"}']
+    return Content(path, 'rosbag2', 'engine_mount.recordings', leaves, notes, prepare)
 
 
-def _time(series: Series) -> TimeBase:
+def _fields(recording: Recording) -> Iterator[tuple[str, str, str]]:
+    """Yield topic, field and unit of all numbers, by the first message of each topic."""
+    for topic in recording:
+        try:
+            series = next(recording.parts([topic], 1), None)
+            names = () if series is None else series.names
+        except SeriesError:
+            continue
+        for field in names:
+            if series is not None and not field.startswith('header.stamp.'):
+                units = UNITS.get(series.type, {}).items()
+                known = next((unit for start, unit in units if field.startswith(start)), '')
+                yield topic, field, series.unit(field) or known
+
+
+def _clock(series: Series) -> TimeBase:
     try:
         stamps, told = series.stamps, 'header stamps'
     except SeriesError:
@@ -86,9 +93,4 @@ def _time(series: Series) -> TimeBase:
     if not np.any(stamps > 0):
         stamps, told = series.receive_times, 'times of arrival (the messages carry none of their own)'
     begin = int(stamps[0]) if stamps.size else 0
-    return TimeBase((stamps - begin) / _SECOND, begin, told)
-
-
-def _unit(kind: str, field: str) -> str:
-    units = UNITS.get(kind, {})
-    return next((unit for start, unit in units.items() if field.startswith(start)), '')
+    return TimeBase((stamps - begin) / SECOND, begin, told)

@@ -1,11 +1,19 @@
-"""What every reader of a format offers: headings first, then the values of chosen columns."""
+"""What the opener of a format returns: columns with their headings, read when they are chosen."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
-from engine_mount.signals.formats.measured import Heading, MeasuredColumn
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.signals.formats.measured import FloatArray, Heading, MeasuredColumn, TimeBase, unique
+from engine_mount.signals.signal import SECOND, SignalError
+
+_LONGEST = 200  # letters of a library's own words, chosen
 
 
 @dataclass(frozen=True)
@@ -23,14 +31,114 @@ class Stated:
     dbc: Path | None = None
 
 
-class Content(Protocol):
-    """An opened file. `notes` are sentences on what was found, and grow while columns are read."""
+@dataclass(frozen=True, eq=False)
+class Leaf:
+    """A column before it is read.
 
+    `read` returns its samples (n,) as the file holds them, dates as datetime64; None for a column without
+    numbers, which is counted and left out. `clock` returns its times, the same object for columns that were
+    sampled together.
+    """
+
+    name: str
+    read: Callable[[], NDArray[Any]] | None
+    unit: str = ''
+    header: str = ''
+    date: bool = False
+    clock: Callable[[], TimeBase] | None = None
+
+
+@dataclass(eq=False)
+class Content:
+    """An opened file. `notes` are sentences on what was found, and grow while columns are read.
+
+    `prepare` takes the numbers of the chosen columns before these are read one by one.
+    """
+
+    path: Path
     format: str
     reader: str
-    headings: Sequence[Heading]
-    notes: list[str]
+    leaves: Sequence[Leaf]
+    notes: list[str] = field(default_factory=list)
+    prepare: Callable[[Sequence[int]], None] = lambda numbers: None
+
+    @cached_property
+    def headings(self) -> tuple[Heading, ...]:
+        """The columns of numbers; raises `SignalError` where there are none."""
+        there = unique([
+            Heading(
+                leaf.name, leaf.header or leaf.name, 's' if leaf.date else leaf.unit, 0,
+                timed=leaf.clock is not None, date=leaf.date,
+            )
+            for leaf in self.leaves
+        ])  # fmt: skip
+        found = tuple(one for one in there if self.leaves[one.number].read is not None)
+        lost = [one.header for one in there if one not in found]
+        if lost:
+            self.notes.append(f'{", ".join(lost)}: no numbers, left out')
+        if not found:
+            why = ''.join(f'; {note}' for note in dict.fromkeys(self.notes))
+            raise SignalError(f'{self.path} holds no columns of numbers; needed are samples over time{why}')
+        return found
 
     def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
         """Return the chosen columns in this order; raises `SignalError`."""
-        ...
+        with readable(self.path, self.format):
+            self.prepare([heading.number for heading in chosen])
+            return [self._column(heading, self.leaves[heading.number]) for heading in chosen]
+
+    def _column(self, heading: Heading, leaf: Leaf) -> MeasuredColumn:
+        assert leaf.read is not None
+        return heading.measured(_as_numbers(leaf.read()), leaf.clock() if leaf.clock else None)
+
+
+def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
+    """Return the leaves of one table on the times of their first column of dates, where there is one."""
+    read, header = next(((one.read, one.header or one.name) for one in leaves if one.date), (None, ''))
+    if read is None:
+        return list(leaves)
+
+    @cache
+    def clock() -> TimeBase:
+        stamps = read().astype('datetime64[ns]')
+        missing = np.flatnonzero(np.isnat(stamps))
+        if missing.size or not stamps.size:
+            what = f'date number {missing[0]} is missing' if missing.size else 'there is no date'
+            raise SignalError(f'{path}, column {header!r}: {what}; fill it in or remove the row')
+        numbers = stamps.astype(np.int64)
+        begin = int(numbers[0])
+        told = f'dates in column {header!r}, taken as UTC where they name no zone'
+        return TimeBase((numbers - begin) / SECOND, begin, told)
+
+    return [replace(leaf, clock=clock) for leaf in leaves]
+
+
+@contextmanager
+def readable(
+    path: Path, kind: str, remedy: str = 'is it cut off, or another format? Export it again'
+) -> Iterator[None]:
+    """Turn every error of a library that reads `path` as a `kind` of file into a `SignalError`.
+
+    Libraries raise whatever a damaged file makes of their own assumptions (KeyError, struct.error,
+    MemoryError, ...), so that no list of classes would be complete. Our own refusals pass as they are.
+    """
+    try:
+        yield
+    except (SignalError, ImportError):
+        raise
+    except FileNotFoundError:
+        raise SignalError(f'{path} does not exist; give an existing file') from None
+    except PermissionError:
+        raise SignalError(f'{path} may not be read by you; change its permissions') from None
+    except Exception as error:
+        words = ' '.join(f'{type(error).__name__}: {error}'.split())[:_LONGEST]
+        raise SignalError(f'{path} is no readable {kind} ({words}); {remedy}') from error
+
+
+def _as_numbers(raw: NDArray[Any]) -> FloatArray:
+    """Return samples as numbers, dates in s since 1970 and spans in s, NaN where there is none."""
+    second = np.timedelta64(1, 's')
+    if raw.dtype.kind == 'M':
+        whole = raw.astype('datetime64[s]')
+        return (whole - np.datetime64(0, 's')) / second + (raw - whole) / second
+    return np.ascontiguousarray(raw / second if raw.dtype.kind == 'm' else raw, np.float64)

@@ -1,37 +1,28 @@
 """Names and units out of titles of columns: `Weg [mm]`, `Weg (mm)`, `accel_z/g`, `disp_mm`, `Kraft in N`."""
 
 import re
+from collections.abc import Sequence
 
-_SYMBOLS = {
-    's', 'ms', 'us', 'µs', 'μs', 'ns', 'min', 'h',
-    'm', 'mm', 'um', 'µm', 'μm', 'nm', 'cm', 'km', 'in', 'inch', 'ft', 'mil',
-    'N', 'kN', 'mN', 'MN', 'lb', 'lbf', 'kip', 'kips', 'kgf', 'Nm',
-    'g', 'mg', 'G', 'kg', 't',
-    'A', 'mA', 'V', 'mV', 'kV', 'T', 'mT', 'Wb', 'H', 'mH', 'uH', 'µH', 'Ohm', 'ohm', 'Ω', 'W', 'kW', 'J',
-    'Hz', 'kHz', 'MHz', 'rpm', 'U', 'deg', 'degree', 'degrees', '°', 'rad', 'mrad',
-    'K', 'degC', '°C', 'C', '°F', 'degF', '%', '-',
-    'Pa', 'kPa', 'MPa', 'GPa', 'hPa', 'bar', 'mbar', 'psi',
-    'kmh', 'kph', 'mph', 'mps', 'knots',
-}  # fmt: skip
-"""What counts as a unit where a title does not bracket it: SI with its prefixes, and those of rigs."""
-_SUFFIXES = {
-    's', 'ms', 'us', 'ns', 'm', 'mm', 'um', 'cm', 'km', 'in', 'inch', 'ft', 'N', 'kn', 'kN',
-    'lb', 'lbf', 'kip', 'g', 'mg', 'kg', 'A', 'ma', 'mA', 'V', 'mv', 'mV', 'T', 'mt', 'mT', 'H', 'mh', 'mH',
-    'hz', 'Hz', 'khz', 'kHz', 'deg', 'rad', 'K', 'C', 'degc', 'degC', 'pa', 'Pa', 'kpa', 'kPa', 'mpa', 'MPa',
-    'bar', 'psi', 'kmh', 'kph', 'mph', 'rpm', 'nm', 'Nm',
-}  # fmt: skip
-"""What counts as a unit behind an underscore; of single small letters those that name no axis or phase."""
-_WRITTEN = {'m_s2': 'm/s2', 'mps2': 'm/s2', 'ms2': 'm/s2', 'm_s': 'm/s', 'mps': 'm/s', 'km_h': 'km/h'}
-"""Suffixes that leave out the stroke of a fraction."""
+from engine_mount.signals.units import is_unit as is_convertible
+
+_OTHERS = (
+    'kg', 't', 'Nm', 'kNm', 'W', 'kW', 'J', 'Wb', 'kV', 'MHz', 'GPa', 'mrad', 'G', 'knots',
+)  # fmt: skip
+"""Units of columns that are never converted, so that a row of units is known as one."""
+_NO_SUFFIXES = ('min', 'h', 'F', 'c', 'mil', 'gal')
+"""What behind an underscore is rather a minimum, an axis or a name."""
 _POWER = r'(?:\^?-?\d|\*\*-?\d|[²³])?'
 _TERM = rf'\(?(?:1|[^\W\d_²³]+|°[CF]?|%|-){_POWER}\)?'
 _UNIT = re.compile(rf'\(?{_TERM}(?:\s*[/*·. ]\s*{_TERM})*\)?')
 _WORD = re.compile(r'°[CF]?|[^\W\d_²³]+|%|-')
 _SQUARE = re.compile(r'(.*?)\s*\[\s*([^\[\]]*?)\s*\]\s*')
-_ROUND = re.compile(r'(.*?)\s*[({]\s*(.*?)\s*[)}]\s*')
-_STROKE = re.compile(r'([^/]+?)\s*/\s*(.+?)\s*')
-_WORDS = re.compile(r'(.+?)(?:\s+in\s+|\s*,\s+)(\S+)\s*')
-_SUFFIX = re.compile(r'(.+?)_((?:m_s2|m_s|km_h|mps2|mps|ms2)|[A-Za-z]+(?:_per_[A-Za-z]+[23]?)?)')
+_PATTERNS = tuple(
+    map(
+        re.compile,
+        (r'(.*?)\s*[({]\s*(.*?)\s*[)}]\s*', r'([^/]+?)\s*/\s*(.+?)\s*', r'(.+?)(?:\s+in\s+|\s*,\s+)(\S+)\s*'),
+    )
+)
+"""`Weg (mm)`, `accel_z/g`, `Kraft in N` or `Time, s`."""
 
 
 def name_and_unit(title: str) -> tuple[str, str]:
@@ -42,27 +33,39 @@ def name_and_unit(title: str) -> tuple[str, str]:
         return square[1], square[2]
     if is_unit(title):
         return title, ''
-    for pattern in (_ROUND, _STROKE, _WORDS):
+    for pattern in _PATTERNS:
         match = pattern.fullmatch(title)
         if match and match[1] and is_unit(match[2]):
-            return match[1].rstrip(' /'), match[2].strip('()') if pattern is _STROKE else match[2]
-    match = _SUFFIX.fullmatch(title)
-    if match and match[2] in _WRITTEN:
-        return match[1], _WRITTEN[match[2]]
-    if match and all(part.rstrip('23') in _SUFFIXES for part in match[2].split('_per_')):
-        return match[1], match[2].replace('_per_', '/')
+            return match[1].rstrip(' /'), match[2].strip('()')
+    parts = title.split('_')
+    for count in (3, 2, 1):  # v_in_per_s, acc_m_s2, disp_mm
+        unit = '/'.join(part for part in parts[-count:] if part != 'per')
+        if len(parts) > count and unit not in _NO_SUFFIXES and is_convertible(unit) and not unit.isdecimal():
+            return '_'.join(parts[:-count]), unit
     return title, ''
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text can be nothing but a unit, such as `m/s^2`, `mm` or `1/min`."""
+    """Return whether a text can be nothing but a unit, such as `m/s^2`, `mm`, `N/mm` or `1/min`."""
     text = text.strip()
-    if not text or text == '1' or text.count('(') != text.count(')') or not _UNIT.fullmatch(text):
+    if text in ('', '1') or text.count('(') != text.count(')') or not _UNIT.fullmatch(text):
         return False
-    return all(word in _SYMBOLS for word in _WORD.findall(text))
+    return all(word in _OTHERS or is_convertible(word) for word in _WORD.findall(text))
 
 
-def in_unit_row(text: str) -> bool:
-    """Return whether a cell may stand in a row of units: a unit, one in brackets, or nothing."""
-    text = text.strip()
-    return not text or is_unit(text) or (text[0] + text[-1]) in ('[]', '()')
+def is_unit_row(cells: Sequence[str]) -> bool:
+    """Return whether a row below titles tells units: each cell a unit, one in brackets, or nothing."""
+    return all(
+        not cell or is_unit(cell) or cell[0] + cell[-1] in ('[]', '()') for cell in map(str.strip, cells)
+    ) and any(is_unit(cell.strip(' []()')) for cell in cells)
+
+
+def titles_and_units(titles: Sequence[str], units: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Return name, header and unit of each title; `units` is the row of units below, or empty."""
+    found = []
+    for place, title in enumerate(titles):
+        name, unit = name_and_unit(title)
+        below = units[place].strip(' []') if place < len(units) else ''
+        below = below[1:-1] if below[:1] + below[-1:] == '()' else below
+        found.append((name, title, below or unit))
+    return found

@@ -1,127 +1,120 @@
 """MDF files of measurement systems (versions 3 and 4): each channel on the time base of its own group."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from engine_mount.signals.extras import required
-from engine_mount.signals.formats.broken import reading
-from engine_mount.signals.formats.can.frames import DecodedFrames
-from engine_mount.signals.formats.can.in_mdf import FRAME, OTHER_FRAMES, frames_in_mdf
-from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase, unique
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.formats.can_frames import FRAME, frames_in_mdf
+from engine_mount.signals.formats.content import Content, Leaf, Stated, readable
+from engine_mount.signals.formats.measured import FloatArray, TimeBase
+from engine_mount.signals.signal import SECOND, SignalError
 
-_SECOND = 1_000_000_000  # ns
 _FRAGMENT = 1 << 22  # B read at once, chosen: an hour at 1 kHz is read within 0.3 GB, and not slower
 _DATED = 100_000_000  # s since 1970, chosen: an earlier start is a clock that was not set
+_FRAMES = (FRAME, 'CAN_ErrorFrame', 'CAN_RemoteFrame', 'CAN_OverloadFrame')
 
 
-class Mdf:
-    """A recording of a measurement system; a name that several groups have is `group/name`."""
+def open_mdf(path: Path, stated: Stated) -> Content:
+    """Return the channels of a recording of a measurement system; one in several groups is `group/name`."""
+    asammdf = required('asammdf', 'reading MDF files')
+    _check_head(path)
+    notes: list[str] = []
+    with readable(path, 'MDF file'):
+        # by a stream: a path would be mapped whole into memory
+        # frames are decoded by the user's database, by one within the file only where there is none
+        file = asammdf.MDF(
+            path.open('rb'), raise_on_multiple_occurrences=False, process_bus_logging=stated.dbc is None
+        )
+        file.configure(read_fragment_size=_FRAGMENT)
+        leaves = _leaves(file, path, notes)
+        raw = any(channel.name == FRAME for group in file.groups for channel in group.channels)
+        frames = frames_in_mdf(file, path, stated.dbc, notes) if raw and stated.dbc is not None else None
+    content = Content(path, f'MDF {file.version}', 'asammdf', leaves, notes)
+    if frames is not None:
+        _add_frames(content, *frames.leaves(_begin(file)))
+    elif raw and not leaves:
+        raise SignalError(
+            f'{path} holds raw CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
+        )
+    elif raw:
+        notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
+    return content
 
-    def __init__(self, path: Path, stated: Stated):
-        asammdf = required('asammdf', 'reading MDF files')
-        self.format, self.reader = 'MDF', 'asammdf'
-        self.notes: list[str] = []
-        self._path = path
-        _check_head(path)
-        with reading(path, 'MDF file'):
-            # by a stream: a path would be mapped whole into memory
-            # frames are decoded by the user's database, by one within the file only where there is none
-            self._file = asammdf.MDF(
-                path.open('rb'),
-                raise_on_multiple_occurrences=False,
-                process_bus_logging=stated.dbc is None,
-            )
-            self._file.configure(read_fragment_size=_FRAGMENT)
-            self.format = f'MDF {self._file.version}'
-            places = list(_places(self._file))
-            self._begin = _begin(self._file)
-        raw = any(channel.name == FRAME for _, _, channel in places)
-        places = [one for one in places if not one[2].name.startswith((FRAME, *OTHER_FRAMES))]
-        if not places and not (raw and stated.dbc):
-            frames = 'raw CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
+
+def _add_frames(content: Content, leaves: list[Leaf], prepare: Callable[[Sequence[int]], None]) -> None:
+    first = len(content.leaves)
+    content.leaves = [*content.leaves, *leaves]
+    content.prepare = lambda numbers: prepare([number - first for number in numbers if number >= first])
+    content.reader = 'asammdf, cantools'
+
+
+def _leaves(file: Any, path: Path, notes: list[str]) -> list[Leaf]:
+    """Return all channels but those of times, of frames, and parts of structures."""
+    places = [
+        (number, index, channel)
+        for number, group in enumerate(file.groups)
+        for index, channel in enumerate(group.channels)
+        if index != file.masters_db.get(number) and channel.name and not channel.name.startswith(_FRAMES)
+    ]
+    counts = Counter(channel.name for _, _, channel in places)
+    groups = {number: _group_name(file, number) for number, _, _ in places}
+    clocks = {
+        number: cache(partial(_clock, file, number, f'times of group {name}'))
+        for number, name in groups.items()
+    }
+    return [
+        Leaf(
+            channel.name if counts[channel.name] == 1 else f'{groups[number]}/{channel.name}',
+            partial(_samples, file, path, number, index, notes),
+            channel.unit or _unit_of_conversion(channel),
+            channel.name,
+            clock=clocks[number],
+        )
+        for number, index, channel in places
+    ]
+
+
+def _clock(file: Any, number: int, told: str) -> TimeBase:
+    return TimeBase(np.asarray(file.get_master(number), np.float64), _begin(file), told)
+
+
+def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -> FloatArray:
+    """Return the samples of a channel with its conversion; invalid ones are NaN."""
+    _check_places(file, path, number, index)
+    name = file.groups[number].channels[index].name
+    signal = file.get(group=number, index=index, ignore_invalidation_bits=False)
+    if signal.samples.dtype.kind in 'SUO':
+        signal = file.get(group=number, index=index, raw=True, ignore_invalidation_bits=False)
+        notes.append(f'{name}: its conversion gives text, so its raw numbers are taken')
+    samples = signal.samples
+    if samples.dtype.kind not in 'fiub' or samples.ndim != 1:
+        raise SignalError(
+            f'{path}, channel {name!r}: {samples.dtype} of shape {samples.shape} is no number for each '
+            'sample; choose another channel'
+        )
+    values = np.array(np.ma.filled(np.ma.asarray(samples, np.float64), np.nan))
+    if signal.invalidation_bits is not None:
+        values[np.asarray(signal.invalidation_bits, bool)] = np.nan
+    return values
+
+
+def _check_places(file: Any, path: Path, number: int, index: int) -> None:
+    """Raise `SignalError` for a channel, or its times, beyond the record, where asammdf reads on."""
+    group = file.groups[number]
+    master = file.masters_db.get(number)
+    size = int(group.channel_group.samples_byte_nr)
+    for place in (index, *([] if master is None else [master])):
+        channel = group.channels[place]
+        if size <= 0 or _end_of(channel) > 8 * size:
             raise SignalError(
-                f'{path} holds {frames if raw else "no channels; needed are signals over time"}'
+                f'{path}, channel {channel.name!r}: ends at bit {_end_of(channel)} of a record of {size} '
+                'bytes; the file is damaged, export it again'
             )
-        counts = Counter(channel.name for _, _, channel in places)
-        full = {
-            (group, index): channel.name
-            if counts[channel.name] == 1
-            else f'{_group_name(self._file, group)}/{channel.name}'
-            for group, index, channel in places
-        }
-        self._places = [(group, index) for group, index, _ in places]
-        own = [
-            Heading(
-                full[group, index], channel.name, channel.unit or _unit_of_conversion(channel), 0, timed=True,
-            )
-            for group, index, channel in places
-        ]  # fmt: skip
-        self._frames = self._decoded(stated.dbc) if raw and stated.dbc is not None else None
-        self._decoded_headings = [] if self._frames is None else self._frames.settle()
-        if raw and self._frames is None:
-            self.notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
-        self.headings: Sequence[Heading] = unique([*own, *self._decoded_headings])
-
-    def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
-        """Return the chosen channels with their conversions; invalid samples are NaN."""
-        times: dict[int, TimeBase] = {}
-        own = [heading for heading in chosen if heading.number < len(self._places)]
-        with reading(self._path, 'MDF file'):
-            found = {heading.number: self._column(heading, times) for heading in own}
-        if self._frames is not None:
-            decoded = [heading for heading in chosen if heading not in own]
-            places = [self._decoded_headings[heading.number - len(self._places)] for heading in decoded]
-            for heading, column in zip(decoded, self._frames.load(places), strict=True):
-                found[heading.number] = heading.measured(column.values, column.time)
-            self.notes += self._frames.notes
-        return [found[heading.number] for heading in chosen]
-
-    def _decoded(self, dbc: Path) -> DecodedFrames:
-        self.reader = 'asammdf, cantools'
-        return frames_in_mdf(self._file, self._path, dbc, self._begin)
-
-    def _column(self, heading: Heading, times: dict[int, TimeBase]) -> MeasuredColumn:
-        group, index = self._places[heading.number]
-        self._check_places(group, index)
-        signal = self._file.get(group=group, index=index, ignore_invalidation_bits=False)
-        if signal.samples.dtype.kind in 'SUO':
-            signal = self._file.get(group=group, index=index, raw=True, ignore_invalidation_bits=False)
-            self.notes.append(f'{heading.name}: its conversion gives text, so its raw numbers are taken')
-        samples = signal.samples
-        if samples.dtype.kind not in 'fiub' or samples.ndim != 1:
-            raise SignalError(
-                f'{self._path}, channel {heading.name!r}: {samples.dtype} of shape {samples.shape} is no '
-                'number for each sample; choose another channel'
-            )
-        values = np.ma.filled(np.ma.asarray(samples, np.float64), np.nan)
-        values = np.ascontiguousarray(values)  # a view would hold the records that it is of
-        invalid = getattr(signal, 'invalidation_bits', None)
-        if invalid is not None:
-            bits = np.asarray(invalid, bool)
-            values = np.where(bits, np.nan, values)
-        if group not in times:
-            told = f'times of group {_group_name(self._file, group)}'
-            times[group] = TimeBase(np.asarray(signal.timestamps, np.float64), self._begin, told)
-        return heading.measured(values, times[group])
-
-    def _check_places(self, number: int, index: int) -> None:
-        """Raise `SignalError` for a channel, or its times, beyond the record, where asammdf reads on."""
-        group = self._file.groups[number]
-        master = self._file.masters_db.get(number)
-        size = int(group.channel_group.samples_byte_nr)
-        for place in (index, *([] if master is None else [master])):
-            channel = group.channels[place]
-            if size <= 0 or _end_of(channel) > 8 * size:
-                raise SignalError(
-                    f'{self._path}, channel {channel.name!r}: ends at bit {_end_of(channel)} of a record of '
-                    f'{size} bytes; the file is damaged, export it again'
-                )
 
 
 def _check_head(path: Path) -> None:
@@ -142,15 +135,6 @@ def _end_of(channel: Any) -> int:
     return int(8 * channel.byte_offset + channel.bit_offset + channel.bit_count)
 
 
-def _places(file: Any) -> Any:
-    """Yield group, index and channel of all channels but those of times and parts of structures."""
-    for number, group in enumerate(file.groups):
-        master = file.masters_db.get(number)
-        for index, channel in enumerate(group.channels):
-            if index != master and channel.name:
-                yield number, index, channel
-
-
 def _group_name(file: Any, number: int) -> str:
     group = getattr(file.groups[number], 'channel_group', None)
     name = getattr(group, 'acq_name', '') or getattr(group, 'comment', '')
@@ -160,12 +144,10 @@ def _group_name(file: Any, number: int) -> str:
 def _unit_of_conversion(channel: Any) -> str:
     conversion = getattr(channel, 'conversion', None)
     unit = getattr(conversion, 'unit', '') or getattr(conversion, 'unit_field', b'')
-    if isinstance(unit, bytes):
-        unit = unit.decode('latin-1').strip('\x00 ')
-    return str(unit)
+    return unit.decode('latin-1').strip('\x00 ') if isinstance(unit, bytes) else str(unit)
 
 
 def _begin(file: Any) -> int:
     """Return when the times of the file begin in ns since 1970, 0 where its clock was not set."""
     seconds = file.start_time.timestamp()
-    return round(seconds * _SECOND) if seconds > _DATED else 0
+    return round(seconds * SECOND) if seconds > _DATED else 0

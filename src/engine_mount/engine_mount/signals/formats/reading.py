@@ -1,12 +1,14 @@
 """The front door: any file of measured signals as named columns with unit, time base and provenance."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+import importlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from engine_mount.signals.formats.bag import is_recording
 from engine_mount.signals.formats.content import Content, Stated
 from engine_mount.signals.formats.measured import (
     Heading,
@@ -16,16 +18,29 @@ from engine_mount.signals.formats.measured import (
     TimeBase,
     found,
 )
-from engine_mount.signals.loading import is_recording
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.stores import local_copy
 
-Opener = Callable[[Path, Stated], Content]
-READ = (
+_READ = (
     'CSV and other text tables, JSON, NPY, NPZ, Parquet, MATLAB, HDF5, Excel (.xlsx), MDF, CAN logs '
     '(BLF, ASC, TRC, candump), MCAP and rosbag2'
 )
-"""What is read, for sentences."""
+_MARKS = {
+    b'\x93NUMPY': 'npy', b'PAR1': 'parquet', b'\x89HDF': 'hdf5', b'MATLAB 7.3': 'hdf5', b'MATLAB 5': 'matlab',
+    b'MDF ': 'mdf', b'UnFinMF ': 'mdf', b'\x89MCAP': 'bag', b'SQLite format 3': 'bag',
+    b'\xd0\xcf\x11\xe0': 'xls',
+}  # fmt: skip
+"""Formats by the first bytes of their files."""
+_SUFFIXES = {
+    '.json': 'json', '.jsonl': 'json', '.ndjson': 'json', '.npy': 'npy', '.npz': 'npz', '.parquet': 'parquet',
+    '.xlsx': 'excel', '.mf4': 'mdf', '.mdf': 'mdf', '.h5': 'hdf5', '.hdf5': 'hdf5', '.mat': 'matlab',
+}  # fmt: skip
+"""Formats by suffix, where the first bytes do not tell."""
+_MODULES = {
+    'npy': 'arrays', 'npz': 'arrays', 'array_folder': 'arrays', 'json': 'trees', 'matlab': 'trees',
+    'hdf5': 'trees', 'can_log': 'can_frames',
+}  # fmt: skip
+"""Where `open_FORMAT` is, if not in a module called like the format."""
 
 
 def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated | None = None) -> Measured:
@@ -34,171 +49,101 @@ def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated |
     Raises `SignalError` or `SourceError` with one sentence: file, place, value, what was expected, remedy.
     """
     stated = stated or Stated()
-    _check_stated(stated)
+    if stated.rate is not None and not (np.isfinite(stated.rate) and stated.rate > 0.0):
+        raise SignalError(f'rate ({stated.rate:g} Hz) must be above 0')
+    if stated.decimal not in ('', '.', ','):
+        raise SignalError(f'decimal sign {stated.decimal!r} must be . or ,')
     with local_copy(str(uri)) as path:
         content = _opened(path, stated)
         there = content.headings
         chosen = there if columns is None else [found(wanted, there, str(uri)) for wanted in columns]
         chosen = list(dict.fromkeys(chosen))
-        loaded = _with_rate(content.load(chosen), stated)
+        loaded = _with_rate(content.load(chosen), stated.rate)
         digest, size = _hashed(path)
-        others = tuple(heading for heading in there if heading not in chosen)
-        provenance = Provenance(str(uri), digest, size, content.format, content.reader)
-        notes = (*dict.fromkeys(content.notes), *_missing(loaded))
-        return Measured({one.name: one for one in loaded}, provenance, notes, others)
+    missing = {one.name: int(np.count_nonzero(np.isnan(one.values))) for one in loaded}
+    notes = dict.fromkeys(content.notes) | {
+        f'{one.name}: {missing[one.name]} of {one.values.size} samples hold no number': None
+        for one in loaded
+        if missing[one.name]
+    }
+    provenance = Provenance(str(uri), digest, size, content.format, content.reader)
+    others = tuple(heading for heading in there if heading not in chosen)
+    return Measured({one.name: one for one in loaded}, provenance, tuple(notes), others)
 
 
 def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ...]:
     """Return which columns the file or folder at `uri` has, without their values; raises as `read`."""
     with local_copy(str(uri)) as path:
-        return tuple(_opened(path, stated or Stated()).headings)
+        return _opened(path, stated or Stated()).headings
 
 
 def is_foreign(path: Path) -> bool:
     """Return whether `path` is a file, or a folder of NPY files, rather than a recording of ROS 2."""
-    from engine_mount.signals.formats.trees import arrays
-
     if path.is_dir():
-        return not is_recording(path) and not (path / 'recording').exists() and arrays.is_array_folder(path)
+        from engine_mount.signals.formats.arrays import is_array_folder
+
+        return not is_recording(path) and not (path / 'recording').exists() and is_array_folder(path)
     return path.is_file() and not is_recording(path)
 
 
 def _opened(path: Path, stated: Stated) -> Content:
+    """Return the opened file; a module is loaded when a file needs it."""
     try:
-        return _opener(path)(path, stated)
+        kind = _kind_of_folder(path) if path.is_dir() else _kind_of_file(path)
+        module = importlib.import_module(f'engine_mount.signals.formats.{_MODULES.get(kind, kind)}')
+        content: Content = getattr(module, f'open_{kind}')(path, stated)
+        return content
     except PermissionError:
         raise SignalError(f'{path} may not be read by you; change its permissions') from None
 
 
-def _opener(path: Path) -> Opener:
-    """Return what opens a file, by its first bytes, and by its suffix where these do not tell."""
-    from engine_mount.signals.formats.can import log
-    from engine_mount.signals.formats.text.table import TextTable
-    from engine_mount.signals.formats.trees import arrays, json_file
-
-    if path.is_dir():
-        return _opener_of_folder(path)
+def _kind_of_file(path: Path) -> str:
     with path.open('rb') as file:
         head = file.read(512)
+    suffix = path.suffix.lower()
+    kind = next((kind for mark, kind in _MARKS.items() if head.startswith(mark)), '')
     if not head:
         raise SignalError(f'{path} is empty; give a file with samples')
-    suffix = path.suffix.lower()
-    binary = _by_first_bytes(head, suffix)
-    if binary is not None:
-        return binary
+    if kind == 'xls':
+        raise SignalError(f'{path} is a workbook of Excel before 2007; save it as .xlsx')
+    if head.startswith(b'PK'):
+        return 'npz' if suffix == '.npz' else 'excel'
+    if kind:
+        return kind
     if is_recording(path):
-        return _bag
-    if log.is_can_log(path):
-        return log.CanLog
-    by_suffix: dict[str, Opener] = {
-        '.json': json_file.open_json, '.jsonl': json_file.open_json, '.ndjson': json_file.open_json,
-        '.npy': arrays.open_npy, '.npz': arrays.open_npz, '.parquet': _parquet, '.xlsx': _excel,
-        '.mf4': _mdf, '.mdf': _mdf, '.h5': _hdf5, '.hdf5': _hdf5, '.mat': _matlab,
-    }  # fmt: skip
-    if suffix in by_suffix:
-        return by_suffix[suffix]
-    if b'\0' in head and not head.startswith((b'\xff\xfe', b'\xfe\xff')) and suffix not in ('.csv', '.txt'):
-        raise SignalError(f'{path.name}: files of type {suffix or "(none)"} are not read; read are {READ}')
-    return TextTable
+        return 'bag'
+    if suffix in ('.blf', '.trc', '.asc', '.log'):
+        from engine_mount.signals.formats.can_frames import is_can_log
+
+        if is_can_log(path):
+            return 'can_log'
+    text = b'\0' not in head or head.startswith((b'\xff\xfe', b'\xfe\xff'))
+    if not text and suffix not in (*_SUFFIXES, '.csv', '.txt'):
+        raise SignalError(f'{path.name}: files of type {suffix or "(none)"} are not read; read are {_READ}')
+    return _SUFFIXES.get(suffix, 'text')
 
 
-def _by_first_bytes(head: bytes, suffix: str) -> Opener | None:
-    from engine_mount.signals.formats.trees import arrays
-
-    marks: tuple[tuple[bytes, Opener], ...] = (
-        (b'\x93NUMPY', arrays.open_npy), (b'PAR1', _parquet), (b'\x89HDF', _hdf5), (b'MATLAB 7.3', _hdf5),
-        (b'MATLAB 5', _matlab), (b'MDF ', _mdf), (b'UnFinMF ', _mdf), (b'\x89MCAP', _bag),
-        (b'SQLite format 3', _bag),
-    )  # fmt: skip
-    for mark, opener in marks:
-        if head.startswith(mark):
-            return opener
-    if head.startswith(b'PK') and suffix != '.npz':
-        return _excel
-    if head.startswith(b'\xd0\xcf\x11\xe0'):
-        return _old_excel
-    return arrays.open_npz if head.startswith(b'PK') else None
-
-
-def _opener_of_folder(path: Path) -> Opener:
-    from engine_mount.signals.formats.trees import arrays
+def _kind_of_folder(path: Path) -> str:
+    from engine_mount.signals.formats.arrays import is_array_folder
 
     if is_recording(path):
-        return _bag
-    if arrays.is_array_folder(path):
-        return arrays.open_array_folder
+        return 'bag'
+    if is_array_folder(path):
+        return 'array_folder'
     raise SignalError(
         f'{path} is a folder without a recording; give one file of it, the folder of a rosbag2 recording, or '
         'of pairs of NPY files (value and t, x_value.npy and x_t.npy)'
     )
 
 
-def _bag(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.bag import Bag
-
-    return Bag(path, stated)
-
-
-def _parquet(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.parquet import Parquet
-
-    return Parquet(path, stated)
-
-
-def _excel(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.excel import Workbook
-
-    return Workbook(path, stated)
-
-
-def _old_excel(path: Path, stated: Stated) -> Content:
-    raise SignalError(f'{path} is a workbook of Excel before 2007; save it as .xlsx')
-
-
-def _mdf(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.mdf import Mdf
-
-    return Mdf(path, stated)
-
-
-def _hdf5(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.trees.matlab import open_hdf5
-
-    return open_hdf5(path, stated)
-
-
-def _matlab(path: Path, stated: Stated) -> Content:
-    from engine_mount.signals.formats.trees.matlab import open_matlab
-
-    return open_matlab(path, stated)
-
-
-def _check_stated(stated: Stated) -> None:
-    if stated.rate is not None and not (np.isfinite(stated.rate) and stated.rate > 0.0):
-        raise SignalError(f'rate ({stated.rate:g} Hz) must be above 0')
-    if stated.decimal not in ('', '.', ','):
-        raise SignalError(f'decimal sign {stated.decimal!r} must be . or ,')
-
-
-def _with_rate(columns: list[MeasuredColumn], stated: Stated) -> list[MeasuredColumn]:
-    """Return the columns, those without times on an even grid of the stated rate."""
-    if stated.rate is None:
+def _with_rate(columns: list[MeasuredColumn], rate: float | None) -> list[MeasuredColumn]:
+    """Return the columns, those without times on an even grid of the stated rate (Hz)."""
+    if rate is None:
         return columns
-    times: dict[int, TimeBase] = {}
-    told = f'the stated rate of {stated.rate:g} Hz'
-    return [
-        one if one.time is not None else replace(one, time=times.setdefault(
-            one.values.size, TimeBase(np.arange(one.values.size) / stated.rate, 0, told)
-        ))
-        for one in columns
-    ]  # fmt: skip
-
-
-def _missing(columns: list[MeasuredColumn]) -> Iterator[str]:
-    for one in columns:
-        count = int(np.count_nonzero(np.isnan(one.values)))
-        if count:
-            yield f'{one.name}: {count} of {one.values.size} samples hold no number'
+    sizes = {one.values.size for one in columns}
+    told = f'the stated rate of {rate:g} Hz'
+    bases = {size: TimeBase(np.arange(size) / rate, 0, told) for size in sizes}
+    return [replace(one, time=one.time or bases[one.values.size]) for one in columns]
 
 
 def _hashed(path: Path) -> tuple[str, int]:

@@ -17,10 +17,9 @@ from engine_mount.signals.importing.one_grid import (
 from engine_mount.signals.importing.pieces import LONGEST_GAP
 from engine_mount.signals.importing.topics import recorded_as
 from engine_mount.signals.importing.writing import Channel, Times
-from engine_mount.signals.plausibility import check_size
+from engine_mount.signals.quantities import Quantity, quantity
 from engine_mount.signals.resampling import has_step, resampled
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError
-from engine_mount.signals.units.quantities import Quantity, quantity
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_size
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 

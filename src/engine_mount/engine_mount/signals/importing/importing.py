@@ -6,15 +6,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.channels import channels_of
 from engine_mount.signals.importing.joined import joined
 from engine_mount.signals.importing.pieces import Piece, pieces, within
-from engine_mount.signals.importing.provenance import SCENARIO, told_mapping
-from engine_mount.signals.importing.reading import Read, read_files
+from engine_mount.signals.importing.provenance import SCENARIO, told_mapping, told_provenance
+from engine_mount.signals.importing.reading import read_files
 from engine_mount.signals.importing.writing import Channel, write_channels
+from engine_mount.signals.mapping import Mapping
+from engine_mount.signals.selection import Selection
 from engine_mount.signals.signal import SECOND, Signal
-from engine_mount.signals.units.mapping import Mapping
 from mount_recorder.session import new_session
 
 Progress = Callable[[float, str], None]
@@ -33,7 +33,6 @@ class ImportOrder:
     mapping_file: str = ''
     first: float | None = None
     last: float | None = None
-    stated: Stated | None = None
 
 
 @dataclass
@@ -55,7 +54,7 @@ def import_recording(order: ImportOrder, progress: Progress = lambda share, what
     Raises a `ValueError` or `OSError` with the reason, before anything is written.
     """
     progress(0.0, 'reading')
-    files = read_files(order.files, order.mapping, order.stated)
+    files = read_files(order.files, order.mapping)
     signals, notes = joined([(one.name, one.signals) for one in files])
     notes = [note for one in files for note in one.notes] + notes
     imported = Imported(notes=[*notes, *_notes_of(signals)])
@@ -116,7 +115,11 @@ def _with_room_before(parts: Sequence[Piece]) -> tuple[list[Piece], list[str]]:
 
 
 def _session(
-    order: ImportOrder, files: Sequence[Read], channels: Sequence[Channel], notes: Sequence[str], piece: str
+    order: ImportOrder,
+    files: Sequence[Selection],
+    channels: Sequence[Channel],
+    notes: Sequence[str],
+    piece: str,
 ) -> dict[str, Any]:
     columns = {name: told for one in files for name, told in one.columns.items()}
     return new_session(
@@ -124,7 +127,7 @@ def _session(
             'scenario': SCENARIO,
             'mode': 'import',
             'imported': {
-                'files': [one.source for one in files],
+                'files': [told_provenance(one.provenance) for one in files],
                 'piece': piece,
                 'mapping': told_mapping(order.mapping, order.mapping_file),
                 'columns': columns,

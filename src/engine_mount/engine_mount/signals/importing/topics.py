@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.signals.quantities import Quantity
 from engine_mount.signals.signal import FloatArray
-from engine_mount.signals.units.quantities import Quantity
 from mount_ros import topics
+from mount_ros.messages.cdr import accelerometer
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
-from mount_ros.messages.sensors import level_imu
 from mount_ros.topics import JOINT_STATE, Delivery, Scalar, Topic
 
 PREFIX = 'measured/'
@@ -27,7 +27,7 @@ class RecordedAs:
         """Return the messages of `stamps` (ns) and `values` (n,), SI, as bytes."""
         if self.topic.type == JOINT_STATE:
             return ScalarsLayout(self.topic).pack_rows(stamps, values[:, None])
-        return OneNumberLayout(level_imu(), self.field).pack_rows(stamps, values)
+        return OneNumberLayout(accelerometer).pack_rows(stamps, values)
 
 
 def recorded_as(quantity: Quantity) -> RecordedAs:

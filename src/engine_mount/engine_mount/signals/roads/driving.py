@@ -4,18 +4,29 @@ The vehicle model stands on one wheel, so there is one track and no second axle.
 long waves, averaged over the length on which a tyre stands, and is faded in as the simulated roads are.
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine_mount.signals.even_grid import EvenSignal
 from engine_mount.signals.importing.provenance import told_provenance
+from engine_mount.signals.mapping import Mapping
+from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.resampling import resampled
-from engine_mount.signals.roads.iso8608 import unevenness
-from engine_mount.signals.roads.long_waves import LONGEST_WAVE, without_long_waves
-from engine_mount.signals.roads.profile import FloatArray, ProfileError, RoadProfile
-from engine_mount.signals.roads.speed import Speed
+from engine_mount.signals.roads.iso8608 import (
+    LONGEST_WAVE,
+    RoadProfile,
+    Unevenness,
+    root_mean_square,
+    unevenness,
+    without_long_waves,
+)
+from engine_mount.signals.selection import name_of, select_rows
+from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.units import unit_of
 from mount_sim.excitation.road import RandomRoad
 
 CONTACT_LENGTH = 0.1
@@ -23,11 +34,85 @@ CONTACT_LENGTH = 0.1
 STEP_TIME = 1e-3  # s, chosen: frequencies up to 400 Hz are kept
 BAND = (0.9, 50.0)
 """Hz: what is to be held of a road, from below the body's frequency to the end of the paper's sweep."""
+SLOWEST, FASTEST = 0.5, 90.0
+"""m/s, chosen: below, no wave within the body's and the engine's range is met; above, km/h are meant."""
+_DOUBTED = 45.0  # m/s, chosen: above 162 km/h a number in km/h is as likely
+_LONGEST_GAP = 1.0  # s, chosen: a car's speed between two values so far apart is near the line through them
+_NUMBER = re.compile(r'([\d.]+)(?:/([\d.]+))?\s*(m/s|km/h|kmh|kph|mph)?')
+_SPEED = by_name(
+    Quantity(
+        'speed', 'velocity', 'speed of the vehicle', SLOWEST, FASTEST,
+        ('v', 'velocity', 'vehicle_speed', 'geschwindigkeit'), by_size=True,
+    )
+)  # fmt: skip
 _ENGINE = 20.0  # Hz: below, the engine moves on its mounts; a road that does not reach it is none for them
 _KEPT = 0.4  # of the rate of the places, as `resampled` keeps
 _SHORTEST = 1.0  # s, chosen: eight periods of the engine on its mounts
 _USUAL = 15.0  # s: of a repeated road, as of the other scenarios
 _RAMP_IN = RandomRoad().ramp_in  # s: as the simulated roads
+
+
+class Speed(NamedTuple):
+    """Speeds (n,) in m/s at times (n,) in s, straight between them; a constant one has a single value."""
+
+    times: FloatArray
+    values: FloatArray
+    told: str
+
+    @property
+    def mean(self) -> float:
+        """Mean over the time, m/s."""
+        if self.values.size == 1:
+            return float(self.values[0])
+        return float(np.trapezoid(self.values, self.times) / (self.times[-1] - self.times[0]))
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what is to be doubted about it."""
+        top = float(self.values.max())
+        if top <= _DOUBTED:
+            return ()
+        return (
+            f'{top:g} m/s are {3.6 * top:.0f} km/h; if {top:g} km/h are meant, write --speed {top:g}/3.6',
+        )
+
+    def places(self, step: float, seconds: float) -> FloatArray:
+        """Return where the car is (n,), m, every `step` s for so many `seconds`."""
+        times = step * np.arange(int(seconds / step) + 1)
+        values = np.interp(times, self.times, self.values)
+        return np.concatenate([[0.0], np.cumsum(0.5 * step * (values[1:] + values[:-1]))])
+
+
+def speed_of(text: str) -> Speed:
+    """Return the speed that `text` tells: m/s as in 60/3.6, with a unit as in 60km/h, or a file over time.
+
+    Raises `SignalError` or `SourceError`.
+    """
+    match = _NUMBER.fullmatch(text.strip())
+    if match is None:
+        return recorded_speed(text)
+    number = float(match[1]) / float(match[2] or 1.0) * unit_of(match[3] or 'm/s').factor
+    if not SLOWEST <= number <= FASTEST:
+        guess = f'; is it in km/h? Write {text}/3.6' if SLOWEST <= number / 3.6 <= FASTEST else ''
+        raise SignalError(
+            f'--speed {text} is {number:g} m/s; it must lie within {SLOWEST:g} .. {FASTEST:g} m/s{guess}'
+        )
+    return Speed(np.zeros(1), np.array([number]), f'{number:.4g} m/s ({3.6 * number:.4g} km/h)')
+
+
+def recorded_speed(file: str | Path) -> Speed:
+    """Return the speed over time in a file of any format; raises `SignalError` or `SourceError`."""
+    option = 'the title of its column as {column} [{unit}]'
+    rows = select_rows(file, Mapping(option=option), _SPEED, _SPEED, timed=True, slowest=0.1)
+    times, values, name = rows['time'], rows['speed'], name_of(str(file))
+    steps = np.diff(times)
+    bad = np.flatnonzero((steps <= 0.0) | (steps > _LONGEST_GAP))
+    if bad.size or values.min() < 0.0:
+        place = int(bad[0]) if bad.size else int(values.argmin())
+        raise SignalError(
+            f'{name}: behind {times[place]:g} s ({values[place]:g} m/s) times must rise by '
+            f'{_LONGEST_GAP:g} s at most, and speeds be 0 m/s or more'
+        )
+    return Speed(times, values, f'{values.min():.3g} .. {values.max():.3g} m/s as in {name}')
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +143,7 @@ def wheel_height(
     duration: float = 0.0,
     repeat: bool = False,
 ) -> WheelHeight:
-    """Return the road under a wheel that rolls over it at `speed`; raises `ProfileError`.
+    """Return the road under a wheel that rolls over it at `speed`; raises `SignalError`.
 
     `contact_length` (m): of the tyre, by default `CONTACT_LENGTH`, none of a road that is effective already.
     `duration` (s): no more than that; `repeat` drives the road forth and back until then.
@@ -67,7 +152,7 @@ def wheel_height(
     notes = [*profile.notes, *speed.notes()]
     reached = kept_frequency(profile, speed)
     if reached < _ENGINE:
-        raise ProfileError(
+        raise SignalError(
             f'{profile.name}: places {profile.spacing:g} m apart at {speed.mean:.3g} m/s hold {reached:.2g} '
             f'Hz; at least {_ENGINE:g} Hz are needed, that is {_KEPT * speed.mean / _ENGINE:.2g} m or finer'
         )
@@ -79,19 +164,30 @@ def wheel_height(
     notes.append(f'the line through the heights and waves longer than {LONGEST_WAVE:g} m are taken out')
     if contact > 0.0:
         notes.append(f'averaged over {contact:g} m on which the tyre stands')
+    seconds = float(speed.times[-1]) or duration or (_USUAL if repeat else np.inf)
     if repeat:
-        height = _repeated(height, _needed(speed, duration or _USUAL), profile.spacing)
-    series = _over_time(height, profile.spacing, speed, contact, duration)
+        once = np.concatenate([height, height[-2:0:-1]])
+        height = np.resize(once, int(speed.mean * seconds / profile.spacing) + 2)
+    seconds = min(seconds, duration or np.inf)
+    series = _over_time(height, profile.spacing, speed, contact, seconds)
     if series.size * STEP_TIME < _SHORTEST:
-        raise ProfileError(
+        raise SignalError(
             f'{profile.name}: {profile.length:g} m at {speed.mean:.3g} m/s last '
             f'{series.size * STEP_TIME:.2g} s; at least {_SHORTEST:g} s are needed: drive slower, or forth '
             'and back with --repeat'
         )
-    told = _told(profile, speed, contact, repeat=repeat)
-    return WheelHeight(
-        series * np.minimum(STEP_TIME * np.arange(series.size) / _RAMP_IN, 1.0), told, tuple(notes)
-    )
+    found = unevenness(profile)
+    told: dict[str, object] = {
+        **told_provenance(profile.provenance),
+        'length_m': round(profile.length, 3),
+        'spacing_m': round(profile.spacing, 6),
+        'iso_8608': f'{found.letter}, Gd {1e6 * found.roughness:.3g}e-6 m^3, waviness {found.waviness:.2f}',
+        'speed': speed.told,
+        'contact_length_m': contact,
+        'repeat': repeat,
+    }
+    fade = np.minimum(STEP_TIME * np.arange(series.size) / _RAMP_IN, 1.0)
+    return WheelHeight(series * fade, told, tuple(notes))
 
 
 def kept_frequency(profile: RoadProfile, speed: Speed) -> float:
@@ -99,21 +195,61 @@ def kept_frequency(profile: RoadProfile, speed: Speed) -> float:
     return _KEPT * min(speed.mean / profile.spacing, 1.0 / STEP_TIME)
 
 
-def _needed(speed: Speed, duration: float) -> float:
-    if speed.values.size == 1:
-        return speed.mean * duration
-    return float(np.trapezoid(speed.values, speed.times))
+def as_rows(profile: RoadProfile, found: Unevenness, speed: Speed | None) -> list[tuple[str, str]]:
+    """Return rows of a table about a road, and at `speed` which frequencies it holds."""
+    short = without_long_waves(profile.height, profile.spacing)
+    rows = [
+        ('format', profile.provenance.format),
+        ('length', f'{profile.length:.1f} m, a height every {1e3 * profile.spacing:.4g} mm'),
+        ('heights', f'{np.ptp(profile.height):.3g} m from the lowest to the highest'),
+        (
+            f'up to {LONGEST_WAVE:g} m',
+            f'{1e3 * root_mean_square(profile):.3g} mm rms, {1e3 * np.ptp(short):.3g} mm in all',
+        ),
+        ('ISO 8608', f'class {found.letter}{" (a guess)" if found.beyond else ""}'),
+        ('Gd(0.1 cycles/m)', f'{1e6 * found.roughness:.3g}e-6 m^3'),
+        ('waviness', f'{found.waviness:.2f}'),
+    ]
+    rows += [
+        ('comes again', f'every {period.wavelength:.3g} m, {1e3 * period.amplitude:.2g} mm')
+        for period in found.periods
+    ]
+    if speed is not None:
+        lowest, highest = speed.mean / min(profile.length, LONGEST_WAVE), kept_frequency(profile, speed)
+        rows.append(
+            (
+                f'at {3.6 * speed.mean:.4g} km/h',
+                f'{profile.length / speed.mean:.1f} s; {lowest:.2g} .. {highest:.4g} Hz',
+            )
+        )
+        rows += [
+            ('', f'{period.wavelength:.3g} m are met at {speed.mean / period.wavelength:.3g} Hz')
+            for period in found.periods
+        ]
+    return rows
 
 
-def _repeated(height: FloatArray, length: float, spacing: float) -> FloatArray:
-    """Return heights driven forth and back until `length` (m) is reached."""
-    once = np.concatenate([height, height[-2:0:-1]])
-    times = int(np.ceil((length / spacing + 2) / once.size))
-    return np.tile(once, max(times, 1))[: int(length / spacing) + 2]
+def as_figures(profile: RoadProfile, found: Unevenness) -> dict[str, Any]:
+    """Return the figures of a road as plain data."""
+    return {
+        'uri': profile.provenance.uri,
+        'sha256': profile.provenance.sha256,
+        'format': profile.provenance.format,
+        'length_m': profile.length,
+        'spacing_m': profile.spacing,
+        'rms_m': root_mean_square(profile),
+        'class': found.letter,
+        'roughness_m3': found.roughness,
+        'waviness': found.waviness,
+        'fitted_cycles_per_m': [found.lowest, found.highest],
+        'class_is_a_guess': found.beyond,
+        'periods': [period._asdict() for period in found.periods],
+        'notes': list(profile.notes),
+    }
 
 
 def _over_time(
-    height: FloatArray, spacing: float, speed: Speed, contact: float, duration: float
+    height: FloatArray, spacing: float, speed: Speed, contact: float, seconds: float
 ) -> FloatArray:
     """Return the heights every `STEP_TIME`, band-limited to what that step holds."""
     from scipy.interpolate import CubicSpline
@@ -121,7 +257,11 @@ def _over_time(
     length = spacing * (height.size - 1)
     finer = max(1, int(np.ceil(2.0 * float(speed.values.max()) * STEP_TIME / max(spacing, contact / 4.0))))
     step = STEP_TIME / finer
-    places = _places(speed, length, step, duration)
+    if speed.values.size == 1:
+        places = speed.mean * step * np.arange(int(min(length / speed.mean, seconds) / step) + 1)
+    else:
+        places = speed.places(step, seconds)
+        places = places[: int(np.searchsorted(places, length, side='right'))]
     curve = CubicSpline(spacing * np.arange(height.size), height)
     if contact > 0.0:
         whole, half = curve.antiderivative(), 0.5 * contact
@@ -132,28 +272,3 @@ def _over_time(
     if finer == 1:
         return np.asarray(values, np.float64)
     return resampled(EvenSignal('the road', step, np.asarray(values, np.float64), 0), STEP_TIME)[:]
-
-
-def _places(speed: Speed, length: float, step: float, duration: float) -> FloatArray:
-    """Return where the wheel is (n,), m, every `step` s, to the end of road, speed or `duration`."""
-    longest = duration or np.inf
-    if speed.values.size == 1:
-        seconds = min(length / speed.mean, longest)
-        return speed.mean * step * np.arange(int(seconds / step) + 1)
-    times = step * np.arange(int(min(speed.times[-1], longest) / step) + 1)
-    values = np.interp(times, speed.times, speed.values)
-    places = np.concatenate([[0.0], np.cumsum(0.5 * step * (values[1:] + values[:-1]))])
-    return places[: int(np.searchsorted(places, length, side='right'))]
-
-
-def _told(profile: RoadProfile, speed: Speed, contact: float, *, repeat: bool) -> dict[str, object]:
-    found = unevenness(profile)
-    return {
-        **told_provenance(profile.provenance),
-        'length_m': round(profile.length, 3),
-        'spacing_m': round(profile.spacing, 6),
-        'iso_8608': f'{found.letter}, Gd {1e6 * found.roughness:.3g}e-6 m^3, waviness {found.waviness:.2f}',
-        'speed': speed.told,
-        'contact_length_m': contact,
-        'repeat': repeat,
-    }

@@ -6,16 +6,22 @@ thirds of them up to 0.25, in twelfths above, and a line Gd(n0) (n / n0)^-w is f
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from engine_mount.signals.roads.profile import FloatArray, RoadProfile
+from engine_mount.signals.formats.measured import Provenance
+from engine_mount.signals.signal import FloatArray
 from mount_sim.excitation.road import REFERENCE_FREQUENCY
 
 CLASSES = 'ABCDEFGH'
 FIRST_LIMIT = 32e-6  # m^3: between A and B; from class to class four times as much
 FITTED = (0.011, 2.83)  # cycles/m
+LONGEST_WAVE = 100.0
+"""m, chosen: 0.33 Hz at 120 km/h, where wheel, body and engine move as one."""
+_GAUSSIAN = math.sqrt(math.log(2.0) / 2.0) / math.pi
+"""Standard deviation over the wavelength that is halved (ISO 16610-21)."""
 _SMOOTHING = ((0.0312, 1), (0.25, 3), (math.inf, 12))  # up to cycles/m: bands to the octave
 _LONGEST_SEGMENT = 256.0  # m, chosen: four averages over a kilometre, and a band below 0.011 cycles/m
 _PARTS = 8  # chosen: so many averages make a peak of chance unlikely
@@ -29,6 +35,55 @@ _HANN_WIDTH = 1.5  # lines of the spectrum: what a sine is spread over
 _LOWEST_WAVE = 1e-4  # m, chosen: less is not felt beside the roughness of asphalt
 _MOST = 3
 _HARMONIC = 0.06  # chosen
+
+
+@dataclass(frozen=True, eq=False)
+class RoadProfile:
+    """Heights (n,) in m at places `spacing` m apart from `first` m on, under one track of wheels.
+
+    `effective`: the heights are those that the axle feels, after the tyre has rounded the road. `notes` are
+    sentences that say what was done to the file to get them.
+    """
+
+    first: float
+    spacing: float
+    height: FloatArray
+    provenance: Provenance
+    notes: tuple[str, ...] = ()
+    effective: bool = False
+
+    @property
+    def distance(self) -> FloatArray:
+        """Places (n,) in m."""
+        return self.first + self.spacing * np.arange(self.height.size, dtype=np.float64)
+
+    @property
+    def length(self) -> float:
+        """From the first place to the last, m."""
+        return (self.height.size - 1) * self.spacing
+
+    @property
+    def name(self) -> str:
+        """The file's name, for sentences."""
+        return self.provenance.uri.rpartition('/')[2]
+
+
+def without_long_waves(height: FloatArray, spacing: float) -> FloatArray:
+    """Return heights (n,) in m, `spacing` m apart, without their line and waves of more than `LONGEST_WAVE`.
+
+    A wave of that length is halved; one of a third of it is left within 1 %.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    places = np.arange(height.size) - 0.5 * (height.size - 1)
+    slope = (places @ height) / (places @ places)
+    level = height - height.mean() - slope * places
+    return np.asarray(level - gaussian_filter1d(level, _GAUSSIAN * LONGEST_WAVE / spacing, mode='mirror'))
+
+
+def root_mean_square(profile: RoadProfile) -> float:
+    """Return the root of the mean square (m) of heights without long waves."""
+    return float(np.sqrt(np.mean(without_long_waves(profile.height, profile.spacing) ** 2)))
 
 
 class Period(NamedTuple):

@@ -1,112 +1,155 @@
-"""Height over distance from the columns of any table."""
+"""A road from a file: a track of OpenCRG, or height over distance in a table; whether it is one, and even."""
 
+import hashlib
 import math
-from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
-from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, listed
-from engine_mount.signals.roads.profile import FloatArray, ProfileError
-from engine_mount.signals.units.unit import is_unit, unit_of
+from engine_mount.signals.even_grid import interpolated
+from engine_mount.signals.formats.measured import Provenance
+from engine_mount.signals.formats.reading import read
+from engine_mount.signals.mapping import Mapping, with_options
+from engine_mount.signals.quantities import Quantity, by_name
+from engine_mount.signals.roads.crg import read_track
+from engine_mount.signals.roads.iso8608 import RoadProfile, root_mean_square, unevenness
+from engine_mount.signals.selection import name_of, select_rows
+from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.sources.stores import local_copy
 
-_DISTANCES = (
-    'distance', 'dist', 'x', 's', 'u', 'station', 'chainage', 'position', 'weg', 'strecke', 'wegstrecke',
-    'laenge', 'länge',
-)  # fmt: skip
-_HEIGHTS = (
-    'height', 'effective_height', 'z', 'h', 'elevation', 'profile', 'road', 'hoehe', 'höhe', 'unevenness',
-    'unebenheit',
-)  # fmt: skip
-_TIME_NAMES = ('t', 'time', 'timestamp', 'zeit')
-_ACCELERATIONS = ('acc', 'accel', 'acceleration', 'beschleunigung', 'az', 'ax', 'ay')
 EFFECTIVE = 'effective_height'
 """Name of a height that is already the one behind the tyre."""
+LONGEST_GAP = 0.5  # m, chosen: 0.03 s at 60 km/h, less than half a period of the engine on its mounts
+SHORTEST_ROAD = 5.0  # m, chosen: less holds hardly a wave that the engine feels
+SMOOTHEST, ROUGHEST = 5e-5, 0.25
+"""m, chosen: rms of waves shorter than 100 m; a tenth of a new motorway's, and class G of ISO 8608."""
+_FEWEST = 20  # places
+_ON_THE_GRID = 1e-3  # spacings, chosen: as of recorded signals
+_WIDE = 1.5  # spacings: a wider step is a gap
+_FLAT_SPECTRUM = 0.5  # chosen: waviness below; of roads it is 1.5 to 3.5, of accelerations of a car about 0
+_HIGH_STONES = 0.03  # m, chosen: rms up to which a flat spectrum is that of a pavement of stones
+_DISTANCE = Quantity(
+    'distance', 'length', 'distance along the road',
+    titles=(
+        'dist', 'x', 's', 'u', 'station', 'chainage', 'position', 'weg', 'strecke', 'wegstrecke', 'laenge',
+        'länge',
+    ),
+)  # fmt: skip
+_HEIGHT = Quantity(
+    'height', 'length', 'height of the road',
+    titles=(EFFECTIVE, 'z', 'h', 'elevation', 'profile', 'road', 'hoehe', 'höhe', 'unevenness', 'unebenheit'),
+)  # fmt: skip
+_OPTION = '--column {column}:{unit}, of a distance --distance {column}:{unit}'
 
-Chosen = tuple[FloatArray, FloatArray, str, float, bool]
-"""Distances and heights (n,) in m, the heights' unit and its size in m, whether they are effective ones."""
 
+def road_profile(
+    uri: str | Path,
+    *,
+    lateral: float = 0.0,
+    column: str = '',
+    distance: str = '',
+    spacing: float = math.nan,
+) -> RoadProfile:
+    """Return the road in the file at `uri`, checked, on an even grid.
 
-def heights_of(measured: Measured, column: str = '', distance: str = '', spacing: float = math.nan) -> Chosen:
-    """Return the chosen columns in m; `column` and `distance` are NAME or NAME:UNIT.
-
-    Without them columns are known by their names and units. `spacing` (m) stands in for a distance. Raises
-    `ProfileError`, or `SignalError` where a named column is missing.
+    `lateral` (m, left of the reference line) chooses the track of an OpenCRG file; `column` and `distance`,
+    NAME or NAME:UNIT, the columns of a table, `spacing` (m) stands in for a distance. Raises `SignalError` or
+    `SourceError` with one sentence.
     """
-    headings = [*measured.columns.values(), *measured.others]
-    name = measured.provenance.uri.rpartition('/')[2]
-    height, height_unit = _chosen(measured, column, _HEIGHTS, 'height', '--column', headings)
-    _refuse_acceleration(name, height, height_unit)
-    height_size = _size(name, height, height_unit, '--column')
-    heights = height_size * height.values
-    effective = height.name.casefold() == EFFECTIVE
-    if math.isfinite(spacing):
-        return spacing * np.arange(heights.size), heights, height_unit, height_size, effective
-    along, unit = _chosen(measured, distance, _DISTANCES, 'distance', '--distance', headings)
-    if along.number == height.number:
-        raise ProfileError(f'{name}: column {height.name!r} is both height and distance; name the other one')
-    if _dimension(unit) == 'time' or along.name.casefold() in _TIME_NAMES:
-        raise ProfileError(
-            f'{name}: column {along.name!r} is a time; a road is height over distance: name a distance with '
-            '--distance, or multiply by the speed at which it was measured'
+    if str(uri).lower().endswith('.crg'):
+        with local_copy(str(uri)) as path:
+            content = path.read_bytes()
+        places, heights, notes = read_track(name_of(str(uri)), content, lateral)
+        digest = hashlib.sha256(content).hexdigest()
+        provenance = Provenance(str(uri), digest, len(content), 'OpenCRG', 'engine_mount.signals')
+        return checked_profile(places, heights, provenance, notes)
+    measured = read(uri)
+    known = by_name(_HEIGHT) if math.isfinite(spacing) else by_name(_HEIGHT, _DISTANCE)
+    said = {'height': column, 'distance': distance}
+    texts = [f'{name}={text}' for name, text in said.items() if text and name in known]
+    mapping = with_options(Mapping(option=_OPTION), texts, known=known)
+    rows = select_rows(measured, mapping, known, known)
+    places = rows.get('distance', spacing * np.arange(rows['height'].size))
+    chosen = mapping.columns['height'].column if column else EFFECTIVE
+    effective = chosen == EFFECTIVE and EFFECTIVE in measured.columns
+    return checked_profile(places, rows['height'], measured.provenance, measured.notes, effective=effective)
+
+
+def checked_profile(
+    places: FloatArray,
+    heights: FloatArray,
+    provenance: Provenance,
+    notes: tuple[str, ...] = (),
+    *,
+    effective: bool = False,
+) -> RoadProfile:
+    """Return heights (n,) in m at places (n,) in m as a road; raises `SignalError` where they are none."""
+    name = name_of(provenance.uri)
+    known = np.flatnonzero(np.isfinite(heights))
+    if not known.size:
+        raise SignalError(f'{name} holds no height: all {heights.size} are missing')
+    missing = heights.size - 1 - int(known[-1] - known[0])
+    if missing:
+        notes = (*notes, f'{missing} missing heights at the ends are left out')
+    even, done = _even_places(name, places[known], heights[known])
+    profile = RoadProfile(*even, provenance, (*notes, *done), effective)
+    _check_road(profile)
+    return profile
+
+
+def _even_places(
+    name: str, places: FloatArray, heights: FloatArray
+) -> tuple[tuple[float, float, FloatArray], list[str]]:
+    """Return first place, spacing and heights on an even grid, and what was done."""
+    steps = np.diff(places)
+    back = np.flatnonzero(steps <= 0.0)
+    if back.size:
+        place = int(back[0])
+        raise SignalError(
+            f'{name}: the distance does not rise at line {place + 1} of the numbers: {places[place]:g} m is '
+            f'followed by {places[place + 1]:g} m ({back.size} such); is this column a distance? Cut there, '
+            'or sort the lines'
         )
-    size = _size(name, along, unit, '--distance')
-    return size * along.values, heights, height_unit, height_size, effective
-
-
-def _chosen(
-    measured: Measured, told: str, names: Sequence[str], what: str, option: str, headings: Sequence[Heading]
-) -> tuple[MeasuredColumn, str]:
-    """Return a column and its unit: the one that is told, else the first of the usual names."""
-    if told:
-        name, _, unit = told.rpartition(':') if ':' in told else (told, '', '')
-        column = measured.column(name)
-        return column, unit or column.unit
-    by_name = {column.name.casefold(): column for column in reversed(measured.columns.values())}
-    for name in names:
-        if name in by_name:
-            return by_name[name], by_name[name].unit
-    file = measured.provenance.uri.rpartition('/')[2]
-    times = [
-        one.name for one in headings if one.name.casefold() in _TIME_NAMES or _dimension(one.unit) == 'time'
-    ]
-    hint = f'; {times[0]!r} is a time: a road is height over distance' if what == 'distance' and times else ''
-    raise ProfileError(
-        f'{file}: which column is the {what}? Name it with {option} NAME:UNIT; there are '
-        f'{listed(headings)}{hint}'
-    )
-
-
-def _refuse_acceleration(name: str, column: MeasuredColumn, unit: str) -> None:
-    words = column.name.casefold().replace('.', '_').replace('/', '_').split('_')
-    by_name = any(word in _ACCELERATIONS for word in words)
-    if _dimension(unit) == 'acceleration' or (by_name and _dimension(unit) != 'length'):
-        raise ProfileError(
-            f'{name}: column {column.name!r} ({unit or "no unit"}) is an acceleration, not a height; drive '
-            'it with --scenario recorded, or make a road of it with engine-mount road invert'
+    length = places[-1] - places[0]
+    if places.size < _FEWEST or length < SHORTEST_ROAD:
+        raise SignalError(
+            f'{name}: {places.size} places on {length:g} m; at least {_FEWEST} on {SHORTEST_ROAD:g} m are '
+            'needed: is the unit of the distance another one?'
         )
+    spacing, longest = float(np.median(steps)), int(steps.argmax())
+    wide = np.count_nonzero(steps > _WIDE * spacing)
+    if steps[longest] > max(LONGEST_GAP, _WIDE * spacing):
+        raise SignalError(
+            f'{name}: no heights from {places[longest]:g} to {places[longest + 1]:g} m ({steps[longest]:.3g} '
+            f'm; {wide} gaps in all); up to {LONGEST_GAP:g} m are interpolated: cut the road there, or '
+            'take another track'
+        )
+    count = round(length / spacing) + 1 if wide else places.size
+    exact = float(length) / (count - 1)
+    grid = places[0] + exact * np.arange(count)
+    if not wide and np.abs(places - grid).max() <= _ON_THE_GRID * exact:
+        return (float(places[0]), exact, heights), []
+    note = f'brought from uneven places onto an even grid of {exact:.4g} m'
+    if wide:
+        note = f'{wide} gaps are interpolated, the longest of {steps[longest]:.3g} m at {places[longest]:g} m'
+    return (float(places[0]), exact, interpolated(places, heights, grid)), [note]
 
 
-def _dimension(unit: str) -> str:
-    return unit_of(unit).dimension if is_unit(unit) else ''
-
-
-def _size(name: str, column: MeasuredColumn, unit: str, option: str) -> float:
-    """Return one of `unit` in m; raises `ProfileError` where it is no length."""
-    if _dimension(unit) == 'length':
-        return unit_of(unit).factor
-    known = column.values[np.isfinite(column.values)]
-    spread = f' ({known.min():g} .. {known.max():g})' if known.size else ''
-    why = f'the unit {unit!r}, which is no length' if unit else 'no unit in its header'
-    raise ProfileError(
-        f'{name}: column {column.name!r}{spread} has {why}; say it as in {option} '
-        f'{column.name}:{_guess(column, option)}'
-    )
-
-
-def _guess(column: MeasuredColumn, option: str) -> str:
-    """Return the unit that the size of the numbers suggests."""
-    known = column.values[np.isfinite(column.values)]
-    if option == '--distance' or not known.size:
-        return 'm'
-    spread = float(np.std(known))
-    return 'm' if spread < 0.3 else 'mm' if spread < 300.0 else 'um'
+def _check_road(profile: RoadProfile) -> None:
+    """Raise `SignalError` for heights in another unit, and for an acceleration in their place."""
+    rms = root_mean_square(profile)
+    if not SMOOTHEST <= rms <= ROUGHEST:
+        what, guess = 'rougher than any road', 'are they in mm instead of m?'
+        if rms < SMOOTHEST:
+            what, guess = 'smoother than any road', 'are they in m instead of mm?'
+        raise SignalError(
+            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} ({SMOOTHEST:g} .. '
+            f'{ROUGHEST:g} m, chosen); {guess}'
+        )
+    waviness = unevenness(profile).waviness
+    if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:
+        raise SignalError(
+            f'{profile.name}: a waviness of {waviness:.2f} with {rms:.3g} m rms is not that of heights '
+            '(1.5 to 3.5) but of accelerations (about 0); if it is one, drive it with --scenario recorded, '
+            'or make a road of it with engine-mount road invert'
+        )

@@ -1,87 +1,268 @@
-"""Recordings in a store that fsspec reaches: listed, and fetched through the local cache."""
+"""Stores that fsspec reaches: their files listed, and fetched whole into the local cache."""
 
+import contextlib
+import errno
 import hashlib
+import importlib
+import logging
+import random
+import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import nan
 from pathlib import Path, PurePosixPath
+from typing import Any, TypeVar
+from urllib.parse import unquote, urlsplit
 
-from engine_mount.signals.sources.cache import Cache, Held, default_limit
-from engine_mount.signals.sources.fetching import fetch_file, reserve
-from engine_mount.signals.sources.looking import Found, changed, look, look_inside, mark
-from engine_mount.signals.sources.patience import Patience, persistent
-from engine_mount.signals.sources.source import Entry, SourceError
-from engine_mount.signals.sources.uris import checked, name_of, shown
+from engine_mount.signals.extras import MissingLibraryError, required
+from engine_mount.signals.sources.cache import cached_copy
+from engine_mount.signals.sources.source import Entry, SourceError, StoreAwayError
+from engine_mount.signals.sources.uris import checked, inside, name_of, scheme_of, shown
 
-Tell = Callable[[int, int], None]
+T = TypeVar('T')
+Progress = Callable[[int, int], None]
 """Takes how many bytes are here, and of how many."""
 
+CONNECT = 10.0  # s, chosen: within it a server answers, or the connection counts as broken
+SILENCE = 30.0  # s, chosen: without a byte for so long, it counts as broken
+ATTEMPTS = 8  # chosen: with the pauses between them a store may be away for 20 s
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 8.0  # s, chosen: doubled each time, shortened by chance by up to a quarter
 
-def tell_nobody(done: int, of: int) -> None:
-    """Tell nobody how far it is."""
-
-
-class RemoteStore:
-    """S3, Google Cloud Storage, SFTP and HTTP, asked again with `patience` where a connection breaks."""
-
-    def __init__(self, patience: Patience | None = None):
-        self._patience = patience or Patience()
-
-    def entries(self, uri: str) -> Iterator[Entry]:
-        """Return every file at or below `uri`, sorted by URI, hidden ones aside; raises `SourceError`."""
-        return (found.entry for found in self.found(uri))
-
-    def fetch(self, uri: str, scratch: Path) -> Path:
-        """Return a whole local copy of the file or folder at `uri`, below `scratch`; raises `SourceError`.
-
-        It is kept until this process ends.
-        """
-        return self.hold(uri, scratch).path
-
-    def hold(self, uri: str, scratch: Path, tell: Tell = tell_nobody) -> Held:
-        """Return a whole local copy that is kept until it is released; raises `SourceError`."""
-        files = self.found(uri)
-        if not files:
-            raise SourceError(f'{shown(uri)}: an empty folder')
-        size, done = sum(found.entry.size for found in files), 0
-
-        def came(count: int) -> None:
-            nonlocal done
-            done += count
-            tell(done, size)
-
-        name = _safe(name_of(uri))
-
-        def reserve_all(part: Path) -> None:
-            for found in files:
-                reserve(found, part / name / found.place)
-
-        def fill(part: Path) -> None:
-            for found in files:
-                fetch_file(found, part / name / found.place, self._patience, came)
-            if files[0].place.parts:
-                now = persistent(uri, lambda: look_inside(uri), self._patience)
-                if _identity(now) != _identity(files):
-                    raise changed(uri)
-
-        return Cache(scratch, default_limit()).hold(_identity(files), name, size, reserve_all, fill)
-
-    def found(self, uri: str) -> Sequence[Found]:
-        """Return the file at `uri`, or those in that folder with their places in it; raises `SourceError`."""
-        checked(uri)
-
-        def ask() -> Sequence[Found]:
-            file = None if uri.endswith('/') else look(uri)
-            return [file] if file else look_inside(uri)
-
-        return persistent(uri, ask, self._patience)
+_KEYS = {
+    's3': "who reads stands in ~/.aws, in AWS_PROFILE or AWS_ACCESS_KEY_ID, or in fsspec's configuration",
+    'gs': 'gcloud auth application-default login, or GOOGLE_APPLICATION_CREDENTIALS, says who reads',
+    'ssh': 'ssh to this host must work without a question: a key in the agent or in ~/.ssh/config',
+    'http': "what the server wants to know stands in fsspec's configuration, as client_kwargs of http",
+}
+_REFUSED = {  # exceptions of the libraries below fsspec, by name: they are not loaded here
+    'DefaultCredentialsError', 'HostKeyNotVerifiable', 'KeyEncryptionError', 'KeyImportError',
+    'NoCredentialsError', 'PartialCredentialsError', 'PermissionDenied', 'ProfileNotFound',
+    'ClientConnectorCertificateError', 'SFTPPermissionDenied', 'PermissionError',
+}  # fmt: skip
+_PASSING_STATUS = (408, 425, 429)  # HTTP: too slow, too early, too often
+_OF_THIS_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+_MARKS = ('ETag', 'etag', 'LastModified', 'mtime', 'updated', 'Last-Modified', 'created')
 
 
-def _identity(files: Sequence[Found]) -> str:
-    """Return what is the same only while all files are as they are."""
-    digest = hashlib.sha256()
-    for found in files:
-        digest.update(repr((found.entry.uri, str(found.place), *mark(found.entry))).encode())
-    return digest.hexdigest()[:32]
+@dataclass(frozen=True)
+class RemoteFile:
+    """A file in a store, and its place in the folder that was listed; `.` for the file itself."""
+
+    entry: Entry
+    place: PurePosixPath
 
 
-def _safe(name: str) -> str:
-    return name if PurePosixPath(name).name == name and name not in ('', '.', '..') else 'recording'
+def list_files(uri: str) -> list[RemoteFile]:
+    """Return the file at `uri`, or those in that folder, without hidden ones; raises `SourceError`."""
+    checked(uri)
+    return _retry(uri, lambda: _list_files(uri))
+
+
+@contextlib.contextmanager
+def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
+    """Give a whole local copy of the file or folder at `uri` as long as the block lasts.
+
+    Raises `SourceError`, also where the store has other files or sizes after the transfer than before.
+    """
+    files = list_files(uri)
+    if not files:
+        raise SourceError(f'{shown(uri)}: an empty folder')
+    name = name_of(uri)
+    if name in ('', '.', '..') or '/' in name:
+        name = 'recording'
+    size = sum(file.entry.size for file in files)
+
+    def fill(folder: Path) -> None:
+        done = 0
+        for file in files:
+            target = folder / name / file.place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _fetch(file.entry, target, partial(_add, progress, done, size))
+            done += file.entry.size
+        if _key(list_files(uri)) != key:
+            raise SourceError(
+                f'{shown(uri)} was changed while it was fetched; fetch it once its writer has ended'
+            )
+
+    key = _key(files)
+    with cached_copy(key, name, size, fill) as path:
+        yield path
+
+
+def _add(progress: Progress, done: int, size: int, came: int) -> None:
+    progress(done + came, size)
+
+
+def _key(files: Sequence[RemoteFile]) -> str:
+    """Return what stays the same only while all files are as they are."""
+    return hashlib.sha256(repr(files).encode()).hexdigest()[:32]
+
+
+def _list_files(uri: str) -> list[RemoteFile]:
+    files, path = _filesystem(uri)
+    if not uri.endswith('/') and (info := files.info(path))['type'] != 'directory':
+        return [RemoteFile(_entry(uri, info), PurePosixPath('.'))]
+    listed = files.find(path, detail=True)
+    if not listed and not files.isdir(path):
+        raise FileNotFoundError(uri)
+    found = []
+    for name, info in listed.items():
+        place = PurePosixPath(name.removeprefix(path.rstrip('/')).lstrip('/'))
+        if any(part.startswith('.') for part in place.parts):  # `..` would lead out of the folder
+            continue
+        if info['type'] == 'link' or info.get('size') is None:  # links of SFTP, all files by HTTP
+            info = files.info(name)
+        if info['type'] != 'directory':
+            found.append(RemoteFile(_entry(inside(uri, str(place)), info), place))
+    return sorted(found, key=lambda file: file.entry.uri)
+
+
+def _entry(uri: str, info: dict[str, Any]) -> Entry:
+    if info.get('size') is None:
+        raise SourceError(
+            f'{shown(uri)}: the server does not tell the size, without which half a file is a whole one'
+        )
+    mark = next((str(info[name]) for name in _MARKS if info.get(name)), '')
+    return Entry(uri, int(info['size']), nan, mark.strip('"'))
+
+
+def _fetch(entry: Entry, target: Path, progress: Callable[[int], None]) -> None:
+    """Write a file of a store to `target`; raises `SourceError`, and `OSError` of this disk."""
+    from fsspec.callbacks import Callback
+    from fsspec.spec import AbstractFileSystem
+
+    def work() -> None:
+        files, path = _filesystem(entry.uri)
+        # sshfs itself would copy a link as a link
+        get_file = (
+            partial(AbstractFileSystem.get_file, files) if _kind(entry.uri) == 'ssh' else files.get_file
+        )
+        get_file(path, str(target), callback=Callback(hooks={'bar': lambda size, value: progress(value)}))
+        if target.stat().st_size != entry.size:
+            raise ConnectionError(f'{target.stat().st_size} bytes came instead of {entry.size}')
+
+    target.touch(mode=0o600)
+    _retry(entry.uri, work)
+
+
+def _retry(uri: str, work: Callable[[], T]) -> T:
+    """Return what `work` returns, repeated where the connection breaks; raises `SourceError`."""
+    begin = time.monotonic()
+    attempt = 0
+    while True:
+        attempt += 1
+        try:
+            return work()
+        except (SourceError, MissingLibraryError):
+            raise
+        except Exception as error:  # of any library below fsspec
+            if isinstance(error, OSError) and error.errno in _OF_THIS_DISK:
+                raise
+            lasting, reason, remedy = _reason(error, uri)
+            if lasting or attempt >= ATTEMPTS:
+                tries = (
+                    f' ({attempt} attempts within {time.monotonic() - begin:.0f} s)' if attempt > 1 else ''
+                )
+                kind = SourceError if lasting else StoreAwayError
+                raise kind(f'{shown(uri)}: {reason}{tries}; {remedy}') from error
+        pause = min(LONGEST_PAUSE, FIRST_PAUSE * (1 << attempt - 1))
+        time.sleep(pause * random.uniform(0.75, 1.0))
+        _filesystem_class(uri).clear_instance_cache()  # a connection that broke stays broken
+
+
+def _reason(error: BaseException, uri: str) -> tuple[bool, str, str]:
+    """Return whether another attempt would fail as well, the reason in one line, and the remedy."""
+    cause = error.__cause__  # HTTP of fsspec calls `not found` whatever went wrong on the way
+    if isinstance(error, FileNotFoundError) and (
+        isinstance(cause, OSError) or type(cause).__module__.startswith('aiohttp')
+    ):
+        error = cause or error
+    told = str(getattr(error, 'status', None) or getattr(error, 'code', None))
+    status = int(told) if told.isdecimal() else 0
+    classes = {kind.__name__ for kind in type(error).__mro__}
+    words = f'{type(error).__name__}: {" ".join(str(error).split())}'.removesuffix(': ')
+    if type(error).__name__ == 'HostKeyNotVerifiable':
+        return (
+            True,
+            words,
+            'connect once with ssh, check the key of the host and keep it in ~/.ssh/known_hosts',
+        )
+    if status in (401, 403) or classes & _REFUSED or str(error).startswith('Forbidden'):  # the last of gcsfs
+        return True, words, _KEYS.get(_kind(uri), 'is this folder yours?')
+    if isinstance(error, FileNotFoundError) or status in (404, 410):
+        return True, 'nothing of this name is there', 'engine-mount ls lists a folder'
+    lasting = (NotADirectoryError, IsADirectoryError, ValueError, TypeError)
+    if isinstance(error, lasting) or (400 <= status < 500 and status not in _PASSING_STATUS):
+        return True, words, 'engine-mount ls lists a folder'
+    return False, words, 'is the store reachable from here?'
+
+
+def _kind(uri: str) -> str:
+    return {'sftp': 'ssh', 'https': 'http'}.get(scheme_of(uri), scheme_of(uri))
+
+
+def _filesystem_class(uri: str) -> Any:
+    """Return the class of fsspec behind a scheme; raises `MissingLibraryError`."""
+    kind, what = _kind(uri), f'reading {shown(uri)}'
+    fsspec = required('fsspec', what)
+    if kind == 'ssh':
+        return required('sshfs', what).SSHFileSystem
+    if kind == 's3':
+        required('s3fs', what)
+    elif kind == 'gs':
+        required('gcsfs', what)
+    elif kind == 'http':
+        required('aiohttp', what)
+    return fsspec.get_filesystem_class(kind if kind != 'http' else scheme_of(uri))
+
+
+def _filesystem(uri: str) -> tuple[Any, str]:
+    """Return the file system of fsspec for `uri`, connected where it needs that, and the path in it.
+
+    Keys and passwords come from fsspec's configuration, from AWS's and Google's own files and variables,
+    and from ssh's agent, keys and config. Raises whatever fsspec raises.
+    """
+    kind, files = _kind(uri), _filesystem_class(uri)
+    logging.getLogger('asyncio').addFilter(_is_new)
+    own = importlib.import_module('fsspec').config.conf
+    if kind == 'ssh':
+        return _ssh(files, uri, {**own.get('ssh', {}), **own.get('sftp', {})})
+    options = {**files._get_kwargs_from_urls(uri), 'use_listings_cache': False}
+    if kind == 'http':
+        aiohttp = importlib.import_module('aiohttp')
+        timeout = aiohttp.ClientTimeout(total=None, sock_connect=CONNECT, sock_read=SILENCE)
+        plain = {'timeout': timeout, 'headers': {'Accept-Encoding': 'identity'}}
+        options['client_kwargs'] = {**plain, **own.get(scheme_of(uri), {}).get('client_kwargs', {})}
+    elif kind == 's3':
+        once = {'connect_timeout': CONNECT, 'read_timeout': SILENCE, 'retries': {'total_max_attempts': 1}}
+        options['config_kwargs'] = {**once, **own.get('s3', {}).get('config_kwargs', {})}
+    made = files(**options)
+    if kind == 's3':
+        made.retries = 1
+    return made, files._strip_protocol(uri)
+
+
+def _is_new(record: logging.LogRecord) -> bool:
+    """Return whether a line of asyncio says more than the error that a broken connection raises as well."""
+    return not record.getMessage().startswith(('Task exception was never', 'socket.send() raised'))
+
+
+def _ssh(files: Any, uri: str, own: dict[str, Any]) -> tuple[Any, str]:
+    """Return the SFTP of the host: sshfs itself trusts any host key and reads no configuration of fsspec."""
+    parts = urlsplit(uri)
+    options = {
+        'known_hosts': (),  # of the user, as ssh does; by itself sshfs trusts any host
+        'connect_timeout': CONNECT,
+        'login_timeout': SILENCE,
+        'keepalive_interval': CONNECT,
+        'keepalive_count_max': 3,
+        **own,
+        'host': parts.hostname or '',
+    }
+    if parts.port:
+        options['port'] = parts.port
+    if parts.username:
+        options['username'] = unquote(parts.username)
+    path = uri.partition('://')[2].partition('/')[2]
+    return files(**options), f'/{path.rstrip("/")}'

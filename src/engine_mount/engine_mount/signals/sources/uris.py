@@ -1,6 +1,7 @@
-"""Addresses of recordings: what is a URI and what a path; one that holds a secret is refused."""
+"""Addresses of recordings: URIs and paths; a URI that holds a secret is refused."""
 
 import re
+from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit, urlunsplit
 
 from engine_mount.signals.sources.source import SourceError
@@ -21,8 +22,26 @@ def is_uri(text: str) -> bool:
     return _URI.match(text) is not None
 
 
+def is_local(uri: str) -> bool:
+    """Return whether `uri` is a path or file://; raises `SourceError` for an unknown scheme."""
+    return not is_uri(uri) or scheme_of(uri) == 'file'
+
+
+def local_path(uri: str) -> Path:
+    """Return what a file:// URI or a plain path means; raises `SourceError` for another machine's."""
+    if not is_uri(uri):
+        return Path(uri)
+    machine = urlsplit(uri).netloc
+    if machine not in ('', 'localhost'):
+        raise SourceError(
+            f'{uri} names the machine {machine}; a path of this machine has three slashes, '
+            'as in file:///data/a.mcap'
+        )
+    return Path(unquote(uri.partition('://')[2].removeprefix(machine)))
+
+
 def scheme_of(uri: str) -> str:
-    """Return the scheme of a URI in small letters; raises `SourceError` where nothing is fetched by it."""
+    """Return the scheme of a URI in small letters; raises `SourceError` for one that is not supported."""
     match = _URI.match(uri)
     scheme = match[1].lower() if match else ''
     if scheme not in SCHEMES:
@@ -35,43 +54,39 @@ def scheme_of(uri: str) -> str:
 
 def checked(uri: str) -> str:
     """Return `uri`; raises `SourceError` where its scheme is unknown or it holds a secret."""
-    scheme = scheme_of(uri)
     parts = urlsplit(uri)
-    inside = 'a password' if parts.password is not None else ''
-    if scheme in _WITH_QUERY and (
-        found := [name for name, _ in parse_qsl(parts.query) if name.lower() in _SECRETS]
-    ):
-        inside = f'what permits reading ({found[0]})'
-    if inside:
+    query = parse_qsl(parts.query) if scheme_of(uri) in _WITH_QUERY else []
+    secrets = [f'what permits reading ({name})' for name, _ in query if name.lower() in _SECRETS]
+    if parts.password is not None:
+        secrets.append('a password')
+    if secrets:
         raise SourceError(
-            f'{shown(uri)} holds {inside}, which the history of the shell and the list of processes '
-            'tell others; leave it out: keys belong in the configuration of fsspec, of AWS or of ssh '
+            f'{shown(uri)} holds {secrets[-1]}, which the history of the shell and the list of processes '
+            'show to others; leave it out: keys belong in the configuration of fsspec, of AWS or of ssh '
             '(README of engine_mount.signals)'
         )
     return uri
 
 
 def shown(uri: str) -> str:
-    """Return `uri` as it may be told: without password, and of a query without values."""
+    """Return `uri` for messages: without password, and of a query without values."""
     match = _URI.match(uri)
     if match is None:
         return uri
-    scheme, rest = match[1].lower(), uri[match.end() :]
-    authority, slash, path = rest.partition('/')
+    authority, slash, path = uri[match.end() :].partition('/')
     user, at, host = authority.rpartition('@')
-    authority = f'{user.partition(":")[0]}{at}{host}'
-    if scheme in _WITH_QUERY and '?' in path:
+    if match[1].lower() in _WITH_QUERY and '?' in path:
         path = path.partition('?')[0] + '?...'
-    return f'{match[1]}://{authority}{slash}{path}'
+    return f'{match[1]}://{user.partition(":")[0]}{at}{host}{slash}{path}'
 
 
 def name_of(uri: str) -> str:
-    """Return the last part of a path: what a local copy is called."""
+    """Return the last part of the path of a URI: the name of a local copy."""
     scheme = scheme_of(uri)
-    path = uri.partition('://')[2].rstrip('/')
+    path = uri.partition('://')[2]
     if scheme in _WITH_QUERY:
-        path = path.partition('?')[0].rstrip('/')
-    last = path.rpartition('/')[2]
+        path = path.partition('?')[0]
+    last = path.rstrip('/').rpartition('/')[2]
     return unquote(last) if scheme in ('http', 'https', 'file') else last
 
 

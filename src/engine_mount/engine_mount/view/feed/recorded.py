@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.drives.live.playback import Playback
 from engine_mount.recordings.place import open_run
 from engine_mount.view.feed.feed import Fail, FeedError, Message, Receive
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
@@ -42,7 +41,8 @@ class Recorded:
         times = (self._arrivals - self._arrivals[0]) * 1e-9
         if not 0.0 <= begin <= times[-1]:
             raise FeedError(f'--from ({begin:g} s) must lie within 0 .. {times[-1]:.3f} s')
-        self._playback = Playback(times, times, rate, begin)
+        self._times, self._rate, self._begin = times, rate, begin
+        self._next = int(np.searchsorted(times, begin))
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._serve, name='recorded', daemon=True)
 
@@ -75,18 +75,20 @@ class Recorded:
 
     def _play(self) -> None:
         self._repeat_latched()
-        self._playback.play(time.monotonic())
-        while not self._ending.is_set() and not self._playback.finished:
-            for number in self._playback.due(time.monotonic()):
+        start = time.monotonic()
+        while not self._ending.is_set() and self._next < len(self._times):
+            position = self._begin + self._rate * (time.monotonic() - start)
+            while self._next < len(self._times) and self._times[self._next] <= position:
                 if self._ending.is_set():
                     return
-                self._receive(self._message(number))
+                self._receive(self._message(self._next))
+                self._next += 1
             self._ending.wait(_PERIOD)
 
     def _repeat_latched(self) -> None:
         """Give out the last message before the beginning of topics that come once."""
         for owner, (topic, _) in enumerate(self._series):
-            before = np.flatnonzero(self._owners[: self._playback.next] == owner)
+            before = np.flatnonzero(self._owners[: self._next] == owner)
             if topic.rate == 0.0 and before.size:
                 self._receive(self._message(int(before[-1])))
 

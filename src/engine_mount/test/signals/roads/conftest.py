@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine_mount.signals.formats.measured import Provenance
-from engine_mount.signals.roads.profile import RoadProfile
+from engine_mount.signals.roads.iso8608 import RoadProfile
 from mount_sim.excitation.road import RandomRoad, random_road
 
 SEPARATOR = '$' * 80

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from engine_mount.signals.roads.crg_file import FORMATS, parse_crg
-from engine_mount.signals.roads.profile import ProfileError
-from engine_mount.signals.roads.reading import road_profile
+from engine_mount.signals.roads.crg import FORMATS
+from engine_mount.signals.roads.table import road_profile
+from engine_mount.signals.signal import SignalError
 
 INCREMENT = 0.02
 V = np.array([-1.5, -0.5, 0.0, 1.5])
@@ -21,7 +21,7 @@ def grid(seed=3, rows=ROWS):
 
 
 def refusal(path, **how):
-    with pytest.raises(ProfileError) as caught:
+    with pytest.raises(SignalError) as caught:
         road_profile(path, **how)
     return str(caught.value)
 
@@ -103,20 +103,24 @@ def test_a_file_that_is_cut_off_or_converted_is_refused(tmp_path, write_crg):
     assert f'text.crg, line {len(lines) - 2}: ' in refusal(text)
 
 
-def test_a_file_without_heights_is_refused_unless_it_refers_to_one(tmp_path, write_crg):
-    write_crg(tmp_path / 'made.crg', grid(), INCREMENT, V, 'LRFI')
+def test_a_file_without_heights_is_refused_with_the_one_that_it_refers_to(tmp_path):
     master = tmp_path / 'master.crg'
     master.write_text(
         '$CT\nby reference\n$\n$ROAD_CRG_FILE\n* a comment\n  ma\n  de.crg  ! in two lines\n$\n'
     )
-    np.testing.assert_array_equal(road_profile(master).height, road_profile(tmp_path / 'made.crg').height)
-    master.write_text(master.read_text() + '$ROAD_CRG_MODS\nSCALE_Z_GRID = 2.0\nREFPOINT_X = 3\n$\n')
-    doubled = road_profile(master)
-    np.testing.assert_allclose(doubled.height, 2.0 * road_profile(tmp_path / 'made.crg').height)
-    assert 'SCALE_Z_GRID 2 is applied' in doubled.notes
-    assert 'modifiers that are not applied: REFPOINT_X' in doubled.notes
+    assert 'no table of heights: give the file that it refers to, made.crg' in refusal(master)
     master.write_text('$CT\nnothing\n$\n')
     assert 'no table of heights' in refusal(master)
+
+
+def test_a_scale_of_the_heights_is_refused_and_other_modifiers_do_no_harm(tmp_path, write_crg):
+    harmless = {'ROAD_CRG_MODS': {'REFPOINT_X': 3, 'SCALE_SLOPE': 1.0}}
+    assert (
+        road_profile(write_crg(tmp_path / 'a.crg', grid(), INCREMENT, V, more=harmless)).height.size == ROWS
+    )
+    scaled = {'ROAD_CRG_MODS': {'SCALE_Z_GRID': 2.0}}
+    words = refusal(write_crg(tmp_path / 'b.crg', grid(), INCREMENT, V, more=scaled))
+    assert 'SCALE_Z_GRID in $ROAD_CRG_MODS changes the heights' in words
 
 
 def test_heights_in_another_unit_or_of_another_kind_are_refused(tmp_path, write_crg):
@@ -125,14 +129,6 @@ def test_heights_in_another_unit_or_of_another_kind_are_refused(tmp_path, write_
     assert 'are they in mm' in refusal(path)
     text = write_crg(tmp_path / 'mu.crg', grid(), INCREMENT, V, 'LRFI')
     text.write_bytes(text.read_bytes().replace(b'0.000,m ', b'0.000,1 '))
-    assert 'is in 1; OpenCRG gives heights in m' in refusal(text)
+    assert 'channels must be long sections in m' in refusal(text)
     text.write_bytes(text.read_bytes().replace(b'#:LRFI', b'#:LRBI'))
-    assert 'numbers in format LRBI are not read' in refusal(text)
-
-
-def test_places_come_from_the_virtual_channel_where_there_is_one():
-    text = '$ROAD_CRG\nREFERENCE_LINE_INCREMENT=1.0\n$\n$KD_DEFINITION\n#:LRFI\n'
-    text += 'U:reference line u,m,730.0,0.01\n'
-    file = parse_crg('x.crg', (text + 'D:long section 1,m\n$\n$$$$\n 0.0000000\n').encode())
-    assert file.virtual[0].numbers == (730.0, 0.01)
-    assert file.channels[0].title == 'long section 1'
+    assert 'in format LRBI are not read' in refusal(text)

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from engine_mount.signals.roads.inversion import BAND, chassis_response, in_band, road_of
-from engine_mount.signals.roads.inverting import inverted
-from engine_mount.signals.roads.profile import ProfileError
-from engine_mount.signals.roads.speed import Speed, speed_of
-from engine_mount.signals.signal import signal_of
+from engine_mount.signals.roads.driving import Speed, speed_of
+from engine_mount.signals.roads.inversion import BAND, chassis_response, in_band, inverted, road_of
+from engine_mount.signals.signal import SignalError, signal_of
 from mount_sim.excitation.road import RandomRoad, random_road
 from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
@@ -89,8 +87,8 @@ def test_where_the_car_stands_no_road_is_told(recorded):
     every = round(0.002 / STEP_TIME)
     signal = signal_of('az', STEP_TIME * np.arange(STEPS)[::every], acceleration[::every])
     stopping = Speed(np.array([0.0, 10.0, 20.0]), np.array([20.0, 0.0, 20.0]), '')
-    with pytest.raises(ProfileError, match='at less than 1 m/s no road can be told'):
+    with pytest.raises(SignalError, match='at less than 1 m/s no road can be told'):
         inverted(signal, stopping)
     short = Speed(np.array([0.0, 10.0]), np.array([20.0, 20.0]), '')
-    with pytest.raises(ProfileError, match='the speed ends at 10 s'):
+    with pytest.raises(SignalError, match='the speed ends at 10 s'):
         inverted(signal, short)

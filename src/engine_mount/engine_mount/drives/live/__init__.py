@@ -1,1 +1,0 @@
-"""A recording published by the wall clock."""

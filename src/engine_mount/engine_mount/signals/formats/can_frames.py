@@ -1,0 +1,193 @@
+"""CAN frames, of logs and within MDF 4 files, decoded by a user's database: a column for each signal."""
+
+from array import array
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from engine_mount.signals.formats.content import Content, Leaf, Stated, readable
+from engine_mount.signals.formats.measured import FloatArray, TimeBase
+from engine_mount.signals.signal import SECOND, SignalError
+
+Key = tuple[str, int]
+"""Bus, and identifier of a message, with `_EXTENDED` in it where that is an extended one."""
+_EXTENDED = 0x80000000
+_DATED = 1e8  # s, chosen: no recording is three years long, so that later times count from 1970
+_NAMED = 5  # unknown identifiers in a note, chosen
+FRAME = 'CAN_DataFrame'
+"""The channel of an MDF file that holds frames, a record of what `_MEMBERS` name and others."""
+_MEMBERS = ('ID', 'DataLength', 'DataBytes')
+_AT_ONCE = 1 << 17  # frames, chosen: 10 MB of classic frames
+
+
+class Frames:
+    """Frames of a file by bus and message of the database `dbc`; `notes` grow with what is left out."""
+
+    def __init__(self, path: Path, dbc: Path, notes: list[str]):
+        from mount_driver.can_library import cantools
+
+        with readable(dbc, 'database of CAN messages', 'give a .dbc, .arxml, .kcd or .sym file'):
+            messages = cantools.database.load_file(str(dbc), strict=False).messages
+        self._messages: dict[int, Any] = {
+            one.frame_id | _EXTENDED * one.is_extended_frame: one for one in messages
+        }
+        self._path, self._dbc = path, dbc
+        self._times: dict[Key, array[float]] = {}
+        self._payloads: dict[Key, list[bytes]] = {}
+        self._unknown: Counter[int] = Counter()
+        self._notes = notes
+
+    def add(self, bus: str, identifier: int, extended: bool, time: float, data: bytes) -> None:
+        """Add a frame; `time` in s."""
+        key = bus, identifier | _EXTENDED * extended
+        if key[1] not in self._messages:
+            self._unknown[key[1]] += 1
+            return
+        self._times.setdefault(key, array('d')).append(time)
+        self._payloads.setdefault(key, []).append(data)
+
+    def leaves(self, begin: int = 0) -> tuple[list[Leaf], Callable[[Sequence[int]], None]]:
+        """Return the signals there are, and what decodes those of chosen numbers.
+
+        `begin` (ns since 1970, or 0) is when times begin that do not count from 1970 themselves. Raises
+        `SignalError` where no frame is known.
+        """
+        unknown = ', '.join(f'0x{key & ~_EXTENDED:X} ({n})' for key, n in self._unknown.most_common(_NAMED))
+        if not self._times:
+            raise SignalError(
+                f'{self._path} holds no frame that {self._dbc.name} names ({unknown or "it is empty"}); is '
+                'it the database of another bus?'
+            )
+        if unknown:
+            self._notes.append(
+                f'{self._unknown.total()} frames of {len(self._unknown)} identifiers that {self._dbc.name} '
+                f'does not name: {unknown}'
+            )
+        buses = Counter(key for _, key in self._times)
+        places = [(key, signal) for key in sorted(self._times) for signal in self._messages[key[1]].signals]
+        columns: dict[int, tuple[FloatArray, TimeBase]] = {}
+
+        def prepare(numbers: Sequence[int]) -> None:
+            for key in dict.fromkeys(places[number][0] for number in numbers):
+                wanted = {number: places[number][1].name for number in numbers if places[number][0] == key}
+                columns.update(self._decoded(key, wanted, begin))
+
+        leaves = []
+        for number, (key, signal) in enumerate(places):
+            bus = f'{key[0]}/' if buses[key[1]] > 1 else ''
+            name = f'{bus}{self._messages[key[1]].name}.{signal.name}'
+            read, clock = (lambda number=number, part=part: columns[number][part] for part in (0, 1))
+            leaves.append(Leaf(name, read, signal.unit or '', signal.name, clock=clock))
+        return leaves, prepare
+
+    def _decoded(
+        self, key: Key, wanted: dict[int, str], begin: int
+    ) -> dict[int, tuple[FloatArray, TimeBase]]:
+        """Return the wanted signals (number: name) of a message at the times of frames that hold them.
+
+        Frames that do not decode are counted.
+        """
+        message, payloads = self._messages[key[1]], self._payloads[key]
+        columns = {name: np.full(len(payloads), np.nan) for name in wanted.values()}
+        faulty, reason = 0, ''
+        for place, data in enumerate(payloads):
+            try:
+                values = message.decode(data, decode_choices=False)
+            except Exception as error:  # bitstruct and cantools raise several kinds
+                faulty, reason = faulty + 1, reason or str(error)
+                continue
+            for name in columns.keys() & values.keys():
+                columns[name][place] = values[name]
+        if faulty:
+            self._notes.append(
+                f'{message.name}: {faulty} of {len(payloads)} frames do not decode ({reason}), left out'
+            )
+        times, bases = np.array(self._times[key]), dict[bytes, TimeBase]()
+        if all(one[0] > _DATED for one in self._times.values()):
+            first = min(one[0] for one in self._times.values())
+            times, begin = times - first, round(first * SECOND)
+        found = {}
+        for number, name in wanted.items():
+            known = ~np.isnan(columns[name])
+            told = f'times of the frames of {message.name}'
+            base = bases.setdefault(known.tobytes(), TimeBase(times[known], begin, told))
+            found[number] = columns[name][known], base
+        return found
+
+
+def open_can_log(path: Path, stated: Stated) -> Content:
+    """Return the signals of a log of CAN frames as `Message.Signal`."""
+    from mount_driver.can_library import can
+
+    if stated.dbc is None:
+        raise SignalError(
+            f'{path} holds CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
+        )
+    notes: list[str] = []
+    frames, other = Frames(path, stated.dbc, notes), 0
+    suffix = path.suffix.lower()
+    arguments = {'relative_timestamp': False} if suffix == '.asc' else {}
+    with readable(path, 'CAN log'), can.LogReader(str(path), **arguments) as reader:
+        for one in reader:
+            if one.is_error_frame or one.is_remote_frame:
+                other += 1
+                continue
+            bus = '' if one.channel is None else str(one.channel)
+            frames.add(bus, one.arbitration_id, one.is_extended_id, one.timestamp, bytes(one.data))
+    if other:
+        notes.append(f'{other} error and remote frames are left out')
+    leaves, prepare = frames.leaves()
+    return Content(path, f'CAN log {suffix}', 'python-can, cantools', leaves, notes, prepare)
+
+
+def is_can_log(path: Path) -> bool:
+    """Return whether a text file is a log of CAN frames: ASC and candump share their suffixes with tables."""
+    suffix = path.suffix.lower()
+    if suffix in ('.blf', '.trc'):
+        return True
+    with path.open('rb') as file:
+        lines = file.read(4096).decode('latin-1').splitlines()
+    if suffix == '.asc':
+        return any(line.startswith(('date ', 'base hex', 'base dec')) for line in lines)
+    return suffix == '.log' and any(line.startswith('(') and '#' in line for line in lines[:5])
+
+
+def frames_in_mdf(file: Any, path: Path, dbc: Path, notes: list[str]) -> Frames:
+    """Return all frames of an opened MDF file, as ASAM MDF bus logging records them.
+
+    asammdf decodes frames itself, but takes those that are too short for their message as filled with zeros;
+    so they are decoded here as those of logs are. Raises `SignalError`.
+    """
+    frames = Frames(path, dbc, notes)
+    for number, group in enumerate(file.groups):
+        for index, channel in enumerate(group.channels):
+            if channel.name == FRAME:
+                for first in range(0, int(group.channel_group.cycles_nr), _AT_ONCE):
+                    _add_records(frames, path, file.get(
+                        group=number, index=index, record_offset=first, record_count=_AT_ONCE
+                    ))  # fmt: skip
+    return frames
+
+
+def _add_records(frames: Frames, path: Path, signal: Any) -> None:
+    samples = signal.samples
+    members = {str(name).rpartition('.')[2]: samples[name] for name in samples.dtype.names or ()}
+    missing = [name for name in _MEMBERS if name not in members]
+    if missing:
+        raise SignalError(
+            f'{path}: its {FRAME} has no {", ".join(missing)}; needed are {", ".join(_MEMBERS)} of ASAM MDF '
+            'bus logging'
+        )
+    none = np.zeros(len(samples), np.int64)
+    identifiers = members['ID'].astype(np.int64)
+    extended = members.get('IDE', none).astype(bool) | (identifiers & _EXTENDED > 0)
+    rows = zip(
+        members.get('BusChannel', none).tolist(), (identifiers & 0x1FFFFFFF).tolist(), extended.tolist(),
+        signal.timestamps.tolist(), members['DataBytes'].astype(np.uint8), members['DataLength'].tolist(),
+        strict=True,
+    )  # fmt: skip
+    for bus, identifier, is_extended, time, data, length in rows:
+        frames.add(str(bus), identifier, is_extended, time, data[:length].tobytes())

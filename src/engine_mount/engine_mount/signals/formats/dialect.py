@@ -1,0 +1,181 @@
+"""Which delimiter and decimal sign a text table has: those under which its lines are a table of numbers.
+
+Every pair of the two is tried. Those under which the lines have equal widths and each column holds one kind
+of cells are possible; of these the ones with the fewest columns of text stay. Where more than one is left and
+they differ, the titles decide; where these do not either, the table is refused.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from engine_mount.signals.formats.cells import ALONE, BLANK, cells_of, kind_of, number_in
+from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.signal import SignalError
+
+COMMENTS = ('#', '%', '//')
+_NAMES = {
+    ';': 'semicolon', '\t': 'tab', ',': 'comma', '|': 'stroke', BLANK: 'blanks', ALONE: 'one column',
+}  # fmt: skip
+_STATED = {name: sign for sign, name in _NAMES.items()} | {'\\t': '\t', ' ': BLANK}
+_MOST = 2000  # lines that are looked at, chosen
+_ENOUGH = 0.5  # of the lines behind the first that fits, chosen: fewer are no table
+Lines = Sequence[tuple[int, str]]
+"""Lines of a file with their numbers from 1 on."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """One way to read the lines: the kinds of the columns, and which line is the first of the samples.
+
+    `rows` are the cells of the samples that were looked at.
+    """
+
+    delimiter: str
+    decimal: str
+    kinds: tuple[str, ...]
+    first: int
+    rows: tuple[tuple[str, ...], ...]
+
+    @property
+    def told(self) -> str:
+        """The dialect in words."""
+        name = _NAMES.get(self.delimiter, repr(self.delimiter))
+        return f'{name}, decimal {"point" if self.decimal == "." else "comma"}'
+
+    @property
+    def texts(self) -> float:
+        """Share of columns that hold text."""
+        return self.kinds.count('text') / len(self.kinds)
+
+    @property
+    def numbers(self) -> list[list[float]]:
+        """What the cells of numbers are under this dialect, -1 for those that are none (to compare two)."""
+        return [
+            [
+                number_in(cell, self.decimal) if kind_of(cell, self.decimal) == kind == 'number' else -1.0
+                for cell, kind in zip(row, self.kinds, strict=False)
+            ]
+            for row in self.rows
+        ]
+
+
+def find_dialect(path: Path, head: Lines, later: Sequence[str], stated: Stated) -> Dialect:
+    """Return how to read the lines at the beginning, `head`, and those `later`; raises `SignalError`."""
+    lines = [(number, text) for number, text in head if text.strip() and not is_comment(text)]
+    later = [text for text in later if text.strip() and not is_comment(text)]
+    delimiters = [_STATED.get(stated.delimiter, stated.delimiter)] if stated.delimiter else list(_NAMES)
+    tried = [
+        _table(lines, later, delimiter, decimal)
+        for delimiter in delimiters
+        for decimal in stated.decimal or '.,'
+    ]
+    possible = [dialect for dialect in tried if dialect is not None]
+    least = min((dialect.texts for dialect in possible), default=0.0)
+    found: list[Dialect] = []
+    for dialect in possible:
+        if dialect.texts == least and not any(_same(dialect, other) for other in found):
+            found.append(dialect)
+    if len(found) > 1:
+        found = [dialect for dialect in found if _fits_titles(dialect, lines)] or found
+    if not found:
+        raise SignalError(_no_table(path, lines))
+    if len(found) > 1:
+        ways = ' or '.join(
+            f'{dialect.told} ({", ".join(dialect.rows[0][:4]).replace(chr(9), " ")})' for dialect in found
+        )
+        raise SignalError(
+            f'{path} can be read as {ways}; state --decimal or --delimiter, or export with semicolons'
+        )
+    _refuse_thousands(path, found[0], stated)
+    return found[0]
+
+
+def is_comment(line: str) -> bool:
+    """Return whether a line is a comment."""
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _table(lines: Lines, later: Sequence[str], delimiter: str, decimal: str) -> Dialect | None:
+    """Return the table that lines are under a delimiter and a decimal sign, None where they are none."""
+    rows = [tuple(cells_of(text, delimiter)) for _, text in lines[:_MOST]]
+    half = rows[len(rows) // 2 :] + [tuple(cells_of(text, delimiter)) for text in later]
+    width = Counter(map(len, half)).most_common(1)[0][0] if half else 0
+    body = [row for row in half if len(row) == width]
+    kinds = tuple(_kind([row[place] for row in body], decimal) for place in range(width))
+    fitting = [_fits(row, kinds, decimal) for row in rows]
+    if 'number' not in kinds or not any(fitting) or (width == 1) != (delimiter == ALONE):
+        return None
+    if delimiter == decimal and not any(decimal in cell for row in body for cell in row):
+        return None  # it separates cells, and stands in none
+    first = fitting.index(True)
+    if sum(fitting[first:]) < _ENOUGH * (len(fitting) - first):
+        return None
+    return Dialect(delimiter, decimal, kinds, lines[first][0], tuple(rows[first:]) + tuple(body))
+
+
+def _kind(cells: Sequence[str], decimal: str) -> str:
+    """Return what most cells of a column are, those without a value aside."""
+    kinds = Counter(kind_of(cell, decimal) for cell in cells)
+    kinds.pop('missing', None)
+    return kinds.most_common(1)[0][0] if kinds else 'missing'
+
+
+def _fits(row: Sequence[str], kinds: Sequence[str], decimal: str) -> bool:
+    if len(row) != len(kinds):
+        return False
+    pairs = [(kind_of(cell, decimal), kind) for cell, kind in zip(row, kinds, strict=True) if kind != 'text']
+    return all(one in (kind, 'missing') for one, kind in pairs) and any(one == kind for one, kind in pairs)
+
+
+def _same(one: Dialect, other: Dialect) -> bool:
+    """Return whether two ways give the same columns with the same numbers."""
+    return one.kinds == other.kinds and one.rows == other.rows and one.numbers == other.numbers
+
+
+def _fits_titles(dialect: Dialect, lines: Lines) -> bool:
+    """Return whether the line above the samples has the same width, and all its cells are words."""
+    above = [text for number, text in lines if number < dialect.first]
+    if not above:
+        return False
+    if dialect.delimiter == ALONE:
+        return not any(sign in above[-1] for sign in ';\t,|')
+    cells = cells_of(above[-1], dialect.delimiter)
+    kinds = {kind_of(cell, dialect.decimal) for cell in cells}
+    return len(cells) == len(dialect.kinds) and 'number' not in kinds
+
+
+def _refuse_thousands(path: Path, dialect: Dialect, stated: Stated) -> None:
+    """Raise `SignalError` where every decimal sign may group thousands: three digits follow each.
+
+    A point is doubted only beside semicolons (chosen): where these stand, the decimal sign is a comma.
+    """
+    if stated.decimal or (dialect.decimal == '.' and dialect.delimiter != ';'):
+        return
+    for place, kind in enumerate(dialect.kinds):
+        cells = [row[place] for row in dialect.rows if len(row) == len(dialect.kinds)]
+        signed = [cell for cell in cells if dialect.decimal in cell]
+        if kind == 'number' and len(signed) != len(cells) and signed and all(map(_is_grouped, signed)):
+            cell, sign = signed[0], dialect.decimal
+            raise SignalError(
+                f'{path}: column {place} holds {cell!r} beside whole numbers, which may be '
+                f'{cell.replace(sign, ",."[sign == ","])} or {cell.replace(sign, "")}; state it with '
+                '--decimal, or export without signs between thousands'
+            )
+
+
+def _is_grouped(cell: str) -> bool:
+    head, _, tail = cell.lstrip('+-').replace(',', '.').partition('.')
+    return len(tail) == 3 and tail.isdecimal() and 1 <= len(head) <= 3 and not head.startswith('0')
+
+
+def _no_table(path: Path, lines: Lines) -> str:
+    if not lines:
+        return f'{path} holds comments and blank lines only; needed are lines of numbers'
+    number, text = lines[len(lines) // 2]
+    return (
+        f'{path}, line {number}: {text.strip()[:80]!r} is no line of a table of numbers; expected are lines '
+        'of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, no signs '
+        'between thousands'
+    )

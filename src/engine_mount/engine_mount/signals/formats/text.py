@@ -1,0 +1,290 @@
+"""Text tables: encoding, titles and units above the samples, and the samples by pyarrow.
+
+Where pyarrow is missing or finds a fault, the cells are read one by one, which names the fault.
+"""
+
+import codecs
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.signals.formats.cells import ALONE, BLANK, MISSING, cells_of, date_in, kind_of, number_in
+from engine_mount.signals.formats.content import Content, Leaf, Stated, with_dates
+from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment
+from engine_mount.signals.formats.headers import is_unit_row, titles_and_units
+from engine_mount.signals.signal import SignalError
+
+HEAD = 1 << 18
+"""B at the beginning of a file by which its dialect is found, chosen: some thousand lines."""
+BLOCK = 1 << 22
+"""Letters read at once, chosen: larger ones are read no faster."""
+_ELSEWHERE = 1 << 16  # B in the middle and at the end, chosen: a decimal sign may come late
+_LONGEST = 1 << 24  # letters, chosen: a line of samples is far shorter
+_GAPS = re.compile(r'\t+|\s{2,}')
+_NO_SAMPLES = re.compile(r'^[ \t]*(?:(?:#|%|//)[^\n]*)?$', re.MULTILINE)
+_RUNS, _ENDS = re.compile(r'[ \t]+'), re.compile(r'^\t|\t$', re.MULTILINE)
+_KINDS = {'number': 'float64', 'missing': 'float64', 'date': 'datetime64[ns]'}
+
+
+def open_text(path: Path, stated: Stated) -> Content:
+    """Return the columns of a text table; raises `SignalError`."""
+    codec = _codec(path)
+    head = next(_blocks(path, codec, HEAD), '').split('\n')
+    dialect = find_dialect(path, list(enumerate(head, 1)), _later(path, codec), stated)
+    titles, units, first, notes = _titles(path, dialect, head[: dialect.first - 1])
+    if len(titles) > 1 and not titles[-1] and dialect.kinds[-1] == 'missing':
+        titles = titles[:-1]  # behind a delimiter at the end of each line
+    columns: dict[int, NDArray[Any]] = {}
+    dates = [place for place, kind in enumerate(dialect.kinds) if kind == 'date'][:1]
+
+    def prepare(numbers: Sequence[int]) -> None:
+        places = list(dict.fromkeys([*numbers, *dates]))
+        columns.update(zip(places, _read(path, codec, dialect, first, places, titles), strict=True))
+
+    leaves = []
+    for place, (name, header, unit) in enumerate(titles_and_units(titles, units)):
+        kind = dialect.kinds[place]
+        read = None if kind == 'text' else partial(columns.__getitem__, place)
+        leaves.append(Leaf(name, read, unit, header, date=kind == 'date'))
+    notes.insert(0, f'read as {dialect.told}, {codec}')
+    return Content(path, 'text table', 'engine_mount.signals', with_dates(path, leaves), notes, prepare)
+
+
+def _codec(path: Path) -> str:
+    """Return UTF-8 or UTF-16 by its mark or its bytes, else Windows-1252; raises `SignalError`."""
+    with path.open('rb') as file:
+        head = file.read(HEAD)
+    if not head.strip():
+        raise SignalError(f'{path} is empty; needed are lines of numbers')
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return 'utf-16'
+    zeros = [head[place::2].count(0) for place in (0, 1)]
+    for codec, place in (('utf-16-be', 0), ('utf-16-le', 1)):
+        if zeros[place] > 0.4 * len(head) / 2 and zeros[1 - place] == 0:
+            return codec
+    if any(zeros):
+        raise SignalError(
+            f'{path} is no text: byte {head.index(0)} is 0; give a text table, or name the file by its format'
+        )
+    try:
+        codecs.getincrementaldecoder('utf-8')().decode(head)
+    except UnicodeDecodeError:
+        return 'cp1252'
+    return 'utf-8-sig' if head.startswith(codecs.BOM_UTF8) else 'utf-8'
+
+
+def _blocks(path: Path, codec: str, size: int) -> Iterator[str]:
+    """Yield whole lines, each ended by a line feed but the last."""
+    with path.open(encoding=codec, errors='replace') as file:
+        while block := file.read(size):
+            yield block + file.readline(_LONGEST)
+
+
+def _later(path: Path, codec: str) -> list[str]:
+    """Return some lines of the middle and of the end of a long file."""
+    size, lines = path.stat().st_size, list[str]()
+    if size > HEAD + 2 * _ELSEWHERE and not codec.startswith('utf-16'):
+        with path.open('rb') as file:
+            for place in (size // 2, size - _ELSEWHERE):
+                file.seek(place)
+                lines += file.read(_ELSEWHERE).decode(codec, 'replace').splitlines()[1:-1]
+    return lines
+
+
+# Titles.
+
+
+def _titles(
+    path: Path, dialect: Dialect, above: Sequence[str]
+) -> tuple[list[str], list[str], int, list[str]]:
+    """Return titles, units or [], the number of the first line of samples, and notes."""
+    plain = [text for text in above if text.strip() and not is_comment(text)]
+    found = [_as_titles(text, dialect) for text in plain]
+    units = found.pop() if len(found) > 1 and found[-2] and is_unit_row(found[-1]) else []
+    if found and found[-1]:
+        return found[-1], units, dialect.first, _left_out(plain[: len(found) - 1])
+    if plain and plain[-1] == above[-1]:
+        _refuse_other_width(path, dialect, plain[-1])
+    comments = [text for text in above if is_comment(text)]
+    commented = _as_commented(comments[-1], dialect) if comments else []
+    if commented:
+        return commented, [], dialect.first, _left_out(plain)
+    row = dialect.rows[0]
+    width = len(dialect.kinds)
+    counted = [cell for cell in row if cell]
+    fractions = sum(dialect.decimal in cell for other in dialect.rows[1:] for cell in other)
+    if (
+        len(counted) > 1
+        and counted == [str(place) for place in range(len(counted))]
+        and 2 * fractions >= len(dialect.rows[1:])
+    ):  # as an export of a frame without names begins
+        names = [cell or 'index' for cell in row]
+        return names, [], dialect.first + 1, ['the first line is taken as numbers of the columns']
+    names = [str(place) for place in range(width)]
+    if dialect.kinds[-1] == 'missing':
+        names[-1] = ''
+    return names, [], dialect.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
+
+
+def _as_titles(text: str, dialect: Dialect) -> list[str]:
+    """Return the titles in a line, [] where they are not as many as the columns, or numbers."""
+    width = len(dialect.kinds)
+    cells = [text.strip().strip('"')] if dialect.delimiter == ALONE else cells_of(text, dialect.delimiter)
+    if dialect.delimiter == BLANK and len(cells) != width:
+        cells = _GAPS.split(text.strip())
+    while len(cells) > width and not cells[-1]:
+        cells = cells[:-1]
+    if len(cells) == width - 1 and dialect.kinds[-1] == 'missing':
+        cells = [*cells, '']
+    words = [cell for cell in cells if kind_of(cell, dialect.decimal) not in ('number', 'missing')]
+    return cells if len(cells) == width and words else []
+
+
+def _as_commented(text: str, dialect: Dialect) -> list[str]:
+    """Return the titles that a comment holds, [] where it holds none."""
+    bare = text.strip().lstrip(''.join(COMMENTS)).strip()
+    ways = (cells_of(bare, dialect.delimiter), _GAPS.split(bare), re.split(r'\s*,\s*', bare), bare.split())
+    fitting = (cells for cells in ways if len(cells) == len(dialect.kinds) and all(cells))
+    return next((cells for cells in fitting if not all(map(_is_number, cells))), [])
+
+
+def _is_number(cell: str) -> bool:
+    return 'number' in (kind_of(cell, '.'), kind_of(cell, ','))
+
+
+def _refuse_other_width(path: Path, dialect: Dialect, text: str) -> None:
+    """Raise `SignalError` where the line just above the samples looks like titles of other columns."""
+    cells, width = cells_of(text, dialect.delimiter), len(dialect.kinds)
+    if len(cells) > 1 and width > 1 and all(cell and not _is_number(cell) for cell in cells):
+        raise SignalError(
+            f'{path}, line {dialect.first - 1}: {len(cells)} titles ({", ".join(cells)[:80]}) above lines '
+            f'of {width} cells ({", ".join(dialect.rows[0])[:80]}); is a decimal comma among commas? Export '
+            'with semicolons, or with one title for each column'
+        )
+
+
+def _left_out(lines: Sequence[str]) -> list[str]:
+    return (
+        [f'{len(lines)} lines before the titles are left out, the first {lines[0][:60]!r}'] if lines else []
+    )
+
+
+# Samples.
+
+
+def _read(
+    path: Path, codec: str, dialect: Dialect, first: int, places: Sequence[int], titles: Sequence[str]
+) -> list[NDArray[Any]]:
+    """Return the columns at `places`; raises `SignalError` with line, column and cell."""
+    if not places:
+        return []
+    parts = []
+    for number, block in _samples(path, codec, dialect, first):
+        found = _in_bulk(block, dialect, places)
+        parts.append(found or _cell_by_cell(path, number, block, dialect, places, titles))
+    if not parts:
+        raise SignalError(f'{path} holds no samples; needed are lines below the titles')
+    return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+
+
+def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:
+    """Yield whole lines with the number of the first, without titles; lines without samples are empty."""
+    number = 1
+    for whole in _blocks(path, codec, BLOCK):
+        block, behind = whole, number + whole.count('\n')
+        if number < first:
+            skipped = min(first, behind) - number
+            block = block.split('\n', skipped)[skipped]
+            number += skipped
+        if any(sign in block for sign in (*COMMENTS, '\n ', '\n\t')) or block[:1] in (' ', '\t'):
+            block = _NO_SAMPLES.sub('', block)
+        if dialect.delimiter == BLANK:
+            block = _ENDS.sub('', _RUNS.sub('\t', block))
+        if block.strip():
+            yield number, block
+        number = behind
+
+
+def _in_bulk(block: str, dialect: Dialect, places: Sequence[int]) -> list[NDArray[Any]] | None:
+    """Return the columns of a block, None where pyarrow is missing or finds a fault."""
+    try:
+        import pyarrow
+        from pyarrow import csv as arrow_csv
+    except ImportError:
+        return None
+    dates = {place: dialect.kinds[place] == 'date' for place in places}
+    types = {
+        str(place): pyarrow.timestamp('ns') if date else pyarrow.float64() for place, date in dates.items()
+    }
+    data = block.encode()
+    try:
+        table = arrow_csv.read_csv(
+            pyarrow.BufferReader(data),
+            arrow_csv.ReadOptions(
+                use_threads=False, column_names=list(map(str, range(len(dialect.kinds)))),
+                block_size=len(data) + 1,
+            ),
+            arrow_csv.ParseOptions(delimiter='\t' if dialect.delimiter == BLANK else dialect.delimiter),
+            arrow_csv.ConvertOptions(
+                check_utf8=False, column_types=types, include_columns=list(types), null_values=MISSING,
+                decimal_point=dialect.decimal, quoted_strings_can_be_null=True,
+            ),
+            pyarrow.system_memory_pool(),  # gives back what a block took
+        )  # fmt: skip
+    except pyarrow.ArrowInvalid:
+        return None
+    columns = {place: table.column(str(place)) for place in places}
+    if any(date and columns[place].null_count for place, date in dates.items()):
+        return None
+    return [column.to_numpy() for column in columns.values()]
+
+
+def _cell_by_cell(
+    path: Path, first: int, block: str, dialect: Dialect, places: Sequence[int], titles: Sequence[str]
+) -> list[NDArray[Any]]:
+    """Return the columns of a block whose first line has the number `first`; raises `SignalError`."""
+    delimiter, width = '\t' if dialect.delimiter == BLANK else dialect.delimiter, len(dialect.kinds)
+    rows = []
+    for number, line in enumerate(block.split('\n'), first):
+        if not line:
+            continue
+        try:
+            cells = cells_of(line, delimiter)
+        except csv.Error as error:
+            raise SignalError(f'{path}, line {number}: {error}; is a quote missing?') from None
+        if len(cells) != width:
+            raise SignalError(
+                f'{path}, line {number}: {len(cells)} cells ({line.strip()[:80]!r}) where the others have '
+                f'{width}; complete the line or leave it out'
+            )
+        row = []
+        for place in places:
+            date = dialect.kinds[place] == 'date'
+            try:
+                row.append(date_in(cells[place]) if date else number_in(cells[place], dialect.decimal))
+            except ValueError:
+                where = f'{path}, line {number}, column {titles[place]!r}'
+                raise SignalError(f'{where}: {_fault(cells[place], dialect, date)}') from None
+        rows.append(row)
+    columns = zip(*rows, strict=True)
+    return [
+        np.array(column, np.int64).view(kind) if kind.startswith('date') else np.array(column, kind)
+        for column, kind in zip(columns, (_KINDS[dialect.kinds[place]] for place in places), strict=True)
+    ]
+
+
+def _fault(cell: str, dialect: Dialect, date: bool) -> str:
+    sign, other = ('point', 'comma') if dialect.decimal == '.' else ('comma', 'point')
+    remedy = 'correct or remove the line'
+    if not date and kind_of(cell, ',' if dialect.decimal == '.' else '.') == 'number':
+        remedy = f'is the decimal sign a {other}? Say so with --decimal, or correct the line'
+    elif not date and re.sub('[., ]', '', cell).lstrip('+-').isdecimal():
+        remedy = 'export without signs between thousands'
+    expected = 'a date such as 2024-05-01 12:00:00.001' if date else f'a number with decimal {sign}'
+    return f'{cell!r} is no number; expected is {expected}; {remedy}'

@@ -1,1 +1,0 @@
-"""Formats that nest: arrays by their paths, whatever file they come from."""

@@ -1,0 +1,231 @@
+"""Which column is which quantity, in what unit, and what its times are: as a user says it.
+
+One measuring system is one YAML file that a team shares; options of a command say more, or otherwise.
+"""
+
+import math
+from collections.abc import Mapping as Keys
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.quantities import QUANTITIES, Quantities, quantity, titled
+from engine_mount.signals.signal import SignalError
+from engine_mount.signals.units import is_unit, unit_of
+from mount_models.plain_yaml import YamlError, yaml_in_file
+
+MEAN = 'mean'
+"""The offset that is the mean of the signal."""
+
+
+@dataclass(frozen=True)
+class ColumnChoice:
+    """A column, by name or number, and what is said of it.
+
+    `unit` is '' where none is said. `scale` is a factor on the value in its unit, as -1 of an axis that
+    points down, or a calibration; where no unit is said, it leads to SI. `offset`, in SI, is subtracted:
+    a number, `mean`, or None where nothing is said of it.
+    """
+
+    column: str
+    unit: str = ''
+    scale: float | None = None
+    offset: float | str | None = None
+
+
+@dataclass(frozen=True)
+class TimeChoice:
+    """Where times stand, and in what unit; or the rate (Hz) of a file without. '' and None: not said."""
+
+    column: str = ''
+    unit: str = ''
+    rate: float | None = None
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What is said of a recording: `columns` by quantity, `others` by names of the user's own.
+
+    `system` says in words what measured; `option` is how a command says a column, for remedies. `stated` is
+    what no column tells of the file.
+    """
+
+    columns: Keys[str, ColumnChoice] = field(default_factory=dict)
+    others: Keys[str, ColumnChoice] = field(default_factory=dict)
+    time: TimeChoice = TimeChoice()
+    system: str = ''
+    option: str = '--column {quantity}={column}:{unit}'
+    stated: Stated = field(default_factory=Stated)
+
+    @property
+    def choices(self) -> dict[str, ColumnChoice]:
+        """All columns that are named."""
+        return {**self.others, **self.columns}
+
+    def only(self, columns: Keys[str, ColumnChoice]) -> 'Mapping':
+        """Return the mapping with these columns alone."""
+        return replace(self, columns=dict(columns), others={})
+
+    def of(self, known: Quantities) -> 'Mapping':
+        """Return the mapping of the `known` quantities alone, by the names that these have."""
+        pairs = ((name, one.mapped or name) for name, one in known.items())
+        there = {name: self.choices.get(name, self.choices.get(mapped)) for name, mapped in pairs}
+        return self.only({name: choice for name, choice in there.items() if choice is not None})
+
+
+def mapping_in_file(path: Path) -> Mapping:
+    """Return the mapping in a YAML file, such as
+
+    ```yaml
+    system: rack 2, string potentiometer and load cell
+    time: {column: t, unit: ms}            # or {rate: 1000}
+    columns:
+      displacement: {column: Weg, unit: mm, offset: mean}
+      acceleration: {column: az, unit: g, scale: -1}
+    others:
+      valve_pressure: {column: p2, unit: bar}
+    decimal: ","                           # of text tables that can be read in two ways; also delimiter
+    ```
+
+    Raises `SignalError`, for a key that is not known too.
+    """
+    try:
+        found = _keys(yaml_in_file(path), ('system', 'time', 'columns', 'others', 'decimal', 'delimiter'))
+        columns, others = (_keys(found.get(name, {}), None, name) for name in ('columns', 'others'))
+        for name in others:
+            if name in QUANTITIES or not (name.isidentifier() and name.isascii()):
+                raise SignalError(
+                    f'others: {name!r} must be a name of letters, digits and _ that is no quantity; '
+                    'a quantity stands below columns'
+                )
+        return Mapping(
+            {quantity(name).name: _column(value, name) for name, value in columns.items()},
+            {name: _column(value, name) for name, value in others.items()},
+            _time(found.get('time', {})),
+            str(found.get('system', '')),
+            stated=Stated(decimal=str(found.get('decimal', '')), delimiter=str(found.get('delimiter', ''))),
+        )
+    except YamlError as error:
+        raise SignalError(f'{path} {error}') from None
+    except SignalError as error:
+        raise SignalError(f'{path}: {error}') from None
+
+
+def with_options(
+    mapping: Mapping,
+    columns: Sequence[str] = (),
+    time: str = '',
+    rate: float | None = None,
+    scale: float | None = None,
+    default: str = '',
+    known: Quantities = QUANTITIES,
+    stated: Stated | None = None,
+) -> Mapping:
+    """Return the mapping with what options say, which goes before what a file says.
+
+    `columns` are `[QUANTITY=]COLUMN[:UNIT]`; where no quantity is written it is `default`, else what unit or
+    title tell; `time=COLUMN[:UNIT]` among them is as `time`. `scale` is that of the columns named. Raises
+    `SignalError`.
+    """
+    said: dict[str, ColumnChoice] = {}
+    for text in columns:
+        if text.startswith('time='):
+            time = text.partition('=')[2]
+            continue
+        name, choice = column_option(text, default, known)
+        if name in said:
+            raise SignalError(f'{name} is named twice, {said[name].column!r} and {choice.column!r}; name one')
+        before = mapping.columns.get(name, choice)
+        said[name] = (
+            choice if before.column != choice.column else replace(before, unit=choice.unit or before.unit)
+        )
+    if scale is not None:
+        scale = _number(scale, '--scale', 'other than 0')
+        said = {name: replace(one, scale=scale) for name, one in (said or mapping.columns).items()}
+    if time and rate is not None:
+        raise SignalError(f'--time {time} and --rate {rate:g} both tell the times; give one of them')
+    times = mapping.time
+    if rate is not None:
+        times = _time({'rate': rate})
+    elif time:
+        times = _time(dict(zip(('column', 'unit'), split_unit(time), strict=True)))
+    told = mapping.stated
+    if stated is not None:
+        dialect = {'decimal': stated.decimal or told.decimal, 'delimiter': stated.delimiter or told.delimiter}
+        told = replace(stated, **dialect)
+    return replace(mapping, columns={**mapping.columns, **said}, time=times, stated=told)
+
+
+def column_option(text: str, default: str = '', known: Quantities = QUANTITIES) -> tuple[str, ColumnChoice]:
+    """Return quantity and column of `[QUANTITY=]COLUMN[:UNIT]`; raises `SignalError`.
+
+    Where no quantity is written it is `default`; without one, unit or title tell it.
+    """
+    name, _, rest = text.partition('=')
+    named = name in known and rest != ''
+    name = name if named else default
+    column, unit = split_unit(rest if named else text, known[name].dimension if name in known else '')
+    if not column:
+        raise SignalError(f'--column {text}: write [QUANTITY=]COLUMN[:UNIT], as in acceleration=az:g')
+    if name:
+        return name, ColumnChoice(column, unit)
+    dimension = unit_of(unit).dimension if unit else ''
+    found = next((one for one in known.values() if one.dimension == dimension), titled(column, known))
+    if found is None:
+        if ':' in column:
+            unit_of(column.rpartition(':')[2])
+        raise SignalError(
+            f'--column {text}: say what it is, as in {next(iter(known))}={text}; known are {", ".join(known)}'
+        )
+    return found.name, ColumnChoice(column, unit)
+
+
+def split_unit(text: str, dimension: str = '') -> tuple[str, str]:
+    """Return column and unit of `COLUMN[:UNIT]`; what follows the colon must be a unit, else it is a name."""
+    column, colon, unit = text.rpartition(':')
+    return (column, unit) if colon and (is_unit(unit) or is_unit(unit, dimension)) else (text, '')
+
+
+def _column(value: Any, name: str) -> ColumnChoice:
+    found = _keys(value, ('column', 'unit', 'scale', 'offset'), name)
+    if 'column' not in found:
+        raise SignalError(f'{name} names no column; write {name}: {{column: NAME, unit: UNIT}}')
+    unit, scale, offset = str(found.get('unit', '')), found.get('scale'), found.get('offset')
+    if unit:
+        unit_of(unit)
+    if scale is not None:
+        scale = _number(scale, f'scale of {name}', 'other than 0')
+    if offset not in (None, MEAN):
+        offset = _number(offset, f'offset of {name}')
+    return ColumnChoice(str(found['column']), unit, scale, offset)
+
+
+def _time(value: Any) -> TimeChoice:
+    found = _keys(value, ('column', 'unit', 'rate'), 'time')
+    unit, rate = str(found.get('unit', '')), found.get('rate')
+    if unit and not is_unit(unit, 'time'):
+        raise SignalError(f'unit of time ({unit}) must be s, ms, us, ns, min or h')
+    if rate is not None:
+        rate = _number(rate, 'rate in Hz', 'above 0')
+    if rate is not None and len(found) > 1:
+        raise SignalError('time has a rate and a column or unit; a rate is for files without times')
+    return TimeChoice(str(found.get('column', '')), unit, rate)
+
+
+def _keys(value: Any, known: Sequence[str] | None, what: str = 'a mapping') -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise SignalError(f'{what} must have keys with values; instead it is {value!r}')
+    unknown = [str(key) for key in value if known and key not in known]
+    if known and unknown:
+        raise SignalError(f'{what}: {", ".join(unknown)} is not known; known are {", ".join(known)}')
+    return {str(key): one for key, one in value.items()}
+
+
+def _number(value: Any, what: str, kind: str = '') -> float:
+    """Return a finite number, `other than 0` or `above 0`; raises `SignalError`."""
+    number = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    if not math.isfinite(number) or (kind and number == 0.0) or (kind == 'above 0' and number < 0.0):
+        raise SignalError(f'{what} ({value!r}) must be a number {kind}'.rstrip())
+    return float(number)

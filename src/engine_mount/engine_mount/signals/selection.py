@@ -1,0 +1,252 @@
+"""The one way in which a command chooses columns: quantities of any file in SI units, with their times."""
+
+from collections.abc import Collection, Sequence
+from collections.abc import Mapping as Keys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.signals.formats.measured import (
+    Heading,
+    Measured,
+    MeasuredColumn,
+    Provenance,
+    found,
+    listed,
+)
+from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.judgement import unit_of_column
+from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
+from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.times import SLOWEST, may_hold_times, times_of
+from engine_mount.signals.units import is_unit, unit_of
+from mount_models.arithmetic.averages import mean
+
+_SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Signals in SI by quantity, what these are, and where they came from.
+
+    `columns` is plain data for a session: column, unit, factor to SI and times of each quantity; `notes` are
+    sentences on the file, those of a signal on what was taken for granted.
+    """
+
+    signals: dict[str, Signal]
+    quantities: Quantities
+    columns: dict[str, dict[str, Any]]
+    provenance: Provenance
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The name of the file."""
+        return name_of(self.provenance.uri)
+
+
+def select(
+    source: str | Path | Measured, choices: Mapping | Keys[str, str], known: Quantities = QUANTITIES
+) -> Selection:
+    """Return what `choices`, a mapping or {quantity: `COLUMN[:UNIT]`}, name of a file or folder, path or URI.
+
+    Samples without a number (NaN) are left out, with a note. Raises `SignalError` with file, column, value,
+    guess and remedy, or `SourceError`.
+    """
+    mapping = _mapping(choices, known)
+    measured = _opened(source, mapping)
+    if not mapping.choices:
+        raise SignalError(f'{measured.provenance.uri}: no column is named; say one as in {mapping.option}')
+    signals, quantities, columns = {}, {}, {}
+    for name, choice in mapping.choices.items():
+        column = measured.column(heading_of(_headings(measured), choice.column, measured.provenance.uri).name)
+        wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
+        quantities[name] = wanted
+        signals[name], columns[name] = _signal(measured, mapping, column, wanted, choice)
+    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
+
+
+def select_rows(
+    source: str | Path | Measured,
+    choices: Mapping | Keys[str, str],
+    known: Quantities,
+    needed: Collection[str],
+    *,
+    timed: bool = False,
+    slowest: float = SLOWEST,
+) -> dict[str, FloatArray]:
+    """Return the quantities of a table row by row in SI, (n,) each, with `timed` the `time` in s.
+
+    A quantity is the column that is chosen for it, else `<name>_<unit>` or `<name> [<unit>]`; all of `known`
+    are returned that are there, and those `needed` must be. Columns that a format samples at times of their
+    own are brought to those of the first by straight lines, as long as all of them last. Raises
+    `SignalError` or `SourceError`.
+    """
+    mapping = _mapping(choices, known).of(known)
+    there = _headings(source) if isinstance(source, Measured) else headings(source, mapping.stated)
+    uri = source.provenance.uri if isinstance(source, Measured) else str(source)
+    chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
+    mapping = mapping.only({name: one for name, one in chosen.items() if one})
+    for name in needed:
+        if name not in mapping.columns:
+            option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
+            raise SignalError(
+                f'{uri} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
+            )
+    measured = _opened(source, mapping, timed=timed)
+    columns = [measured.column(choice.column) for choice in mapping.columns.values()]
+    base = times_of(measured, columns[0], mapping.time, slowest)[0] if timed else columns[0].time
+    inside = np.full(columns[0].values.size, True)
+    rows = {}
+    for name, column in zip(mapping.columns, columns, strict=True):
+        where = f'{name_of(uri)}, column {column.name!r}'
+        at_first = replace(column, values=_at_times_of(columns[0], column, where, inside))
+        bad = np.flatnonzero(inside & ~np.isfinite(at_first.values))
+        if bad.size:
+            raise SignalError(
+                f'{where}: row {bad[0] + 1} is {column.values[bad[0]]} ({bad.size} '
+                f'such of {column.values.size}); leave these rows out'
+            )
+        rows[name], _ = _in_si(where, at_first, known[name], mapping.columns[name], mapping.option)
+    times = {'time': base.times[inside]} if base is not None and timed else {}
+    return {**times, **{name: values[inside] for name, values in rows.items()}}
+
+
+def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
+    """Return the heading that `wanted` names; raises `SignalError`, also for an unknown unit behind it."""
+    try:
+        return found(wanted, there, uri)
+    except SignalError:
+        name, _, unit = wanted.rpartition(':')
+        if name not in {text for one in there for text in (one.name, one.header)}:
+            raise
+        try:
+            unit_of(unit)
+        except SignalError as error:
+            raise SignalError(f'{uri}, column {name!r}: {error}') from None
+        raise
+
+
+def name_of(uri: str) -> str:
+    """Return the last part of a path or URI."""
+    return uri.rstrip('/').rpartition('/')[2] or uri
+
+
+def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
+    if isinstance(choices, Mapping):
+        return choices
+    return with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
+
+
+def _headings(measured: Measured) -> list[Heading]:
+    return [*measured.columns.values(), *measured.others]
+
+
+def _opened(source: str | Path | Measured, mapping: Mapping, *, timed: bool = True) -> Measured:
+    """Return a file with the columns that `mapping` names, and those that may hold their times."""
+    if isinstance(source, Measured):
+        return source
+    there = headings(source, mapping.stated)
+    wanted = [choice.column for choice in mapping.choices.values()]
+    names = {heading_of(there, text, str(source)).name for text in wanted}
+    if timed and mapping.time.column:
+        names.add(heading_of(there, mapping.time.column, str(source)).name)
+    elif timed:
+        names |= may_hold_times(there)
+    return read(source, [one.name for one in there if one.name in names], mapping.stated)
+
+
+def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None:
+    """Return the column `<name>` or `<name>_<unit>`, or one that ends in a title of the quantity."""
+    titles = tuple(f'/{title}' for title in (wanted.name, *wanted.titles))
+    fitting = [ColumnChoice(one.name) for one in there if f'/{one.name.lower()}'.endswith(titles)]
+    for one in there:
+        before, _, unit = one.header.lower().partition(f'{wanted.name}_')
+        if not before and is_unit(unit, wanted.dimension) and not fitting:
+            fitting.append(ColumnChoice(one.name, unit))
+    if len(fitting) > 1:
+        names = ', '.join(choice.column for choice in fitting)
+        raise SignalError(f'{wanted.name} may be each of the columns {names}; name one')
+    return fitting[0] if fitting else None
+
+
+def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
+    """Return a quantity of the user's own: any size is taken."""
+    if not (choice.unit or column.unit):
+        raise SignalError(
+            f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
+        )
+    unit = unit_of(choice.unit or column.unit)
+    return Quantity(name, unit.dimension, f'{name}, in {Quantity(name, unit.dimension, "").unit.symbol}')
+
+
+def _signal(
+    measured: Measured, mapping: Mapping, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice
+) -> tuple[Signal, dict[str, Any]]:
+    base, notes = times_of(measured, column, mapping.time)
+    where = f'{name_of(measured.provenance.uri)}, column {column.name!r}'
+    if base.times.size != column.values.size:
+        raise SignalError(
+            f'{where} has {column.values.size} values but {base.times.size} times; name its own with --time'
+        )
+    infinite = np.flatnonzero(np.isinf(column.values))
+    if infinite.size:
+        raise SignalError(
+            f'{where}: value number {infinite[0]} is {column.values[infinite[0]]}, at '
+            f'{base.times[infinite[0]]:.4f} s; repair it or cut it out'
+        )
+    known = np.isfinite(column.values)
+    missing = int(known.size - np.count_nonzero(known))
+    check_count(where, known.size - missing)
+    values, told = _in_si(where, replace(column, values=column.values[known]), wanted, choice, mapping.option)
+    times = base.times[known]
+    left_out = (f'{column.name}: {missing} samples without a number are left out',) if missing else ()
+    begin = base.begin + round(SECOND * float(times[0]))
+    signal = Signal(
+        where, times - times[0], values, begin, base.told, (*notes, *told.pop('notes'), *left_out)
+    )
+    told |= {'times': base.told, 'samples': int(values.size)}
+    return signal, {**told, 'offset': choice.offset} if choice.offset else told
+
+
+def _in_si(
+    where: str, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice, option: str
+) -> tuple[FloatArray, dict[str, Any]]:
+    """Return the values in SI, and what is to be told of them."""
+    unit, scale, notes = unit_of_column(where, column, wanted, choice, option)
+    values = unit.to_si(column.values)
+    values *= scale  # in place: it can be an hour
+    told = {'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol}
+    offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
+    if offset:
+        values -= offset
+        which = 'its mean' if choice.offset == MEAN else 'as said'
+        notes.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
+    return values, {**told, 'notes': notes}
+
+
+def _at_times_of(
+    first: MeasuredColumn, column: MeasuredColumn, where: str, inside: NDArray[np.bool_]
+) -> FloatArray:
+    """Return a column at the times of the first, and mark in `inside` when it does not last."""
+    if column.time is first.time or column.time is None or first.time is None:
+        if column.values.size != first.values.size:
+            raise SignalError(
+                f'{where} has {column.values.size} samples, {first.name} has '
+                f'{first.values.size}, and no times tell which belong together; give columns of one length'
+            )
+        return column.values
+    at = first.time.times + 1e-9 * (first.time.begin - column.time.begin)
+    known = np.isfinite(column.values)
+    own = column.time.times[known]
+    if own.size:
+        inside &= (at >= own[0] - _SAME_TIME) & (at <= own[-1] + _SAME_TIME)
+    if not (own.size and inside.any()):
+        raise SignalError(
+            f'{where}, and {first.name} have no time in common; give columns that were sampled together'
+        )
+    return np.interp(at, own, column.values[known])

@@ -1,0 +1,145 @@
+"""The times of a column: from the format, from a column, or from a stated rate, in s."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, TimeBase, listed
+from engine_mount.signals.mapping import TimeChoice
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError
+from engine_mount.signals.units import Unit, unit_of
+
+SLOWEST, FASTEST = 10.0, 2e5
+"""Hz, chosen: between these engine mounts are sampled; beyond, the unit of the times is doubted."""
+TITLES = (
+    't', 'time', 'times', 'timestamp', 'timestamps', 'time_s', 't_s', 'seconds', 'zeit', 'zeitstempel',
+    'elapsed', 'elapsed_time', 'time_stamp', 'seconds_elapsed',
+)  # fmt: skip
+"""Titles of columns that hold times, in small letters."""
+_LIKELY = (20.0, 2e4)  # Hz, chosen: a unit is only guessed where the rate that follows is common
+_SHORTEST = 0.5  # s, chosen: what is shorter shows no motion of an engine
+_EPOCH = (5e8, 4e9)  # s, chosen: 1985 .. 2096, what counts from 1970 lies here
+_SAME_RATE = 0.02  # chosen: a stated rate may differ so much from that of times that stand there
+
+Times = tuple[TimeBase, tuple[str, ...]]
+"""Times, and sentences on what was taken for granted."""
+
+
+def is_time(heading: Heading) -> bool:
+    """Return whether a column is called as one of times is, whatever group it is in."""
+    return heading.date or heading.name[len(_group(heading)) :].lower().replace(' ', '_') in TITLES
+
+
+def may_hold_times(there: Sequence[Heading]) -> set[str]:
+    """Return the names of the columns that are read for the times of others."""
+    return {one.name for one in there if is_time(one)} | {one.name for one in there[:1] if not one.timed}
+
+
+def times_of(
+    measured: Measured, column: MeasuredColumn, choice: TimeChoice, slowest: float = SLOWEST
+) -> Times:
+    """Return the times of a column.
+
+    What is said by hand goes before what the format tells, that before a column with a usual title, and that
+    before a first column that rises. A rate below `slowest` (Hz) doubts their unit. Raises `SignalError`.
+    """
+    if choice.column:
+        return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
+    found = _time_column(measured, column)
+    if choice.rate is not None:
+        own = column.time.times if column.time else None
+        if own is None and found is not None and found.unit:
+            own = unit_of(found.unit, 'time').to_si(found.values)
+        return _at_rate(measured, column, choice.rate, own)
+    if column.time is not None:
+        return column.time, ()
+    if found is None:
+        raise SignalError(
+            f'{measured.provenance.uri} tells no times for column {column.name!r}: name their column with '
+            f'--time COLUMN:UNIT (there are {listed([*measured.columns.values(), *measured.others])}), or '
+            'the rate with --rate HZ'
+        )
+    base, notes = _in_column(measured, found, choice.unit, slowest)
+    first = () if is_time(found) else (f'{found.name}: the first column rises: taken as the time',)
+    return base, (*first, *notes)
+
+
+def _group(heading: Heading) -> str:
+    """Return the part of a name that says in which group a column is, with the sign behind it."""
+    return heading.name[: max(heading.name.rfind('/'), heading.name.rfind('.')) + 1]
+
+
+def _time_column(measured: Measured, column: MeasuredColumn) -> MeasuredColumn | None:
+    """Return the column of times by its title, in the nearest group first, else the first if it rises."""
+    others = [one for one in measured.columns.values() if one is not column]
+    titled = sorted(
+        filter(is_time, others),
+        key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
+    )
+    rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
+    return next(iter([*titled, *rising]), None)
+
+
+def _at_rate(measured: Measured, column: MeasuredColumn, rate: float, own: FloatArray | None) -> Times:
+    told = f'the stated rate of {rate:g} Hz'
+    if own is not None and own.size == column.values.size > 1 and own[-1] > own[0]:
+        found = (own.size - 1) / (own[-1] - own[0])
+        if abs(found / rate - 1.0) > _SAME_RATE:
+            raise SignalError(
+                f'{measured.provenance.uri}: its times tell {found:.5g} samples per second, --rate says '
+                f'{rate:g}; leave --rate out, or remove the times if they are wrong'
+            )
+        told += f' (the times in the file tell {found:.5g})'
+    begin = column.time.begin if column.time else 0
+    return TimeBase(np.arange(column.values.size) / rate, begin, told), ()
+
+
+def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: float) -> Times:
+    where = f'{measured.provenance.uri}, column {column.name!r}'
+    if column.time is not None and not np.isfinite(column.values).any():
+        return column.time, ()  # dates, which are no numbers
+    bad = np.flatnonzero(~np.isfinite(column.values))
+    if bad.size or column.values.size < 2:
+        what = f'time number {bad[0]} is no number' if bad.size else 'at least 2 times are needed'
+        raise SignalError(
+            f'{where}: {what} ({bad.size} such of {column.values.size}); remove these samples, or say the '
+            'rate with --rate HZ'
+        )
+    unit, notes = _unit(where, column, said, slowest)
+    raw = column.values
+    epoch = _EPOCH[0] < raw[0] * unit.factor < _EPOCH[1]
+    begin = round(float(raw[0]) * round(unit.factor * SECOND))
+    told = f'column {column.name!r} in {unit.symbol}' + (', counted from 1970' if epoch else '')
+    return TimeBase((raw - raw[0]) * unit.factor, begin, told), notes
+
+
+def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tuple[Unit, tuple[str, ...]]:
+    """Return the unit of a column of times; it must give a rate that can be."""
+    chosen = said or column.unit
+    unit = unit_of(chosen or 's', 'time')
+    if unit.dimension != 'time':
+        raise SignalError(
+            f'{where} is in {chosen}, which is no unit of time; name another with --time COLUMN:UNIT'
+        )
+    notes: tuple[str, ...] = ()
+    if said and column.unit and unit_of(column.unit, 'time') != unit:
+        notes = (f'{column.name}: its header says {column.unit}; taken as {said}, as you say',)
+    count = column.values.size
+    # the mean step: stamps in bursts have a median of 0
+    step = float((column.values.max() - column.values.min()) / (count - 1))
+    if step <= 0.0:
+        return unit, notes  # of times that do not rise the even grid tells
+    rate = 1.0 / (step * unit.factor)
+    if slowest <= rate <= FASTEST and (rate <= _LIKELY[1] or count >= _SHORTEST * rate):
+        assumed = f'{column.name}: no unit is said; taken as s: {rate:.4g} samples per second'
+        return unit, notes if chosen else (assumed,)
+    units = ('s', 'ms', 'us', 'ns', 'min')
+    guess = next((u for u in units if _LIKELY[0] <= 1.0 / (step * unit_of(u).factor) <= _LIKELY[1]), '')
+    if chosen and not guess:
+        return unit, notes  # of a rate that is too low the even grid tells
+    looks = f'these look like {guess}: write --time {column.name}:{guess}'
+    raise SignalError(
+        f'{where}: steps of {step:.4g} are {rate:.4g} samples per second in {unit.symbol}'
+        f'{", as you say" if said else ", as its header says" if chosen else ""}; '
+        f'{looks if guess else "say the unit with --time COLUMN:UNIT, or the rate with --rate HZ"}'
+    )

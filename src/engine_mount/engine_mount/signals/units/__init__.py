@@ -1,1 +1,0 @@
-"""Units and times of measured columns: said, checked for plausibility, and turned into signals in SI."""
