@@ -8,8 +8,8 @@ import pytest
 import engine_mount
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.audit import audit
+from engine_mount.recordings.events import node_reports
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.node_reports import node_reports
 from engine_mount.recordings.session import recorded_sample_rate
 
 DATA_TOPICS = (

@@ -14,8 +14,7 @@ from engine_mount.recordings.compare import compare
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
-from engine_mount.reports.run_facts import run_facts
-from engine_mount.reports.signals import Signals
+from engine_mount.reports.sections.subject import Subject
 from engine_mount.settings.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
 from mount_models.quantity import ParameterError
@@ -75,12 +74,12 @@ def test_each_is_replayed_to_the_bit(drives, policy, lockstep):
 @pytest.mark.parametrize(('policy', 'levels'), [('switched_viscous', 2), ('viscous_example', 0)])
 def test_a_report_reads_a_drive_of_any_policy(drives, policy, levels):
     recording = engine_mount.open(drives[policy])
-    drive, facts = load_drive(recording), run_facts(Signals(recording))
-    assert len(facts.levels.displacement) == levels
+    drive, subject = load_drive(recording), Subject(recording)
+    assert len(subject.run.levels) == levels
     assert np.isfinite(drive.seen.band_displacement).any() == (policy == 'switched_viscous')
-    assert facts.tracking.error < 0.03
+    assert subject.tracking.error < 0.03
     own = policy_of(with_recorded_policy(session_parameters(session_content(recorded_session(recording)))))
-    assert facts.tracking.error == tracking_error(drive, *own)
+    assert subject.tracking.error == tracking_error(drive, *own)
 
 
 def test_openings_are_compared_as_a_switch_and_as_a_signal(drives, tmp_path):

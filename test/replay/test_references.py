@@ -8,6 +8,7 @@ import pytest
 from engine_mount.drives.inputs.consumed_samples import Notes
 from engine_mount.drives.inputs.input import recorded_parameters
 from engine_mount.drives.replay import replay
+from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
 from engine_mount.recordings.session import (
@@ -17,7 +18,6 @@ from engine_mount.recordings.session import (
     version_differences,
     versions_sentence,
 )
-from engine_mount.recordings.switching import switching_times
 from mount_recorder.versions import versions
 
 REFERENCES = sorted(

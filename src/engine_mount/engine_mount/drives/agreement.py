@@ -6,19 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.drives.core import ControlAnswers, RampAnswers, Replayed
-from engine_mount.drives.inputs.consumed_samples import Times
+from engine_mount.drives.core import ControlAnswers, Replayed
+from engine_mount.drives.inputs.consumed_samples import ControlRun, Ramp, Times, places_in
 from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.recordings.difference import (
+    EXACT,
     Column,
     Moment,
-    Quantity,
     SignalDifference,
     signal_difference,
     signal_sentences,
 )
-from engine_mount.recordings.switching import Switching, paired_switchings, switching_times
-from engine_mount.recordings.tolerances import EXACT
+from engine_mount.recordings.events import Switching, paired_switchings, switching_times
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 
 # Where a recording begins in the middle of control: what the controller remembered is not in it. The
@@ -37,7 +36,6 @@ class Agreement:
 
     setpoints: SignalDifference
     intermediates: tuple[SignalDifference, ...]
-    unanswered: int  # recorded setpoints of the samples replayed for which the replay has none
     settling_skipped: int  # setpoints not compared, because the recording begins in the middle of control
 
     @property
@@ -48,12 +46,12 @@ class Agreement:
     @property
     def equal(self) -> bool:
         """Whether every compared setpoint and every intermediate is the same to the bit."""
-        return not (self.differing or self.unanswered)
+        return not self.differing
 
     @property
     def agrees(self) -> bool:
         """Whether the answers are equal, or as near as a recording that begins in the middle allows."""
-        if not self.settling_skipped or self.unanswered or self.setpoints.unknown_in_one:
+        if not self.settling_skipped or self.setpoints.unknown_in_one:
             return self.equal
         largest = self.setpoints.largest
         return largest is None or abs(largest.difference) <= SETTLED
@@ -68,11 +66,9 @@ class Agreement:
                 f'equal to the recorded setpoints to the last bit ({count} setpoints, '
                 f'{steps} steps with all their intermediates)'
             ]
-        told = signal_sentences(self.differing, _NAMES[1])
+        told = signal_sentences(self.differing)
         if self.setpoints.differing:
             told.insert(0, f'{self.setpoints.differing} of {count} setpoints differ')
-        if self.unanswered:
-            told.append(f'{self.unanswered} recorded setpoints have no answer in the replay')
         return told
 
 
@@ -81,29 +77,37 @@ def agreement(given: ReplayInput, replayed: Replayed) -> Agreement | None:
     recorded = given.answers
     if recorded is None:
         return None
-    answered = list(zip(given.parts, replayed.parts, strict=True))
-    settled = [_settled(part, answers) for part, answers in answered]
-    stamps = np.concatenate([answers.stamps for _, answers in answered])
-    currents = np.concatenate([answers.setpoints for _, answers in answered])
-    places, known = _matched(recorded.stamps, stamps)
-    judged = known & np.concatenate(settled)
+    settled = [_settled(part) for part in given.parts]
+    stamps = np.concatenate([part.stamps for part in replayed.parts])
+    currents = np.concatenate([part.setpoints for part in replayed.parts])
+    found, places = places_in(recorded.stamps, stamps)
+    judged = found & np.concatenate(settled)
     if not judged.any():
         return None
-    time = _seconds(given, stamps[judged])
-    setpoints = _judged(
-        CURRENT_SETPOINT,
-        'coil_current',
-        time,
-        recorded.currents[places[judged]],
-        currents[judged],
-        given.sample_time,
-    )
-    samples = np.concatenate([part.stamps for part in given.parts])
+    steps = [
+        (answers, answers.traced & mask)
+        for answers, mask in zip(replayed.parts, settled, strict=True)
+        if isinstance(answers, ControlAnswers)
+    ]
+    traced = np.concatenate([answers.stamps[mask] for answers, mask in steps])
+    traces = np.concatenate([answers.traces[mask] for answers, mask in steps])
+    known, at = places_in(recorded.trace_stamps, traced)
     return Agreement(
-        setpoints=setpoints,
-        intermediates=_intermediates(given, answered, settled),
-        unanswered=np.setdiff1d(np.intersect1d(recorded.stamps, samples), stamps).size,
-        settling_skipped=int(np.count_nonzero(known & ~judged)),
+        setpoints=_difference(
+            CURRENT_SETPOINT,
+            'coil_current',
+            given.seconds(stamps[judged]),
+            recorded.currents[places[judged]],
+            currents[judged],
+        ),
+        intermediates=tuple(
+            _difference(
+                CONTROL_TRACE, name, given.seconds(traced[known]), values[at[known]], traces[name][known]
+            )
+            for name, values in recorded.traces.items()
+            if name in (traces.dtype.names or ())  # another policy traces something else
+        ),
+        settling_skipped=int(np.count_nonzero(found & ~judged)),
     )
 
 
@@ -151,52 +155,18 @@ def moment_figures(moment: Moment | None) -> dict[str, float | None] | None:
     return {'time_s': moment.time, 'recorded_a': recorded, 'replayed_a': replayed}
 
 
-def _intermediates(
-    given: ReplayInput, answered: list, settled: list[NDArray[np.bool_]]
-) -> tuple[SignalDifference, ...]:
-    assert given.answers is not None
-    steps = [
-        (answers, answers.traced & judged)
-        for (_, answers), judged in zip(answered, settled, strict=True)
-        if isinstance(answers, ControlAnswers)
-    ]
-    stamps = np.concatenate([answers.stamps[judged] for answers, judged in steps])
-    traces = np.concatenate([answers.traces[judged] for answers, judged in steps])
-    places, known = _matched(given.answers.trace_stamps, stamps)
-    time = _seconds(given, stamps[known])
-    return tuple(
-        _judged(CONTROL_TRACE, name, time, values[places[known]], traces[name][known], given.sample_time)
-        for name, values in given.answers.traces.items()
-        if name in (traces.dtype.names or ())  # another policy traces something else
-    )
-
-
-def _judged(
-    topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray, sample_time: float
-) -> SignalDifference:
+def _difference(topic: Topic, signal: str, time: NDArray, a: NDArray, b: NDArray) -> SignalDifference:
     unit = topic.unit(signal)
-    column = Column(Quantity('', topic.name, signal, '' if unit == '1' else unit), time, a, b)
-    return signal_difference(column, EXACT, None, sample_time)
+    return signal_difference(Column('', topic.name, signal, '' if unit == '1' else unit, time, a, b), EXACT)
 
 
-def _settled(part: object, answers: RampAnswers | ControlAnswers) -> NDArray[np.bool_]:
-    if getattr(part, 'from_its_beginning', True):
-        return np.ones(len(answers.stamps), bool)
-    return answers.stamps - answers.stamps[0] >= round(SETTLING * 1e9)
-
-
-def _matched(known: Times, stamps: Times) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return where each of `stamps` stands in the rising `known`, and whether it does."""
-    if not len(known):
-        return np.zeros(len(stamps), np.intp), np.zeros(len(stamps), bool)
-    places = np.clip(np.searchsorted(known, stamps), 0, len(known) - 1)
-    return places, known[places] == stamps
+def _settled(part: Ramp | ControlRun) -> NDArray[np.bool_]:
+    """Return which samples of a part can be expected to be answered as they were recorded."""
+    if isinstance(part, Ramp) or part.from_its_beginning:
+        return np.ones(len(part.stamps), bool)
+    return part.stamps - part.stamps[0] >= round(SETTLING * 1e9)
 
 
 def _switching(given: ReplayInput, runs: list[tuple[Times, NDArray]]) -> Switching:
-    times = [switching_times(_seconds(given, stamps), active) for stamps, active in runs]
+    times = [switching_times(given.seconds(stamps), active) for stamps, active in runs]
     return Switching(*(tuple(np.concatenate(each).tolist()) for each in zip(*times, strict=True)))
-
-
-def _seconds(given: ReplayInput, stamps: Times) -> NDArray[np.float64]:
-    return (stamps - given.zero) / 1e9

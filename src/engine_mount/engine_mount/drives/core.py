@@ -80,7 +80,7 @@ class Replayed:
 
 def replay_parts(
     given: ReplayInput,
-    play_ramp: Callable[[Ramp], RampAnswers],
+    parameters: Parameters,
     play_run: Callable[[ControlRun, MeasuredGap], ControlAnswers],
 ) -> Replayed:
     """Replay all parts; a run begins with the gap that the replayed initialisation before it has measured."""
@@ -88,7 +88,7 @@ def replay_parts(
     measured: MeasuredGap | None = None
     for part in given.parts:
         if isinstance(part, Ramp):
-            ramp = play_ramp(part)
+            ramp = run_ramp(part, parameters)
             measured = ramp.gap
             replayed.parts.append(ramp)
             continue
@@ -107,7 +107,7 @@ def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
         replay = ControlReplay(int(run.stamps[0]), gap, parameters, given.changes)
         return replay.answer(run.stamps, run.displacement)
 
-    return replay_parts(given, lambda ramp: run_ramp(ramp, parameters), play_run)
+    return replay_parts(given, parameters, play_run)
 
 
 def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:

@@ -23,14 +23,12 @@ from engine_mount.signals.excitation import build_excitation
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.graph.nodes import RESTART_LIMIT, SIM, GraphSettings, Grouping
 from mount_bringup.settings import check_sample_rate, checked_settings
-from mount_control.diagnosis import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.parameters import RecorderParameters, split_of
 from mount_recorder.session import new_session, session_text
-from mount_sim.diagnosis import beyond_range_sentence
 from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
 from mount_sim.excitation.excitation import Excitation, steps_of_sample
 from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
@@ -136,7 +134,7 @@ def drive(
     if composed and (lockstep or core):
         raise CombinationError('--composed is for real time: in lock-step the nodes share a process anyway')
     mode = CORE if core else LOCKSTEP if lockstep else REAL_TIME
-    screen = screen or Screen(io.StringIO())
+    screen, domain = screen or Screen(io.StringIO()), chosen_domain(domain)
     values = {node: dict(own) for node, own in (parameters or {}).items()}
     sim = values.setdefault(SIM.name, {})
     scenario = _scenario(scenario, sim, excitation)
@@ -164,7 +162,7 @@ def drive(
         apart_in_time = Grouping.COMPOSED if composed else Grouping.APART
         settings = GraphSettings(
             namespace=namespace,
-            domain=chosen_domain(domain),
+            domain=domain,
             parameters=values,
             grouping=Grouping.TOGETHER if lockstep and not apart else apart_in_time,
             priority=0 if lockstep else priority,
@@ -174,8 +172,12 @@ def drive(
     beyond, first = figures.pop('beyond_range'), figures.pop('first_beyond_range')
     control_faults = figures.pop('control_faults')
     if control_faults:
+        from mount_control.diagnosis import FAULT_SENTENCE  # loads the middleware
+
         complaints.insert(0, f'{FAULT_SENTENCE} (times: {control_faults})')
     if beyond:
+        from mount_sim.diagnosis import beyond_range_sentence  # loads the middleware
+
         complaints.insert(0, beyond_range_sentence(beyond, first))
     return Drive(folder, scenario, mode, values, complaints=complaints, **figures)
 

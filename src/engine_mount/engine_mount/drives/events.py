@@ -10,8 +10,7 @@ from mount_recorder.automatic_marks import MarkKind, Ration, of_mount
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level
 
-_STARTING, _ACTIVATING, _ACTIVE = 'starting', 'activating', 'active'
-_NAMED = 5  # chosen: more nodes are counted
+_STARTING, _ACTIVE = 'starting', 'active'
 _NUMBERS = re.compile(r'[\d.]+')
 _SETTLING = 1.0  # s, chosen: before that a node may rightly complain of one that is not yet active
 
@@ -55,11 +54,7 @@ class DriveEvents(GraphObserver):
         names: dict[str, list[str]] = {}
         for name, state in self._states.items():
             names.setdefault(state, []).append(_short(name))
-        few = len(self._states) <= _NAMED
-        return '; '.join(
-            f'{state}: {", ".join(those) if few or state == _ACTIVATING else len(those)}'
-            for state, those in names.items()
-        )
+        return '; '.join(f'{state}: {", ".join(those)}' for state, those in names.items())
 
     @property
     def damping(self) -> str:

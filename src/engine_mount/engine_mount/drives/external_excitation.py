@@ -14,11 +14,12 @@ from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
+from engine_mount.signals.importing.channels import recorded_as
 from engine_mount.signals.importing.provenance import told_mapping, told_provenance
-from engine_mount.signals.importing.topics import recorded_as
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
 from engine_mount.signals.mapping import Mapping as ColumnMapping
 from engine_mount.signals.quantities import QUANTITIES
+from engine_mount.signals.roads.driving import Road, wheel_height
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import Signal, SignalError
 
@@ -101,6 +102,24 @@ def recorded_acceleration(
     return ExternalExcitation(
         'recorded.file', partial(_write, signal), origin, (*selection.notes, *signal.notes)
     )
+
+
+def measured_road(
+    road: Road, *, duration: float = 0.0, contact_length: float | None = None, repeat: bool = False
+) -> ExternalExcitation:
+    """Return a road at its speed as excitation for `duration` s (0: once).
+
+    With `repeat` it is driven forth and back. The tyre stands on `contact_length` m (None: 0.1). Raises
+    `SignalError`, also for a road without a speed.
+    """
+    if road.speed is None:
+        raise SignalError('a road needs a speed: --speed 60/3.6 (m/s), or a file of the speed over time')
+    over = wheel_height(
+        road.profile, road.speed, contact_length=contact_length, duration=duration, repeat=repeat
+    )
+    sentences = (*road.unevenness.sentences(), *over.notes)
+    notes = tuple(f'{road.profile.name}: {sentence}' for sentence in sentences)
+    return ExternalExcitation('road.file', over.write, over.told, notes)
 
 
 def _write(signal: Signal, folder: Path) -> Path:

@@ -1,8 +1,8 @@
 """A drive through the real nodes, in real time or in lock-step."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -114,9 +114,16 @@ def _watch(
     mark = supervisor.client(Trigger, f'{RECORDER.name}/mark')  # found by the time it is needed
     first = supervisor.figures(SIM)
     scenario = supervisor.settings.parameters[SIM.name]['scenario']
-    with _keys_of_real_time(lockstep=lockstep) as pressed, screen.bar(f'driving ({scenario})') as show:
+    # In lock-step the screen says nothing of the time in the stamps: no keys.
+    keys: AbstractContextManager[Callable[[float], int] | None] = nullcontext() if lockstep else mark_keys()
+    with keys as pressed, screen.bar(f'driving ({scenario})') as show:
         if not lockstep:
-            _say_where_to_look(supervisor.settings, screen, marks=pressed is not None)
+            where = f' --domain {supervisor.settings.domain}' if supervisor.settings.domain else ''
+            where += f' --namespace {space}' if (space := supervisor.settings.namespace) else ''
+            page = f'engine-mount view{where}, then http://127.0.0.1:8137'
+            screen.say(line('look', f'in another terminal: {page}'))
+            if pressed is not None:
+                screen.say(line('mark', 'm or space'))
 
         def finished() -> bool:
             show(_share(first, supervisor.figures(SIM)), detail=events.damping)
@@ -125,16 +132,6 @@ def _watch(
             return supervisor.finished
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
-
-
-@contextmanager
-def _keys_of_real_time(*, lockstep: bool) -> Iterator[Callable[[float], int] | None]:
-    """Give the keys; in lock-step the screen says nothing of the time in the stamps, so there are none."""
-    if lockstep:
-        yield None
-        return
-    with mark_keys() as pressed:
-        yield pressed
 
 
 def _share(first: Mapping[str, str], now: Mapping[str, str]) -> float:
@@ -155,12 +152,3 @@ def _set_mark(mark: Client, screen: Screen) -> None:
         mark.call_async(Trigger.Request()).add_done_callback(answered)
     else:
         screen.say('no mark was set: the recorder is not there yet')
-
-
-def _say_where_to_look(settings: GraphSettings, screen: Screen, *, marks: bool) -> None:
-    where = f' --domain {settings.domain}' if settings.domain else ''
-    where += f' --namespace {settings.namespace}' if settings.namespace else ''
-    page = f'engine-mount view{where}, then http://127.0.0.1:8137'
-    screen.say(line('look', f'in another terminal: {page}'))
-    if marks:
-        screen.say(line('mark', 'm or space'))

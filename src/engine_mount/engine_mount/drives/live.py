@@ -1,8 +1,9 @@
 """Plays a recording by the wall clock: its topics are published, or the real mount_control answers it."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from rclpy.node import Node
 
 from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import has, replay_input
-from engine_mount.drives.lockstep import NodePlayer, displacement_messages
+from engine_mount.drives.lockstep import ControlPlayer, displacement_messages
 from engine_mount.drives.replay import check_parameters, parsed_changes, with_changes
 from engine_mount.recordings.place import open_mount
 from engine_mount.recordings.recording import Recording
@@ -29,6 +30,8 @@ from mount_ros.topics import Delivery
 
 _LOOK = 0.6  # s: as long as a running graph needs to be discovered
 _SHOW_PERIOD = 0.1  # s
+
+Pace = Callable[[NDArray[np.float64], float], Iterator[int]]
 
 
 def play_live(
@@ -59,15 +62,14 @@ def play_live(
         screen.note(warning)
     with domain_lock(domain, namespace), ros_context(domain) as context, screen.bar('playing') as show:
         _refuse_beside_a_graph(context, namespace)
+        pace = partial(_paced, rate=rate, show=show)
         if with_control:
-            _play_to_control(recording, parsed_changes(changes or {}), context, namespace, begin, rate, show)
+            _play_to_control(recording, parsed_changes(changes or {}), context, namespace, begin, pace)
         else:
-            _play_topics(recording, context, namespace, begin, rate, show)
+            _play_topics(recording, context, namespace, begin, pace)
 
 
-def _play_topics(
-    recording: Recording, context: Context, namespace: str, begin: float, rate: float, show: Bar
-) -> None:
+def _play_topics(recording: Recording, context: Context, namespace: str, begin: float, pace: Pace) -> None:
     """Publish every topic of the registry that was recorded."""
     played = {
         name: topic
@@ -88,7 +90,7 @@ def _play_topics(
             before = np.flatnonzero(of_topic[order[: np.searchsorted(times, begin)]] == number)
             if topic.delivery is Delivery.LATCHED and before.size:
                 senders[number](series[number].payloads[int(place[order[before[-1]]])])
-        for due in _paced(times, begin, rate, show):
+        for due in pace(times, begin):
             owner_of, its_place = int(of_topic[order[due]]), int(place[order[due]])
             senders[owner_of](series[owner_of].payloads[its_place])
     finally:
@@ -102,29 +104,28 @@ def _play_to_control(
     context: Context,
     namespace: str,
     begin: float,
-    rate: float,
-    show: Bar,
+    pace: Pace,
 ) -> None:
     """Activate mount_control at the beginning of each recorded run and send it the samples."""
     given = replay_input(recording)
     parameters = with_changes(given.parameters, changes)
     check_parameters(parameters)
     ignored = dict.fromkeys((topics.CURRENT_SETPOINT, topics.CONTROL_TRACE), lambda raw: None)
-    player = NodePlayer(context, parameters, namespace, lockstep=False)
+    player = ControlPlayer(context, parameters, namespace, lockstep=False)
     for run in given.controls:
-        times = (run.stamps - given.zero) * 1e-9
+        times = given.seconds(run.stamps)
         part = slice(int(np.searchsorted(times, begin)), None)
         if not len(times[part]):
             continue
         rest = replace(run, stamps=run.stamps[part], displacement=run.displacement[part])
         messages = displacement_messages(rest)
         with player.active_control(rest, run.gap, ignored) as (node, send):
-            for due in _paced(times[part], float(times[part][0]), rate, show):
+            for due in pace(times[part], float(times[part][0])):
                 send(messages[due])
             node.trigger_deactivate()
 
 
-def _paced(times: NDArray[np.float64], begin: float, rate: float, show: Bar) -> Iterator[int]:
+def _paced(times: NDArray[np.float64], begin: float, *, rate: float, show: Bar) -> Iterator[int]:
     """Yield the numbers of the rising `times` (s) from `begin` on, each when it is due; show the position."""
     if not 0.0 <= begin < times[-1]:
         raise ReplayError(f'--from ({begin:g} s) must lie within 0 .. {times[-1]:.3f} s')

@@ -3,7 +3,6 @@
 import os
 import threading
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +27,7 @@ from mount_ros.topics import EVENT, TOPICS, topic
 
 # Several may run beside a graph; by the order of names the graph's own recorder sets the automatic marks.
 _FAMILY = f'{NAME}_lone'
-_LINE_PERIOD = 0.2  # s, chosen
-_RATE_SPAN = 1.0  # s, chosen: over which messages are counted for their rate
+_LINE_PERIOD = 0.5  # s, chosen: over it messages are counted for their rate
 _SERVICE_PERIOD = 0.2  # s, chosen
 
 
@@ -124,17 +122,16 @@ def _watch(
     """Show the figures and set marks until the end."""
     begin = time.monotonic()
     end = begin + duration if duration is not None else float('inf')
-    counts = deque([(begin, 0)])  # s on the clock, messages received
+    before, counted = begin, 0  # s on the clock, messages received
     with mark_keys() as pressed, screen.line('') as show:
         hint = '  (m or space: mark, Ctrl-C: end)' if pressed is not None else ''
         while not signals and (now := time.monotonic()) < end:
             figures = _figures(node)
             if figures['failed'] and until_failure:
                 return
-            counts.append((now, figures.get('received', 0)))
-            while len(counts) > 2 and counts[1][0] <= now - _RATE_SPAN:
-                counts.popleft()
-            rate = (counts[-1][1] - counts[0][1]) / max(now - counts[0][0], 1e-3)
+            received = figures.get('received', 0)
+            rate = (received - counted) / max(now - before, 1e-3)
+            before, counted = now, received
             show(_line(figures, now - begin, rate) + hint)
             for _ in range(wait_for_keys(pressed, min(_LINE_PERIOD, end - now))):
                 node.mark()

@@ -26,8 +26,13 @@ from engine_mount.experiments.harness.drawing import BLUE, family, finish, new_f
 from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drawing.style import COLOURS, HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
-from engine_mount.reports.sections.charts import decibels
-from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
+from engine_mount.reports.sections.periodic import (
+    cycle_work,
+    decibels,
+    distortion,
+    harmonics,
+    whole_periods,
+)
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity

@@ -26,7 +26,7 @@ from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drawing.style import COLOURS, HYDROMOUNT_COLOUR, UNDAMPED_COLOUR
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
-from engine_mount.reports.sections.sweep import peak_per_band, rms_per_band
+from engine_mount.reports.sections.periodic import peak_per_band, rms_per_band
 from mount_control.policy import switched_viscous
 from mount_models.damper import damper_curve
 from mount_models.quantity import Quantity

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
-from engine_mount.recordings.switching import paired_switchings, switching_times
+from engine_mount.recordings.events import paired_switchings, switching_times
 from mount_models.arithmetic.interpolation import each_interpolated
 
 Column = NDArray[np.float64]

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
+from engine_mount.recordings.events import switching_places
 from engine_mount.recordings.series import Series, SeriesError
-from engine_mount.recordings.switching import switching_places
 from engine_mount.recordings.times import Times, each_once, misdated
 from mount_ros.topics import DISPLACEMENT
 

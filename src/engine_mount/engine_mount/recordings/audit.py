@@ -5,7 +5,7 @@ are held against the samples, not against their own stamps.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import NamedTuple
 
@@ -22,28 +22,27 @@ from engine_mount.recordings.answers import (
     setpoint_latency,
     spanned,
 )
+from engine_mount.recordings.events import CONTROL, node_reports
 from engine_mount.recordings.metadata import read_statement
-from engine_mount.recordings.node_reports import CONTROL, NodeReport, node_reports
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.series import SeriesError, TopicTimes
+from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.session import recorded_sample_rate
-from engine_mount.recordings.time_axis import TimeAxis
 from engine_mount.recordings.times import (
+    MOST_JITTER,
     NO_TIMES,
     Times,
     distinct,
     is_in,
+    jitter_share,
     misdated,
     missing_samples,
     redated,
-    regular_rate,
     stamp_jitter,
     stamp_statistics,
 )
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.losses import RECORDER_RECORD
 from mount_recorder.stamp_watch import FARTHEST
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -53,8 +52,6 @@ from mount_ros.topics import (
     Delivery,
     Topic,
 )
-
-_CURRENT = CURRENT_SETPOINT.names[0]
 
 
 @dataclass(frozen=True)
@@ -93,20 +90,22 @@ class TopicAudit:
 class _Topic(NamedTuple):
     """A topic as it is judged: misdated stamps are set to where the rate (Hz) puts their samples."""
 
-    times: TopicTimes
+    series: Series
     registered: Topic | None  # None for a foreign one that only has the same name
     rate: float  # by registry and session, 0 where they tell none
     wrong: NDArray[np.bool_]
     stamps: Times
+    obstacle: str = ''  # why there are no stamps
 
 
 class _Mount(NamedTuple):
-    """The stamps (ns) of one mount, none where a topic is missing."""
+    """The topics of one mount."""
 
     namespace: str
     topics: Mapping[str, _Topic]
 
     def stamps(self, topic: Topic) -> Times:
+        """Return the stamps (ns) of a topic, none where it is missing."""
         name = self.namespace + topic.name
         return self.topics[name].stamps if name in self.topics else NO_TIMES
 
@@ -117,22 +116,22 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
     Lost is what the stamps show, or what the recorder, the file's proven summary or `metadata.yaml` counted
     and is not there, whichever is more.
     """
-    topics = {name: _judged(recording, times) for name, times in recording.times().items()}
-    counted: dict[str, int] = {}
-    for file in recording.files:
-        for name, row in read_statement(file.metadata.get(RECORDER_RECORD, {})).items():
-            counted[name] = row.get('kept', 0) + max(0, row.get('lost', 0))
+    recording.load_times()
+    topics = {name: _judged(recording, recording[name]) for name in recording}
+    counted = {
+        name: row.get('kept', 0) + max(0, row.get('lost', 0))
+        for file in recording.files
+        for name, row in read_statement(file.metadata.get(RECORDER_RECORD, {})).items()
+    }
     audits = {
         name: _with_counts(_from_stamps(name, topics), recording.missing.get(name, 0), counted.get(name))
         for name in recording
     }
-    sampled = [
-        name for name, topic in topics.items() if topic.registered is DISPLACEMENT and len(topic.times)
-    ]
-    reports = node_reports(recording) if sampled else []
-    for name in sampled:
+    for name in [name for name, topic in topics.items() if topic.registered is DISPLACEMENT]:
+        if not len(topics[name].series):
+            continue
         mount = _Mount(name.removesuffix(DISPLACEMENT.name), topics)
-        answers = _answers(mount, reports, recording.time_axis)
+        answers = _answers(recording, mount)
         measured = [mount.stamps(each) for each in (DISPLACEMENT, COIL_RIPPLE)]
         own = [audits.get(mount.namespace + each.name) for each in (DISPLACEMENT, COIL_RIPPLE)]
         lost = [entry.lost or 0 for entry in own if entry is not None]
@@ -156,48 +155,50 @@ def control_spans(audits: Mapping[str, TopicAudit]) -> dict[str, tuple[Span, ...
     }
 
 
-def _judged(recording: Recording, times: TopicTimes) -> _Topic:
-    topic = registered_topic(times.topic, times.type)
-    if topic is not None and times.names and not set(topic.names) <= set(times.names):
+def _judged(recording: Recording, series: Series) -> _Topic:
+    topic = series.registered
+    if topic is not None and series.first_names and not set(topic.names) <= set(series.first_names):
         topic = None
     rate = topic.rate if topic is not None else 0.0
     if topic is not None and rate == SAMPLE_RATE:
-        rate = recorded_sample_rate(recording, times.topic.removesuffix(topic.name))
-    stamps = NO_TIMES if times.stamps is None else times.stamps
+        rate = recorded_sample_rate(recording, series.topic.removesuffix(topic.name))
+    try:
+        stamps, obstacle = series.stamps, ''
+    except SeriesError as error:
+        why = str(error).removeprefix(f'{series.topic}: ').removesuffix('; use receive_times')
+        stamps, obstacle = NO_TIMES, why
     wrong = misdated(stamps)
-    return _Topic(times, topic, rate, wrong, redated(stamps, wrong, rate) if rate else stamps)
+    return _Topic(series, topic, rate, wrong, redated(stamps, wrong, rate) if rate else stamps, obstacle)
 
 
 def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
-    times, topic, rate, wrong, stamps = topics[name]
-    present = len(times)
+    series, topic, rate, wrong, stamps, obstacle = topics[name]
+    present = len(series)
     if not present:
         return TopicAudit(None, 0, None, remark='no message')
-    found = rate if topic is not None else regular_rate(stamps) if times.stamps is not None else None
-    if topic is not None and topic.rate == 0.0:
+    why = obstacle
+    if topic is None:
+        why = obstacle or 'no declared rate'
+    elif topic.rate == 0.0:
         why = 'latched' if topic.delivery is Delivery.LATCHED else 'irregular'
-    elif times.stamps is None:
-        why = str(times.obstacle)
-    else:
-        why = '' if found else 'stamps without a regular rate'
-    if why or not found:
+    elif (share := jitter_share(stamps, rate)) > MOST_JITTER:
+        why = f'{100 * share:.3g} % of the stamps are beside the rate (limit {100 * MOST_JITTER:g} %)'
+    if why:
         return TopicAudit(None, present, None, remark=f'{why}: only counted')
-    jitter, worst = stamp_jitter(stamps, found)
+    jitter, worst = stamp_jitter(stamps, rate)
     entry = TopicAudit(
-        **asdict(stamp_statistics(stamps, found)),
-        misdated=int(np.count_nonzero(wrong)) if wrong.any() else None,
-        rate_hz=found,
+        **asdict(stamp_statistics(stamps, rate)),
+        misdated=int(np.count_nonzero(wrong)) or None,
+        rate_hz=rate,
         jitter_s=jitter,
         worst_jitter_s=worst,
-        remark='' if topic is not None else f'rate of {found:.4g} Hz taken from the stamps',
+        remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',
     )
-    if wrong.any():
-        entry = replace(entry, remark=_misdated_remark(times.stamps, wrong))
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE):
         if len(_Mount(name.removesuffix(topic.name), topics).stamps(DISPLACEMENT)):
             entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
-        if topic is CURRENT_SETPOINT and times.receive_times is not None:
-            entry = replace(entry, latency=setpoint_latency(stamps, times.receive_times))
+        if topic is CURRENT_SETPOINT:
+            entry = replace(entry, latency=setpoint_latency(stamps, series.receive_times))
     return entry
 
 
@@ -221,25 +222,23 @@ def _with_counts(entry: TopicAudit, missing: int, recorded: int | None) -> Topic
     return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
 
 
-def _answers(mount: _Mount, reports: Sequence[NodeReport], axis: TimeAxis) -> Answers | None:
+def _answers(recording: Recording, mount: _Mount) -> Answers | None:
     """Return how the samples of a mount were answered, None where its setpoints were not recorded."""
     stamps = mount.stamps(CURRENT_SETPOINT)
     if not len(stamps):
         return None
-    sent = mount.topics[mount.namespace + CURRENT_SETPOINT.name].times.publish_times
-    if sent is None:
-        return None
     own = [
         report
-        for report in reports
+        for report in node_reports(recording)
         if report.node == CONTROL and report.namespace == mount.namespace.strip('/') and report.state
     ]
     inactive = np.array([report.log_time for report in own if report.state == 'inactive'], np.int64)
     control = Control(
         steps=mount.stamps(CONTROL_TRACE),
         handovers=mount.stamps(AIR_GAP),
-        inactive=axis.stamps_at(inactive) if own else None,
+        inactive=recording.time_axis.stamps_at(inactive) if own else None,
     )
+    sent = mount.topics[mount.namespace + CURRENT_SETPOINT.name].series.publish_times
     return judge_answers(mount.stamps(DISPLACEMENT), Setpoints(stamps, sent), control)
 
 
@@ -249,10 +248,9 @@ def _lost_steps(recording: Recording, mount: _Mount, answers: Answers) -> int:
     untraced = ~is_in(setpoints, np.sort(traced)) & (spanned(setpoints, answers.spans) >= 0)
     if not len(traced) or not untraced.any():
         return 0
-    name = mount.namespace + CURRENT_SETPOINT.name
-    recording.load_columns({name: (_CURRENT,)})
+    name, current = mount.namespace + CURRENT_SETPOINT.name, CURRENT_SETPOINT.names[0]
+    recording.load_columns({name: (current,)})
     try:
-        above = recording[name][_CURRENT] > 0.0
+        return len(distinct(setpoints[untraced & (recording[name][current] > 0.0)]))
     except SeriesError:
         return 0  # no setpoints of ours
-    return len(distinct(setpoints[untraced & above]))

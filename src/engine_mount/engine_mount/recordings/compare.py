@@ -5,22 +5,27 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from engine_mount.recordings.alignment import (
+from engine_mount.recordings.difference import SHOWN, SignalDifference, Tolerances, few, signal_sentences
+from engine_mount.recordings.events import (
+    SwitchingChange,
+    paired_switchings,
+    recorded_marks,
+    switching_times,
+)
+from engine_mount.recordings.matching import (
+    SWITCH,
     Alignment,
     ComparisonError,
+    MatchedTopic,
+    TopicComparison,
     align,
     alignment_sentence,
     mount_of,
     paired_topics,
     registered_in,
 )
-from engine_mount.recordings.difference import SHOWN, SignalDifference, few, signal_sentences
-from engine_mount.recordings.events import recorded_marks
-from engine_mount.recordings.matched_topic import SWITCH, MatchedTopic, TopicComparison
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sessions, session_differences
-from engine_mount.recordings.switching import SwitchingChange, paired_switchings, switching_times
-from engine_mount.recordings.tolerances import Tolerances
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION, Topic
 
 # Sessions and marks have words of their own; diagnostics hold clock time and load, which are never equal.

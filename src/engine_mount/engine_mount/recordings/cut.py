@@ -52,15 +52,17 @@ def cut(
     whole = axis.of_log((recording.time_range or (0, 0))[1])
     begin = axis.of_log(first) if begin is None else begin
     end = whole if end is None else min(end, whole)
-    parts, losses, carried, read = [], [], 0, {}
-    for name in recording:
-        messages, damages = read_messages(recording, name)
+    known = list(recording.warnings)
+    parts, carried, read = [], 0, {}
+    for name, topic in recording.topics.items():
+        messages = read_messages(recording, name)
+        if messages is None:
+            continue
         read[name] = len(messages)
-        edges = np.searchsorted(messages.log_times, [first, behind]).tolist()
-        before = range(edges[0])[_carried(messages.topic)]
-        parts.append(messages.chosen(np.array([*before, *range(*edges)], np.int64)))
+        edges = np.searchsorted(messages.heads['log_time'], [first, behind]).tolist()
+        before = range(edges[0])[_carried(topic)]
+        parts.append(messages.at(np.array([*before, *range(*edges)], np.int64)))
         carried += len(before)
-        losses += damages
     count = sum(map(len, parts)) - carried
     if not count:
         raise CutError(
@@ -75,11 +77,11 @@ def cut(
         'made': made or time_text(),
         **({'reason': reason} if reason else {}),
     }
+    losses = [warning for warning in recording.warnings if warning not in known]
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete([recording], [read], with_step([recording.information], step))
-    losses += [f'{name} is lost by damage' for name in recording.lost_beside]
-    return Cut(Path(out), begin, end, count, carried, tuple(losses))
+    return Cut(Path(out), begin, end, count, carried, (*losses, *bag.notes))
 
 
 def _span(recording: Recording, begin: float | None, end: float | None) -> tuple[int, int]:

@@ -1,20 +1,23 @@
 """How one signal differs between two recordings: its samples side by side, figures, sentences, a table."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+import re
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.screen import Table
-from engine_mount.recordings.tolerances import Tolerance
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 Values = NDArray[np.float64]
 Places = NDArray[np.int64]
 
+SWITCHING = 'switching'
+_ALL = ''
+_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>[0-9.]+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
 SHOWN = 6  # signals, switchings, session entries named one by one
 _ROWS = 10  # of the table
 _RANKS = {
@@ -22,6 +25,81 @@ _RANKS = {
     f'{CONTROL_TRACE.name}.current': 1,
     f'{DISPLACEMENT.name}.mount': 2,
 }
+
+
+class ToleranceError(ValueError):
+    """A tolerance is not understood or names no signal; the text says how to write it."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A bound on the difference: in the signal's unit, or as a share of its largest value in A."""
+
+    value: float = 0.0
+    relative: bool = False
+
+    def bound(self, largest: float) -> float:
+        """Return the bound in the unit of the signal, whose largest absolute value is `largest`."""
+        return self.value * largest if self.relative else self.value
+
+
+EXACT = Tolerance()
+
+
+class Tolerances:
+    """The tolerances of a comparison by signal, topic, or for all signals."""
+
+    def __init__(self, texts: Iterable[str] = ()):
+        """Read `NAME=0.01`, `NAME=1%` or, for all signals, `1%`; raises `ToleranceError`.
+
+        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), the same
+        of one mount (`mount_left/control_trace.current`), or `switching` for the times of switching in s.
+        """
+        self._by_name = dict(map(_read, texts))
+
+    def of(self, mount: str, topic: str, signal: str) -> Tolerance:
+        """Return the tolerance of a signal; the name that says most counts.
+
+        `mount` is what stands before the topic: `mount_left/`, or nothing.
+        """
+        for name in (f'{mount}{topic}.{signal}', f'{topic}.{signal}', signal, mount + topic, topic, _ALL):
+            if name in self._by_name:
+                return self._by_name[name]
+        return EXACT
+
+    @property
+    def switching(self) -> float:
+        """By how much a switching may move, s."""
+        return self._by_name.get(SWITCHING, EXACT).value
+
+    def check(self, known: Collection[tuple[str, str, str]]) -> None:
+        """Raise `ToleranceError` for a name that is none of `known` (mount, topic, signal)."""
+        names = {SWITCHING, _ALL}
+        for mount, topic, signal in known:
+            names |= {signal, topic, mount + topic, f'{topic}.{signal}', f'{mount}{topic}.{signal}'}
+        unknown = next((name for name in self._by_name if name not in names), None)
+        if unknown is not None:
+            raise ToleranceError(
+                f'tolerance for {unknown!r}: no such signal in both recordings; --json lists all signals'
+            )
+
+
+def _read(text: str) -> tuple[str, Tolerance]:
+    match = _FORM.fullmatch(text.strip())
+    try:
+        value = float(match['value']) if match else 0.0
+    except ValueError:
+        match = None
+    if match is None:
+        raise ToleranceError(f'tolerance {text!r}: write NAME=VALUE as current=0.01, or NAME=1%, or 1%')
+    name, relative = match['name'] or _ALL, bool(match['percent'])
+    if name == _ALL and not relative:
+        raise ToleranceError(
+            f'tolerance {text!r} would mean another thing in each unit; name a signal or write a share: 1%'
+        )
+    if name == SWITCHING and relative:
+        raise ToleranceError('the tolerance of switching is a time in s, such as switching=0.002')
+    return name, Tolerance(value / 100.0 if relative else value, relative)
 
 
 @dataclass(frozen=True)
@@ -44,20 +122,16 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """Where a signal is from and its unit; `mount` stands before the topic: `mount_left/`, or nothing."""
+class Column:
+    """One signal of matched samples: times (s), values in A and B.
+
+    `mount` is the part of its name before the topic: `mount_left/`, or nothing.
+    """
 
     mount: str
     topic: str
     signal: str
     unit: str
-
-
-@dataclass(frozen=True)
-class Column:
-    """One signal of matched samples: times (s), values in A and B."""
-
-    quantity: Quantity
     time: Values
     a: Values
     b: Values
@@ -68,14 +142,18 @@ class Column:
 
 
 @dataclass(frozen=True)
-class SignalDifference(Quantity):
+class SignalDifference:
     """One signal in both recordings; values in `unit`, unknown is NaN.
 
     `differing` samples are beyond the tolerance; NaN in one recording alone always is, NaN in both never.
     `first` is the first of them, `largest` the sample with the largest difference of numbers; `rms` is that
-    of the differences of numbers over all samples; B is `lag` s later. `exact`: all are equal to the bit.
+    of the differences of numbers over all samples. `exact`: all are equal to the bit.
     """
 
+    mount: str
+    topic: str
+    signal: str
+    unit: str
     samples: int
     differing: int = 0
     exact: bool = True
@@ -84,7 +162,6 @@ class SignalDifference(Quantity):
     largest: Moment | None = None
     rms: float = 0.0
     scale: float = math.nan
-    lag: float = math.nan
 
     @property
     def name(self) -> str:
@@ -94,12 +171,12 @@ class SignalDifference(Quantity):
     def importance(self) -> tuple[int, bool, float, str]:
         """Return the key of the order: output, input, share of the largest value; the simulator's last."""
         rank = _RANKS.get(f'{self.topic}.{self.signal}', len(_RANKS))
-        told = self.largest is not None and self.scale > 0.0
-        share = abs(self.largest.difference) / self.scale if told and self.largest else 1.0
+        share = abs(self.largest.difference) / self.scale if self.largest and self.scale > 0.0 else 1.0
         return rank, self.topic.startswith('sim/'), -share, self.name
 
-    def sentence(self, b: str = 'B') -> str:
-        """Return the difference in words; `b` names B."""
+    @property
+    def sentence(self) -> str:
+        """The difference in words."""
         since = '' if self.first is None else f', first at {time_text(self.first.time)}'
         verb = 'sample is' if self.unknown_in_one == 1 else 'samples are'
         unknown = f'in one of them {self.unknown_in_one} {verb} unknown' if self.unknown_in_one else ''
@@ -108,15 +185,11 @@ class SignalDifference(Quantity):
         behind = f'; {unknown}' if unknown else ''
         if self.largest.difference == 0.0:
             return f'{self.name} differs in the sign of zero{since}{behind}'
-        if abs(self.lag) >= _LEAST_LAG:
-            word = 'later' if self.lag > 0.0 else 'earlier'
-            behind = f'; {b} is {1e3 * abs(self.lag):.2f} ms {word}{behind}'
         most = quantity_text(abs(self.largest.difference), self.unit)
         return f'{self.name} differs by at most {most} at {time_text(self.largest.time)}{since}{behind}'
 
     def row(self) -> tuple[str, ...]:
         """Return the difference as the cells of a table."""
-        late = f'{1e3 * self.lag:.2f} ms' if abs(self.lag) >= _LEAST_LAG else '0'
         return (
             f'{self.mount}{self.topic}\n{self.signal}',  # two lines, so that all fits into 80 characters
             str(self.differing),
@@ -124,37 +197,31 @@ class SignalDifference(Quantity):
             'unknown' if self.largest is None else quantity_text(abs(self.largest.difference), self.unit),
             '' if self.largest is None else f'{self.largest.time:.3f}',
             quantity_text(self.rms, self.unit),
-            '-' if math.isnan(self.lag) else late,
         )
 
     def figures(self) -> dict[str, Any]:
         """Return the figures for JSON."""
         return {
-            **{
-                name: getattr(self, name)
-                for name in ('unit', 'samples', 'differing', 'exact', 'unknown_in_one')
-            },
+            'unit': self.unit,
+            'samples': self.samples,
+            'differing': self.differing,
+            'exact': self.exact,
+            'unknown_in_one': self.unknown_in_one,
             'first': self.first and self.first.figures(),
             'largest': self.largest and self.largest.figures(),
             'rms': known(self.rms),
-            'lag_ms': known(1e3 * self.lag),
         }
 
 
-def signal_difference(
-    column: Column, tolerance: Tolerance, places: Places | None, period: float
-) -> SignalDifference:
-    """Return how the two sides of `column` differ beyond `tolerance`.
-
-    `places` numbers the samples in periods (s), for the lag; None where they have no rate.
-    """
-    origin = asdict(column.quantity)
+def signal_difference(column: Column, tolerance: Tolerance) -> SignalDifference:
+    """Return how the two sides of `column` differ beyond `tolerance`."""
+    origin = column.mount, column.topic, column.signal, column.unit
     a, b = np.ascontiguousarray(column.a, float), np.ascontiguousarray(column.b, float)
     unknown_a, unknown_b = np.isnan(a), np.isnan(b)
     same = (a.view(np.int64) == b.view(np.int64)) | (unknown_a & unknown_b)
     scale = float(np.abs(a[np.isfinite(a)]).max(initial=0.0))
     if same.all():
-        return SignalDifference(**origin, samples=len(a), scale=scale)
+        return SignalDifference(*origin, samples=len(a), scale=scale)
     with np.errstate(invalid='ignore'):
         distance = np.where(same, 0.0, np.abs(b - a))
     bound, numbers = tolerance.bound(scale), ~(unknown_a | unknown_b)
@@ -163,7 +230,7 @@ def signal_difference(
     distances = distance[numbers]
     unlike = (numbers & ~same).any()
     return SignalDifference(
-        **origin,
+        *origin,
         samples=len(a),
         differing=len(differing),
         exact=False,
@@ -172,7 +239,6 @@ def signal_difference(
         largest=column.at(int(np.flatnonzero(numbers)[np.argmax(distances)])) if unlike else None,
         rms=float(np.sqrt(np.mean(distances**2))) if len(distances) else math.nan,
         scale=scale,
-        lag=math.nan if places is None else lag(_evenly(a, places), _evenly(b, places), period),
     )
 
 
@@ -181,12 +247,12 @@ def by_importance(signals: Iterable[SignalDifference]) -> list[SignalDifference]
     return sorted((signal for signal in signals if signal.differing), key=SignalDifference.importance)
 
 
-def signal_sentences(signals: Iterable[SignalDifference], b: str = 'B') -> list[str]:
-    """Return the sentences about the most important of the differing `signals`; `b` names B."""
+def signal_sentences(signals: Iterable[SignalDifference]) -> list[str]:
+    """Return the sentences about the most important of the differing `signals`."""
     ordered = by_importance(signals)
     others = [signal.name for signal in ordered[SHOWN:]]
     more = [f'{len(others)} more signals differ: {few(others, ", ")}'] if others else []
-    return [*(signal.sentence(b) for signal in ordered[:SHOWN]), *more]
+    return [*(signal.sentence for signal in ordered[:SHOWN]), *more]
 
 
 def signal_table(signals: Iterable[SignalDifference]) -> Table:
@@ -195,9 +261,9 @@ def signal_table(signals: Iterable[SignalDifference]) -> Table:
     more = len(ordered) - _ROWS
     return Table(
         'The largest differences',
-        'lrrrrrr',
+        'lrrrrr',
         [signal.row() for signal in ordered[:_ROWS]],
-        ('signal', 'samples', 'first (s)', 'largest', 'at (s)', 'rms', 'B later'),
+        ('signal', 'samples', 'first (s)', 'largest', 'at (s)', 'rms'),
         f'{more} more differ; see --json' if more > 0 else '',
     )
 
@@ -211,72 +277,6 @@ def few(names: Sequence[str], separator: str) -> str:
 def known(value: float) -> float | None:
     """Return a number as JSON knows it: unknown is null."""
     return value if math.isfinite(value) else None
-
-
-def _evenly(values: Values, places: Places) -> Values:
-    """Return `values` with missing samples replaced by a straight line."""
-    count = int(places[-1] - places[0]) + 1
-    return values if count == len(places) else np.interp(np.arange(count), places - places[0], values)
-
-
-# The lag.
-
-_LEAST_LAG = 0.05e-3  # s, chosen: below, the estimate says nothing
-_LONGEST_LAG = 0.5  # s, chosen
-_LEAST_SAMPLES = 64  # chosen
-_LEAST_CORRELATION = 0.8  # chosen: below, the shapes are not the same and a lag means nothing
-_AS_GOOD = 0.99  # of the highest correlation, chosen: then the shorter lag is the answer
-_EXPLAINED = 0.5  # chosen: of what remains unlike without a shift, a lag must take away so much
-_IN_STEP = 0.1  # samples, chosen: a shorter lag is none and need not explain anything
-
-
-def lag(a: Values, b: Values, period: float) -> float:
-    """Return by how many s `b` is later than `a`, both sampled every `period` (s) from the same time on.
-
-    The lag is that of the highest correlation coefficient within half a second and a quarter of the length,
-    refined below one sample by a parabola; of several as good, as with a periodic signal, the shortest. NaN
-    where shapes differ or no shift makes the signals clearly more alike. NaNs in signals count as the mean.
-    """
-    one, other = _centred(a), _centred(b)
-    if len(one) < _LEAST_SAMPLES or not (one.any() and other.any()):
-        return math.nan
-    reach = max(1, min(round(_LONGEST_LAG / period), len(one) // 4))
-    found = _correlation(one, other, reach)
-    good = 1 + np.flatnonzero(
-        (found[1:-1] >= found[:-2]) & (found[1:-1] > found[2:]) & (found[1:-1] >= _AS_GOOD * found.max())
-    )
-    if found.max() < _LEAST_CORRELATION or not len(good):
-        return math.nan
-    place = int(good[np.argmin(np.abs(good - reach))])
-    before, at, after = found[place - 1 : place + 2].tolist()
-    bend, slope = before - 2.0 * at + after, 0.5 * (after - before)
-    offset = -slope / bend if bend < 0.0 else 0.0
-    shift = place - reach + offset
-    unlike = 1.0 - (at + 0.5 * slope * offset)
-    if abs(shift) > _IN_STEP and unlike > (1.0 - _EXPLAINED) * (1.0 - found[reach]):
-        return math.nan
-    return float(shift) * period
-
-
-def _centred(signal: Values) -> Values:
-    finite = np.isfinite(signal)
-    values = signal[finite]
-    if not len(values) or (values == values[0]).all():
-        return np.zeros(len(signal))  # else rounding of the mean would make a signal of a constant
-    return np.where(finite, signal - values.mean(), 0.0)
-
-
-def _correlation(a: Values, b: Values, reach: int) -> Values:
-    """Return the correlation coefficients of `a[i]` and `b[i + k]` for k from -reach to reach."""
-    count, shifts = len(a), np.arange(-reach, reach + 1)
-    size = 1 << (count + reach).bit_length()
-    products = np.fft.irfft(np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size), size)
-    # Energy of what overlaps at each shift, so that a shift does not lower the coefficient by itself.
-    energy_a, energy_b = (np.concatenate([[0.0], np.cumsum(signal**2)]) for signal in (a, b))
-    begin, end = np.maximum(0, -shifts), count - np.maximum(0, shifts)
-    energies = (energy_a[end] - energy_a[begin]) * (energy_b[end + shifts] - energy_b[begin + shifts])
-    least = 1e-12 * energy_a[-1] * energy_b[-1]  # an overlap without signal says nothing
-    return np.where(energies > least, products[shifts] / np.sqrt(np.maximum(energies, least)), 0.0)
 
 
 # Numbers with units as people read them: 0.031 A, 12.5 µm, 3.2 ms.

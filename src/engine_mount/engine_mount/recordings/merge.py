@@ -3,21 +3,21 @@
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.recordings.bag_copy import BagCopy, Messages, joined, read_messages
-from engine_mount.recordings.metadata import TopicInformation, with_step
+from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
+from engine_mount.recordings.metadata import with_step
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import session_differences
 from mount_recorder.session import time_text
 from mount_recorder.topic_groups import registered_topic
-from mount_ros.topics import SESSION, Delivery
+from mount_ros.topics import SESSION
 
-_HOLE = 0.1  # s, chosen: a longer silence between two parts is told
-_TOLD = 4  # differences of sessions in a refusal
+_LISTED = 4  # differences of sessions in a refusal
 
 
 class MergeError(ValueError):
@@ -31,7 +31,6 @@ class Merge:
     folder: Path
     messages: int
     repeated: int
-    holes: tuple[str, ...]  # times of which no part tells, in sentences
     losses: tuple[str, ...]  # what of the parts could not be read, in sentences
 
 
@@ -47,118 +46,94 @@ def merge(
     """
     if not recordings:
         raise MergeError('nothing to merge; name the recordings')
-    topics = _topics(recordings)
+    _check_types(recordings)
     if not different_sessions:
         _refuse_different_sessions(recordings)
-    parts, losses, repeated = [], [], 0
+    known = [list(recording.warnings) for recording in recordings]
+    parts, repeated = [], 0
     read: list[dict[str, int]] = [{} for _ in recordings]
-    for topic in topics.values():
+    for name in dict.fromkeys(name for recording in recordings for name in recording):
         found = []
         for recording, counts in zip(recordings, read, strict=True):
-            if topic.name in recording.topics:
-                messages, damages = read_messages(recording, topic.name)
-                counts[topic.name] = len(messages)
+            messages = read_messages(recording, name) if name in recording.topics else None
+            if messages is not None:
+                counts[name] = len(messages)
                 found.append(messages)
-                losses += damages
-        parts.append(_united(topic, found))
-        repeated += sum(map(len, found)) - len(parts[-1])
+        if found:
+            parts.append(_united(found))
+            repeated += sum(map(len, found)) - len(parts[-1])
     step = {
         'did': 'merge',
         'recordings': [recording.short_name for recording in recordings],
         'made': time_text(),
     }
+    losses = [
+        warning
+        for recording, before in zip(recordings, known, strict=True)
+        for warning in recording.warnings
+        if warning not in before
+    ]
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete(recordings, read, with_step([recording.information for recording in recordings], step))
-    losses += [f'{name} is lost by damage' for recording in recordings for name in recording.lost_beside]
-    return Merge(Path(out), bag.added, repeated, tuple(_holes(recordings)), tuple(losses))
+    return Merge(Path(out), bag.added, repeated, (*losses, *bag.notes))
 
 
-def _topics(recordings: Sequence[Recording]) -> dict[str, TopicInformation]:
-    topics: dict[str, TopicInformation] = {}
+def _check_types(recordings: Sequence[Recording]) -> None:
+    types: dict[str, tuple[str, str]] = {}
     for recording in recordings:
         for name, topic in recording.topics.items():
-            known = topics.setdefault(name, topic)
-            if known.type != topic.type:
+            known, known_hash = types.setdefault(name, (topic.type, topic.type_hash))
+            if known != topic.type:
                 raise MergeError(
-                    f'{name} is {known.type} in one recording and {topic.type} in {recording.path}; '
+                    f'{name} is {known} in one recording and {topic.type} in {recording.path}; '
                     'they are no parts of one drive'
                 )
-            if known.type_hash and topic.type_hash and known.type_hash != topic.type_hash:
-                raise MergeError(f'{name}: {known.type} has another definition in {recording.path}')
-            if topic.offered_qos and not known.offered_qos:
-                topics[name] = replace(known, offered_qos=topic.offered_qos)
-    return topics
+            if known_hash and topic.type_hash and known_hash != topic.type_hash:
+                raise MergeError(f'{name}: {known} has another definition in {recording.path}')
 
 
 def _refuse_different_sessions(recordings: Sequence[Recording]) -> None:
-    first, *others = recordings
-    known = _sessions(first)
-    for other in others:
-        sessions = _sessions(other)
-        if known.keys() & sessions.keys() or not (known or sessions):
+    """Refuse recordings of which one has no session that the first has as well."""
+    first, *others = [(recording, _sessions(recording)) for recording in recordings]
+    for other, sessions in others:
+        if first[1] & sessions or not (first[1] or sessions):
             continue
-        why = f'{(other if known else first).path} has no session that says what it is'
-        if known and sessions:
-            what = session_differences(next(iter(known.values())), next(iter(sessions.values())))
-            why = ': '.join(['their sessions differ', *(['; '.join(what[:_TOLD])] if what else [])])
+        why = f'{(other if first[1] else first[0]).path} has no session that says what it is'
+        if first[1] and sessions:
+            differences = session_differences(min(first[1]), min(sessions))
+            why = ': '.join(['their sessions differ', '; '.join(differences[:_LISTED])])
         raise MergeError(
-            f'{first.path} and {other.path} may be different drives: {why}; '
+            f'{first[0].path} and {other.path} may be different drives: {why}; '
             'merge them with --different-sessions'
         )
 
 
-def _sessions(recording: Recording) -> dict[bytes, str]:
-    """Return {message: text} of all session messages in a recording."""
+def _sessions(recording: Recording) -> set[str]:
+    """Return the texts of all session messages in a recording."""
     names = [name for name in recording if registered_topic(name, recording.topics[name].type) is SESSION]
-    return {
-        recording[name].payloads[place]: recording[name].message(place).data
-        for name in names
-        for place in range(len(recording[name]))
-    }
+    return {message.data for name in names for message in recording[name].messages()}
 
 
-def _united(topic: TopicInformation, parts: Sequence[Messages]) -> Messages:
+def _united(parts: Sequence[Messages]) -> Messages:
     """Return the messages of all parts without those that an earlier part has as well.
 
     Each part may repeat what the others have as often as the one that has it most often.
     """
     times, counts = np.unique(
-        np.concatenate([np.unique(part.log_times) for part in parts]), return_counts=True
+        np.concatenate([np.unique(part.heads['log_time']) for part in parts]), return_counts=True
     )
     most, kept = Counter[tuple[int, int, bytes]](), []
     for part in parts:
         own = Counter[tuple[int, int, bytes]]()
         is_new = np.ones(len(part), bool)
-        for place in np.flatnonzero(np.isin(part.log_times, times[counts > 1])).tolist():
-            key = int(part.log_times[place]), int(part.publish_times[place]), part.payloads[place]
+        log_times, sent = part.heads['log_time'], part.heads['publish_time']
+        for place in np.flatnonzero(np.isin(log_times, times[counts > 1])).tolist():
+            key = int(log_times[place]), int(sent[place]), part.payloads[place]
             own[key] += 1
             is_new[place] = own[key] > most[key]
         most |= own
-        kept.append(part.chosen(np.flatnonzero(is_new)))
-    return joined(topic, kept)
-
-
-def _holes(recordings: Sequence[Recording]) -> list[str]:
-    """Return a sentence for each time span between the parts of which no part tells."""
-    spans = sorted(span for span in map(_streamed, recordings) if span is not None)
-    latest = np.maximum.accumulate([last for _, last in spans])
-    gaps = [(first - before) / 1e9 for (first, _), before in zip(spans[1:], latest, strict=False)]
-    return [f'between two parts {gap:.3f} s are missing' for gap in gaps if gap > _HOLE]
-
-
-def _streamed(recording: Recording) -> tuple[int, int] | None:
-    """Return first and last log time (ns) of the topic with most messages; latched ones came earlier."""
-    streams = [
-        topic
-        for topic in recording.topics.values()
-        if topic.message_count
-        and (
-            (known := registered_topic(topic.name, topic.type)) is None
-            or known.delivery is not Delivery.LATCHED
-        )
-    ]
-    if not streams:
-        return None
-    times = recording[max(streams, key=lambda topic: topic.message_count).name].receive_times
-    return int(times.min()), int(times.max())
+        kept.append(part.at(np.flatnonzero(is_new)))
+    payloads = Payloads([part.payloads.messages for part in kept if len(part)])
+    united = Messages(parts[0].topic, np.concatenate([part.heads for part in kept]), payloads)
+    return united.at(np.argsort(united.heads['log_time'], kind='stable'))

@@ -4,10 +4,14 @@ import functools
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, TypeVar
 
 import yaml
+from rosbags.interfaces import QosTime
+from rosbags.rosbag2.metadata import parse_qos
 
+from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_recorder.metadata import NANOSECONDS, ROOT, VERSION, OfferedQos
 
@@ -18,33 +22,38 @@ class MetadataError(ValueError):
     """A description of a recording is not understood."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TopicInformation:
     """One topic of a recording."""
 
     name: str
     type: str
-    message_count: int
+    message_count: int = 0
     serialization_format: str = 'cdr'
     offered_qos: tuple[OfferedQos, ...] = ()
     type_hash: str = ''
-    units: Mapping[str, str] = field(default_factory=dict)  # by field, where the channel tells them
+    units: Mapping[str, str] = field(default_factory=dict)
+    """By field, where the channel tells them."""
+    stored: StoredTopic | None = None
+    """As the files declare it."""
+    stored_count: int = 0
+    """Messages in the files, repetitions included; `message_count` is without these."""
+    places: dict[Any, list[int]] = field(default_factory=dict)
+    """The files that hold it, and its numbers in each."""
+    other_types: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
 class BagInformation:
-    """A whole recording; times in ns."""
+    """A whole recording."""
 
     topics: tuple[TopicInformation, ...]
     files: tuple[str, ...]  # their names
-    starting_time: int
-    duration: int
     message_count: int
     ros_distro: str = ''
     custom_data: Mapping[str, str] = field(default_factory=dict)
     version: int = VERSION
     storage: str = 'mcap'
-    compression_format: str = ''
     compression_mode: str = ''
 
 
@@ -59,20 +68,15 @@ def read_metadata(text: str) -> BagInformation:
 
 
 def _bag(document: Any) -> BagInformation:
-    optional = {
-        name: _checked(document.get(name) or '', str)
-        for name in ('ros_distro', 'compression_format', 'compression_mode')
-    }
     return BagInformation(
         topics=tuple(_topic(entry) for entry in document['topics_with_message_count'] or ()),
         files=tuple(_checked(path, str) for path in document['relative_file_paths']),
-        starting_time=_checked(document['starting_time']['nanoseconds_since_epoch'], int),
-        duration=_checked(document['duration']['nanoseconds'], int),
         message_count=_count(document),
+        ros_distro=_checked(document.get('ros_distro') or '', str),
         custom_data={name: str(value) for name, value in (document.get('custom_data') or {}).items()},
         version=_checked(document['version'], int),
         storage=_checked(document['storage_identifier'], str),
-        **optional,
+        compression_mode=_checked(document.get('compression_mode') or '', str),
     )
 
 
@@ -102,29 +106,6 @@ def _count(entry: Any) -> int:
     return count
 
 
-# The position of a word is its number in rmw/types.h.
-_POLICIES = {
-    'history': 'system_default keep_last keep_all unknown',
-    'reliability': 'system_default reliable best_effort unknown best_available',
-    'durability': 'system_default transient_local volatile unknown best_available',
-    'liveliness': 'system_default automatic manual_by_node manual_by_topic unknown best_available',
-}
-_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
-
-
-class QosError(ValueError):
-    """The quality of service in a bag is not understood."""
-
-
-def read_qos(source: Any) -> tuple[OfferedQos, ...]:
-    """Return the offers in `source`: YAML text or the list that it holds; raises `QosError`."""
-    try:
-        return _offers_in(source) if isinstance(source, str) else _offers(source)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise QosError(f'offered quality of service not understood: {reason}') from None
-
-
 # The topics of a recording, and of many recordings, have the same few texts.
 @functools.lru_cache(maxsize=64)
 def _offers_in(text: str) -> tuple[OfferedQos, ...]:
@@ -132,34 +113,23 @@ def _offers_in(text: str) -> tuple[OfferedQos, ...]:
 
 
 def _offers(documents: Any) -> tuple[OfferedQos, ...]:
-    return tuple(_offer(document) for document in documents or ())
+    return tuple(OfferedQos(*map(_plain, offer)) for offer in parse_qos(documents or []))
 
 
-def _offer(document: Any) -> OfferedQos:
-    return OfferedQos(
-        depth=int(document['depth']),
-        avoid_ros_namespace_conventions=bool(document['avoid_ros_namespace_conventions']),
-        **{name: _word(document[name], words.split()) for name, words in _POLICIES.items()},
-        **{
-            name: int(document[name]['sec']) * NANOSECONDS + int(document[name]['nsec'])
-            for name in _DURATIONS
-        },
-    )
-
-
-def _word(value: Any, words: list[str]) -> str:
-    if not isinstance(value, int):
-        return str(value)
-    if not 0 <= value < len(words):
-        raise ValueError(f'policy {value} is none of {", ".join(words)}')
-    return words[value]
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.name.lower()
+    return value.sec * NANOSECONDS + value.nsec if isinstance(value, QosTime) else value
 
 
 def readable_qos(source: Any) -> tuple[OfferedQos, ...]:
-    """Return the offers in `source`, none where they are not understood: no message needs them."""
+    """Return the offers in `source`, YAML text or the list that it holds.
+
+    None where they are not understood: no message needs them.
+    """
     try:
-        return read_qos(source)
-    except QosError:
+        return _offers_in(source) if isinstance(source, str) else _offers(source)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError):
         return ()
 
 

@@ -3,15 +3,15 @@
 import contextlib
 import copy
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.collector import RECEIVED, SENT, STAMPS, Collector
-from engine_mount.recordings.definitions import Definition
+from engine_mount.recordings.mcap_file import McapFile
+from engine_mount.recordings.mcap_records import HEAD, StorageError, StoredMessages
 from engine_mount.recordings.metadata import (
     ZERO_KEY,
     BagInformation,
@@ -21,20 +21,20 @@ from engine_mount.recordings.metadata import (
     read_metadata,
 )
 from engine_mount.recordings.pieces import (
-    Declared,
-    Pieces,
     declared_topics,
+    definition_of,
     find_pieces,
     open_piece,
     repeated_topics,
 )
-from engine_mount.recordings.series import Payloads, Series, SeriesError, TopicTimes
-from engine_mount.recordings.stored import HEAD, StorageError, StoredFile, StoredMessages
-from engine_mount.recordings.time_axis import TimeAxis, anchors
-from engine_mount.recordings.times import NO_TIMES, Times, shared
+from engine_mount.recordings.series import Messages, Payloads, Series, SeriesError
+from engine_mount.recordings.times import TimeAxis, anchors
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.topic_groups import registered_topic
-from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, JOINT_STATE
+
+# Names of times among columns: no field has such a name, behind the / is that of the property of a `Series`.
+_STAMPS, _RECEIVED, _SENT = '/stamps', '/receive_times', '/publish_times'
 
 
 class ReadingError(ValueError):
@@ -57,32 +57,52 @@ class Recording:
         self.path = path
         self.mount = ''
         """Of which of several mounts these are the topics; empty: of all."""
-        self.warnings: list[str] = []
+        self.files: list[McapFile] = []
+        self._series: dict[str, Series] = {}
+        reasons = []
         try:
             pieces = find_pieces(path)
+            for place in pieces.paths:
+                try:
+                    self.files.append(open_piece(place))
+                except StorageError as error:
+                    reasons.append(str(error))
+            if not self.files:
+                raise StorageError('; '.join(reasons) or f'{path} holds no MCAP file')
         except StorageError as error:
             raise ReadingError(str(error)) from None
-        self.warnings += pieces.warnings
-        self.information: BagInformation | None = pieces.information
-        self.files: list[StoredFile] = self._open(pieces)
-        self._complete = pieces.complete and len(self.files) == len(pieces.paths)
-        if self.information is None:
-            self._read_embedded_description()
-        self._declared: dict[str, Declared] = declared_topics(self.files, self.information)
-        self.topics: dict[str, TopicInformation] = {
-            name: declared.information for name, declared in self._declared.items()
-        }
+        self.warnings: list[str] = [*pieces.warnings, *reasons]
+        for file in self.files:
+            self.warnings += file.warnings
+            file.warnings = self.warnings  # what is found later, while a topic is read, comes here too
+        self._complete = pieces.complete and not reasons
+        self.information: BagInformation | None = pieces.information or self._embedded_description()
+        listed = self.information.topics if self.information else ()
+        self.topics: dict[str, TopicInformation] = declared_topics(self.files, listed)
         self.missing: dict[str, int] = {}
         """How many messages of a topic are known to be missing."""
-        self._counts_agree = False
-        self.described = pieces.information is not None and len(pieces.information.files) >= len(self.files)
-        """Whether `metadata.yaml` covers all files."""
-        if self.described:
-            self._compare_counts()
-        self._definitions: dict[str, tuple[Definition | None, str]] = {}
-        self._check_topics()
-        self._series: dict[str, Series] = {}
-        self._time_axis: TimeAxis | None = None
+        self.described_count: int | None = None
+        """How many messages `metadata.yaml` lists, repetitions included, if it covers all files."""
+        if pieces.information is not None and len(pieces.information.files) >= len(self.files):
+            self.described_count = pieces.information.message_count
+            total = sum(topic.stored_count for topic in self.topics.values())
+            if self._complete and self.described_count != total:
+                lists = f'{METADATA_NAME} lists {self.described_count} messages'
+                self.warnings.append(f'{lists}, the files hold {total}')
+            for topic in () if self.proven else pieces.information.topics:
+                missing = topic.message_count - self.topics[topic.name].stored_count
+                self.missing |= {topic.name: missing} if missing > 0 else {}
+        self._definitions = {name: definition_of(topic) for name, topic in self.topics.items()}
+        for name, topic in self.topics.items():
+            definition, sentence = self._definitions[name]
+            if topic.other_types:
+                others = ', '.join(sorted(topic.other_types))
+                self.warnings.append(
+                    f'{name}: messages of {others} are left out; read are those of {topic.type}'
+                )
+            if sentence and topic.message_count:
+                remedy = 'the installed one is used' if definition else 'only its raw bytes can be read'
+                self.warnings.append(f'{name}: {sentence}; {remedy}')
 
     @property
     def mounts(self) -> list[str]:
@@ -103,7 +123,8 @@ class Recording:
         part = copy.copy(self)
         part.mount = mount
         part.topics = {name: topic for name, topic in self.topics.items() if not name.startswith(others)}
-        part._series, part._time_axis = {}, None
+        part._series = {}
+        part.__dict__.pop('time_axis', None)
         return part
 
     @property
@@ -116,17 +137,13 @@ class Recording:
         """Whether nothing is known to be missing; damage inside of a topic is known once that was read."""
         if self.missing or not self._complete or any(file.damaged for file in self.files):
             return False
-        return all(file.whole for file in self.files) or self._counts_agree
+        held = sum(topic.stored_count for topic in self.topics.values())
+        return all(file.whole for file in self.files) or self.described_count == held
 
     @property
     def proven(self) -> bool:
         """Whether no file is missing and checksums vouch for the account that each gives of itself."""
         return self._complete and all(file.proven for file in self.files)
-
-    @property
-    def lost_beside(self) -> list[str]:
-        """The names of attachments and metadata that are known to be lost."""
-        return [name for file in self.files for name in file.lost_beside]
 
     @property
     def time_range(self) -> tuple[int, int] | None:
@@ -140,12 +157,19 @@ class Recording:
         path = self.path.absolute()
         return f'{path.parent.name}/{path.name}' if path.name == 'recording' else path.name
 
-    @property
+    @cached_property
     def time_axis(self) -> TimeAxis:
-        """The time axis shown to users, read once: where `times` were read before, without messages."""
-        if self._time_axis is None:
-            self._time_axis = self._find_axis()
-        return self._time_axis
+        """The time axis shown to users."""
+        zeros = [zero for step in origin(self.information) if isinstance(zero := step.get(ZERO_KEY), int)]
+        for name in anchors({name: topic.type for name, topic in self.topics.items() if topic.message_count}):
+            self._read_columns({name: (_STAMPS, _RECEIVED)})
+            with contextlib.suppress(SeriesError):  # of a foreign topic
+                series = self[name]
+                if len(series.stamps):
+                    break
+        else:
+            return TimeAxis(*[np.array([self.time_range[0] if self.time_range else 0])] * 2, zeros)
+        return TimeAxis(series.stamps, series.receive_times, zeros)
 
     def __contains__(self, name: str) -> bool:
         return len(self._candidates(name)) == 1
@@ -172,19 +196,15 @@ class Recording:
         What else is wanted of these topics later, such as a message or a column that is not in each of them,
         is read then.
         """
-        wanted = {self.resolve(topic): set(names) for topic, names in columns.items()}
-        for name, series in self._series.items():
-            if name in wanted:
-                wanted[name] -= wanted[name] if series.loaded else series.columns.keys()
-        known: list[Times] = []
-        collected = self._collect(
-            {name: {RECEIVED, STAMPS, *names} for name, names in wanted.items() if names}
-        )
-        for name, collector in collected.items():
-            found = collector.columns
-            received, stamps = found.pop(RECEIVED, NO_TIMES), found.pop(STAMPS, None)
-            series = self._series.setdefault(name, self._make_series(name, partial(self._read_one, name)))
-            series.add_columns(found, received, None if stamps is None else shared(stamps, known))
+        self._read_columns({topic: (_RECEIVED, _STAMPS, *names) for topic, names in columns.items()})
+
+    def load_times(self) -> None:
+        """Read the stamps of all topics in one pass, and of setpoints the other times."""
+        wanted = {}
+        for name, topic in self.topics.items():
+            answers = registered_topic(name, topic.type) is CURRENT_SETPOINT
+            wanted[name] = (_STAMPS, _RECEIVED, _SENT) if answers else (_STAMPS,)
+        self._read_columns(wanted)
 
     def release(self) -> None:
         """Forget what was read of the topics: it is read again where it is needed."""
@@ -196,18 +216,27 @@ class Recording:
         Only these are in memory. Raises `ReadingError`.
         """
         counts = {self.resolve(name): 0 for name in names}
-        for name, block in self._blocks(list(counts)) if counts else ():
-            counts[name] += len(block)
-            for begin in range(0, len(block), size or len(block)):
-                part = block.at(slice(begin, begin + size if size else None))
-                yield self._make_series(name, (Payloads([part.payloads()]), part.heads))
-        for name, count in counts.items():
-            self._note_damage(name, count)
-
-    def axis_from(self, stamps: Times, received: Times) -> TimeAxis:
-        """Return the time axis by these samples of its topic alone, at least one (ns)."""
-        zeros = [step.get(ZERO_KEY) for step in origin(self.information)]
-        return TimeAxis(stamps, received, [zero for zero in zeros if isinstance(zero, int)])
+        places = {
+            file: [n for name in counts for n in self.topics[name].places.get(file, ())]
+            for file in self.files
+        }
+        for file, block, _ in self.stored_blocks(places):
+            for name in counts:
+                numbers = self.topics[name].places.get(file)
+                if not numbers:
+                    continue
+                own = block.of(numbers)
+                counts[name] += len(own)
+                for begin in range(0, len(own), size or len(own) or 1):
+                    part = own.at(slice(begin, begin + size if size else None))
+                    yield self._make_series(name, (Payloads([part.payloads()]), part.heads))
+        for name, present in counts.items():
+            expected = self.topics[name].message_count
+            if self.missing.get(name, 0) < expected - present:
+                self.warnings.append(
+                    f'{name}: {expected - present} of {expected} messages are lost by damage'
+                )
+                self.missing[name] = expected - present
 
     def latched(self, name: str) -> Any:
         """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
@@ -216,25 +245,12 @@ class Recording:
             raise ReadingError(f'{series.topic} has no message in {self.path}')
         return series.message(len(series) - 1)
 
-    def times(self) -> dict[str, TopicTimes]:
-        """Return the times of all topics: one pass through the files, no message is kept.
-
-        Those of sending are kept of setpoints, those of arrival also of the topic of the time axis.
-        """
-        anchor = next(iter(anchors(self._types)), '') if self._time_axis is None else ''
-        found = self._times_of(self.topics, anchor)
-        samples = found.get(anchor)
-        if samples and samples.stamps is not None and samples.receive_times is not None:
-            self._time_axis = self.axis_from(samples.stamps, samples.receive_times)
-        return found
-
     def resolve(self, name: str) -> str:
         """Return the full name of the topic meant by `name`, which may lack its namespace."""
         candidates = self._candidates(name)
         if not candidates:
-            raise ReadingError(
-                f'{self.path} has no topic {name!r}; it has {", ".join(self.topics) or "none"}'
-            )
+            known = ', '.join(self.topics) or 'none'
+            raise ReadingError(f'{self.path} has no topic {name!r}; it has {known}')
         if len(candidates) > 1:
             raise ReadingError(f'{name!r} is ambiguous in {self.path}: {", ".join(candidates)}')
         return candidates[0]
@@ -245,124 +261,57 @@ class Recording:
                 return [full_name]
         return [full_name for full_name in self.topics if full_name.endswith(f'/{name}')]
 
-    # Opening.
-
-    def _open(self, pieces: Pieces) -> list[StoredFile]:
-        files, reasons = [], []
-        for path in pieces.paths:
-            try:
-                files.append(open_piece(path))
-            except StorageError as error:
-                reasons.append(str(error))
-        if not files:
-            raise ReadingError('; '.join(reasons) or f'{self.path} holds no MCAP file')
-        self.warnings += reasons
-        for file in files:
-            self.warnings += file.warnings
-            file.warnings = self.warnings  # what is found later, while a topic is read, comes here too
-        return files
-
-    def _read_embedded_description(self) -> None:
+    def _embedded_description(self) -> BagInformation | None:
         text = self.files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
-        if text:
-            try:
-                self.information = read_metadata(text)
-            except MetadataError as error:
-                self.warnings.append(f'{self.files[0].path.name}: {error}')
+        try:
+            return read_metadata(text) if text else None
+        except MetadataError as error:
+            self.warnings.append(f'{self.files[0].path.name}: {error}')
+            return None
 
-    def _compare_counts(self) -> None:
-        """Compare how many messages the description and the files have."""
-        assert self.information is not None
-        held = {name: declared.stored for name, declared in self._declared.items()}
-        described, total = self.information.message_count, sum(held.values())
-        self._counts_agree = described == total
-        if self._complete and not self._counts_agree:
-            self.warnings.append(f'{METADATA_NAME} lists {described} messages, the files hold {total}')
-        if not self.proven:
-            for topic in self.information.topics:
-                if topic.message_count > held.get(topic.name, 0):
-                    self.missing[topic.name] = topic.message_count - held.get(topic.name, 0)
-
-    def _check_topics(self) -> None:
-        for name, declared in self._declared.items():
-            definition, sentence = self._definitions[name] = declared.definition()
-            if declared.other_types:
-                others = ', '.join(sorted(declared.other_types))
-                kept = declared.information.type
-                self.warnings.append(f'{name}: messages of {others} are left out; read are those of {kept}')
-            if sentence and declared.information.message_count:
-                what = 'the installed one is used' if definition else 'only its raw bytes can be read'
-                self.warnings.append(f'{name}: {sentence}; {what}')
-
-    # Reading.
-
-    @property
-    def _types(self) -> dict[str, str]:
-        """The types of the topics that have messages."""
-        return {name: topic.type for name, topic in self.topics.items() if topic.message_count}
-
-    def _times_of(self, names: Iterable[str], received: str) -> dict[str, TopicTimes]:
-        """Return the times of topics, those of arrival of the topic `received`."""
-        wanted: dict[str, set[str]] = {name: {STAMPS} for name in names}
-        for name, columns in wanted.items():
-            if registered_topic(name, self.topics[name].type) is CURRENT_SETPOINT:
-                columns |= {RECEIVED, SENT}
-            elif name == received:
-                columns.add(RECEIVED)
-        times: dict[str, TopicTimes] = {}
-        known: list[Times] = []
-        for name, collector in self._collect(wanted).items():
-            found, obstacle = collector.columns, collector.obstacles.get(STAMPS, '')
-            stamps = found.get(STAMPS, None if obstacle else NO_TIMES)
-            times[name] = TopicTimes(
-                name,
-                self.topics[name].type,
-                collector.count,
-                None if stamps is None else shared(stamps, known),
-                found.get(RECEIVED),
-                found.get(SENT),
-                collector.names,
-                obstacle.removeprefix(f'{name}: ').removesuffix('; use receive_times'),
+    def _read_columns(self, wanted: Mapping[str, Iterable[str]]) -> None:
+        """Read columns and times that are not in memory; a column that not every message has is left out."""
+        found: dict[str, dict[str, list[np.ndarray]]] = {}
+        for topic, names in wanted.items():
+            name = self.resolve(topic)
+            series = self._series.setdefault(
+                name, self._make_series(name, lambda name=name: self._read([name])[name])
             )
-        return times
+            if not series.loaded and not series.known >= set(names):
+                series.count, series.known = 0, series.known | set(names)
+                found[name] = {column: [] for column in names}
+        for part in self.parts(found):
+            series = self._series[part.topic]
+            if not series.count and part.type == JOINT_STATE:
+                with contextlib.suppress(SeriesError):
+                    series.first_names = part.names
+            series.count = (series.count or 0) + len(part)
+            for column, parts in tuple(found[part.topic].items()):
+                try:
+                    parts.append(getattr(part, column[1:]) if column[0] == '/' else part[column])
+                except SeriesError as error:
+                    del found[part.topic][column]
+                    if column == _STAMPS and series.count == len(part):  # else it counts from the part
+                        series.stamp_obstacle = str(error)
+        shared: list[np.ndarray] = []  # topics of a mount have the same stamps
+        for name, columns in found.items():
+            for column, parts in columns.items():
+                values = np.concatenate(parts) if parts else np.empty(0, np.int64)
+                if column[0] == '/':
+                    shared.append(next((each for each in shared if np.array_equal(each, values)), values))
+                    setattr(self._series[name], column[1:], shared[-1])
+                elif parts:
+                    self._series[name].columns[column] = values
 
-    def _collect(self, wanted: Mapping[str, Iterable[str]]) -> dict[str, Collector]:
-        """Return columns and times of topics, read in one pass."""
-        found = {name: Collector(wanted[name], self.topics[name].message_count) for name in wanted}
-        for part in self.parts(wanted):
-            found[part.topic].add(part)
-        return found
-
-    def _find_axis(self) -> TimeAxis:
-        for name in anchors(self._types):
-            samples: Series | TopicTimes | None = self._series.get(name)
-            if samples is None:
-                samples = self._times_of([name], name)[name]
-            with contextlib.suppress(SeriesError):  # of a foreign topic
-                stamps, received = samples.stamps, samples.receive_times
-                if stamps is not None and received is not None and len(stamps):
-                    return self.axis_from(stamps, received)
-        only = np.array([self.time_range[0] if self.time_range else 0])
-        return self.axis_from(only, only)
-
-    def _read(self, names: Sequence[str]) -> dict[str, tuple[Payloads, np.ndarray]]:
+    def _read(self, names: Iterable[str]) -> dict[str, Messages]:
         """Return bytes and heads of all messages of topics."""
-        payloads: dict[str, list] = {name: [] for name in names}
-        heads: dict[str, list[np.ndarray]] = {name: [np.empty(0, HEAD)] for name in names}
-        for name, block in self._blocks(names) if names else ():
-            payloads[name].append(block.payloads())
-            heads[name].append(block.heads)
-        found = {name: (Payloads(payloads.pop(name)), np.concatenate(heads.pop(name))) for name in names}
-        for name, (messages, _) in found.items():
-            self._note_damage(name, len(messages))
-        return found
+        found: dict[str, tuple[list, list]] = {name: ([], [np.empty(0, HEAD)]) for name in names}
+        for part in self.parts(found):
+            found[part.topic][0].append(part.payloads.messages)
+            found[part.topic][1].append(part.heads)
+        return {name: (Payloads(raw), np.concatenate(heads)) for name, (raw, heads) in found.items()}
 
-    def _read_one(self, name: str) -> tuple[Payloads, np.ndarray]:
-        return self._read([name])[name]
-
-    def _make_series(
-        self, name: str, messages: tuple[Payloads, np.ndarray] | Callable[[], tuple[Payloads, np.ndarray]]
-    ) -> Series:
+    def _make_series(self, name: str, messages: Any) -> Series:
         definition, sentence = self._definitions[name]
         return Series(
             name,
@@ -374,29 +323,25 @@ class Recording:
             units=self.topics[name].units,
         )
 
-    def _note_damage(self, name: str, present: int) -> None:
-        expected = self.topics[name].message_count
-        if present < expected and self.missing.get(name, 0) < expected - present:
-            self.warnings.append(f'{name}: {expected - present} of {expected} messages are lost by damage')
-            self.missing[name] = expected - present
+    def stored_blocks(
+        self, places: Mapping[McapFile, Sequence[int]]
+    ) -> Iterator[tuple[McapFile, StoredMessages, int]]:
+        """Yield the messages of topics, given by their numbers in each file, in the order of the files.
 
-    def _blocks(self, names: Sequence[str]) -> Iterator[tuple[str, StoredMessages]]:
-        """Yield the messages of topics, without those that a piece repeats from the one before."""
+        Messages that a file repeats of the one before are left out; how many stands beside each block.
+        """
         last: dict[str, tuple[bytes, int]] = {}
-        repetitions = repeated_topics(self.files)
-        watched = frozenset().union(*repetitions)
-        for file, repeated in zip(self.files, repetitions, strict=True):
-            topics = {name: numbers for name in names if (numbers := self._declared[name].numbers_in(file))}
-            heads = set(repeated)
-            for block in file.blocks({number for numbers in topics.values() for number in numbers}):
-                for name, numbers in topics.items():
-                    found = block if len(topics) == 1 else block.of(numbers)
-                    if not len(found):
-                        continue
-                    if name in heads and found.message(0) == last.get(name):
-                        found = found.at(slice(1, None))
-                    heads.discard(name)
-                    if len(found):
-                        if name in watched:
-                            last[name] = found.message(-1)
-                        yield name, found
+        watched = frozenset().union(*map(repeated_topics, self.files))
+        for file in filter(places.get, self.files):
+            repeated = set(repeated_topics(file))
+            for block in file.blocks(places[file]):
+                is_new = np.ones(len(block), bool)
+                for number in places[file]:
+                    name = file.topics[number].name
+                    own = np.flatnonzero((block.heads['topic'] == number) & (name in watched))
+                    if len(own):
+                        is_new[own[0]] = name not in repeated or block.message(own[0]) != last.get(name)
+                        repeated.discard(name)
+                        last[name] = block.message(own[-1])
+                left_out = int(np.count_nonzero(~is_new))
+                yield file, block.at(np.flatnonzero(is_new)) if left_out else block, left_out

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from engine_mount.recordings.bag_copy import BagCopy
-from engine_mount.recordings.mcap_file import McapFile
 from engine_mount.recordings.metadata import read_statement
-from engine_mount.recordings.pieces import repeated_topics
-from engine_mount.recordings.recording import Recording, open_recording
+from engine_mount.recordings.recording import open_recording
 from mount_recorder.losses import RECORDER_RECORD
 
 Progress = Callable[[int, int], None]  # messages done, messages in all
@@ -38,21 +36,13 @@ class Recovery:
     kept_seconds: float  # from the first to the last message
     kept_bytes: int
     lost_bytes: int
-    all_messages: bool
-    lost_beside: tuple[str, ...]  # names of attachments and metadata
+    complete: bool  # nothing of the file is lost
     lost_before: int
     notes: tuple[str, ...]
 
-    @property
-    def complete(self) -> bool:
-        """Whether nothing of the file is lost."""
-        return self.all_messages and not self.lost_beside
-
     def __str__(self) -> str:
         kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s, {_size(self.kept_bytes)}'
-        losses = [] if self.all_messages else [self._lost_text()]
-        losses += [', '.join(self.lost_beside)] if self.lost_beside else []
-        lost = f'lost {"; and ".join(losses)}' if losses else 'nothing of the file is missing'
+        lost = 'nothing of the file is missing' if self.complete else f'lost {self._lost_text()}'
         if self.lost_before:
             lost += f', but {self.lost_before} messages never reached it, as its recorder says'
         return f'{kept}; {lost}'
@@ -73,74 +63,44 @@ def recover(
     """
     recording = open_recording(path)
     with BagCopy(out) as bag:
-        stored = _copy(recording, bag, progress)
+        channels = {
+            (file, number): bag.channel_of(topic)
+            for file in recording.files
+            for number, topic in file.topics.items()
+        }
+        stored = 0  # in the files, repetitions included
+        for file, block, repeated in recording.stored_blocks(
+            {file: list(file.topics) for file in recording.files}
+        ):
+            stored += len(block) + repeated
+            heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
+            for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
+                bag.write(channels[file, number], raw, *head)
+            if progress is not None:
+                progress(bag.added, recording.message_count)
         if not bag.added:
             reasons = '; '.join(recording.warnings) or 'it is empty'
             raise RecoveryError(f'{path} holds no message that can be recovered: {reasons}')
         custom = dict(recording.information.custom_data) if recording.information else {}
         custom['recovered_from'] = f'{recording.path.name}: {stored} messages'
         bag.complete([recording], None, custom)
-    return _balance(recording, bag, stored)
-
-
-def _copy(recording: Recording, bag: BagCopy, progress: Progress | None) -> int:
-    """Write all messages to `bag` and return how many the files hold, repetitions included."""
-    stored, repeated = 0, repeated_topics(recording.files)
-    last: dict[str, tuple[bytes, int]] = {}
-    watched = frozenset().union(*repeated)
-    for file, names in zip(recording.files, repeated, strict=True):
-        targets = {number: bag.channel_of(topic) for number, topic in file.topics.items()}
-        pending = set(names)
-        for block in file.blocks(file.topics.keys()):
-            stored += len(block)
-            heads = block.heads[['topic', 'sequence', 'log_time', 'publish_time']].tolist()
-            rows = zip(heads, map(bytes, block.payloads()), strict=True)
-            for (number, sequence, log_time, publish_time), raw in rows:
-                name = file.topics[number].name
-                if name in watched:
-                    is_first, same = name in pending, last.get(name) == (raw, publish_time)
-                    pending.discard(name)
-                    last[name] = raw, publish_time
-                    if is_first and same:
-                        continue
-                bag.write(targets[number], raw, log_time, publish_time, sequence)
-            if progress is not None:
-                progress(bag.added, recording.message_count)
-    return stored
-
-
-def _balance(recording: Recording, bag: BagCopy, stored: int) -> Recovery:
-    files = [file for file in recording.files if isinstance(file, McapFile)]
-    lost_bytes = sum(map(_lost_bytes, files))
-    expected = _expected(recording)
+    expected = recording.described_count
+    if recording.proven:
+        expected = sum(sum(file.message_counts.values()) for file in recording.files)
     complete = recording.whole and (expected is None or expected <= stored)
+    lost_bytes = sum(file.lost_bytes for file in recording.files)
     statements = [read_statement(file.metadata.get(RECORDER_RECORD, {})) for file in recording.files]
-    first, last = bag.time_range
     return Recovery(
         folder=bag.folder,
         kept=bag.added,
         lost=0 if complete else None if expected is None else max(0, expected - stored),
-        kept_seconds=(last - first) / 1e9,
+        kept_seconds=bag.seconds,
         kept_bytes=sum(file.path.stat().st_size for file in recording.files) - lost_bytes,
         lost_bytes=lost_bytes,
-        all_messages=complete,
-        lost_beside=tuple(recording.lost_beside),
+        complete=complete,
         lost_before=sum(row.get('lost', 0) for rows in statements for row in rows.values()),
-        notes=tuple(recording.warnings),
+        notes=(*recording.warnings, *bag.notes),
     )
-
-
-def _expected(recording: Recording) -> int | None:
-    """Return how many messages there once were, None if no reliable source tells."""
-    if recording.proven:
-        return sum(sum(file.message_counts.values()) for file in recording.files)
-    information = recording.information
-    return information.message_count if information is not None and recording.described else None
-
-
-def _lost_bytes(file: McapFile) -> int:
-    damaged = sum(chunk.end - chunk.position for chunk in file.chunks if file.is_damaged(chunk))
-    return damaged + sum(stretch.end - stretch.begin for stretch in file.unexplained)
 
 
 def _size(count: int) -> str:

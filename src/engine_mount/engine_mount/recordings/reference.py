@@ -11,15 +11,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from engine_mount.recordings.bag_copy import Messages, in_log_order, read_messages
-from engine_mount.recordings.compare import Comparison, compare
+from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
+from engine_mount.recordings.compare import compare
 from engine_mount.recordings.difference import time_text as moment_text
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
-from engine_mount.recordings.times import Times, distinct
+from engine_mount.recordings.times import distinct
 from mount_models.plain_yaml import YamlError, yaml_in_file
-from mount_recorder.bag_writer import BagWriter
 from mount_recorder.session import session_message, session_text, time_text
 from mount_ros.topics import (
     AIR_GAP,
@@ -47,42 +46,28 @@ def differences_from_reference(
     every answer must be there and no other; of the ramp before it those that both have are compared. Raises
     `ReadingError` or `ComparisonError` where that cannot be told.
     """
-    a, b = _opened(reference), _opened(replayed)
+    a, b = (each if isinstance(each, Recording) else open_recording(each) for each in (reference, replayed))
     comparison = compare(a, b, topics=ANSWERS)
     if not comparison.alignment.same_stamps:
         return ['the replay has other stamps than the reference: it answers other samples']
-    sentences = comparison.difference_sentences()
-    for topic in ANSWERS:
-        sentences += _unmatched(a, b, topic, comparison)
-    return sentences
-
-
-def _opened(recording: Recording | str | os.PathLike[str]) -> Recording:
-    return recording if isinstance(recording, Recording) else open_recording(recording)
-
-
-def _unmatched(a: Recording, b: Recording, topic: Topic, comparison: Comparison) -> list[str]:
     traced = a[CONTROL_TRACE.name].stamps
     if not len(traced):
         return ['the reference holds no control_trace: there is nothing to meet']
-    # When mount_control is deactivated it answers its last sample a second time, with 0 A; so unique.
-    stamps_a, stamps_b = (_since(recording, topic, int(traced.min())) for recording in (a, b))
-    sentences = []
-    for here, there, where in ((stamps_a, stamps_b, 'the replay'), (stamps_b, stamps_a, 'the reference')):
-        missing = np.setdiff1d(here, there)
-        if len(missing):
-            first = moment_text(float(comparison.alignment.axis.of_stamps(missing[:1])[0]))
-            sentences.append(
-                f'{len(missing)} samples of {topic.name} are missing in {where}, first at {first}'
-            )
+    sentences = comparison.difference_sentences()
+    for topic in ANSWERS:
+        # When mount_control is deactivated it answers its last sample a second time, with 0 A; so distinct.
+        stamps = [
+            distinct(each[topic.name].stamps) if topic.name in each else np.empty(0, np.int64)
+            for each in (a, b)
+        ]
+        for here, there, where in ((*stamps, 'the replay'), (*stamps[::-1], 'the reference')):
+            missing = np.setdiff1d(here[here >= traced.min()], there)
+            if len(missing):
+                first = moment_text(float(comparison.alignment.axis.of_stamps(missing[:1])[0]))
+                sentences.append(
+                    f'{len(missing)} samples of {topic.name} are missing in {where}, first at {first}'
+                )
     return sentences
-
-
-def _since(recording: Recording, topic: Topic, first: int) -> Times:
-    if topic.name not in recording:
-        return np.empty(0, np.int64)
-    stamps = distinct(recording[topic.name].stamps)
-    return stamps[stamps >= first]
 
 
 ACCEPTED_NAME = 'accepted.yaml'
@@ -121,13 +106,27 @@ def accept(
     target = folder / name
     before = open_recording(target) if target.exists() else None
     parts = _parts(run, before)
-    changes = _changes(before, run) if before is not None else []
+    changes: list[str] = []
+    if before is not None:
+        comparison = compare(before, run, topics=(*_INPUTS, *ANSWERS), common_only=True)
+        if comparison.equal and not comparison.sessions:
+            raise AcceptError(f'{run.path} is equal to {before.path} to the bit; there is nothing to accept')
+        changes = comparison.sentences()
     made = folder / f'.{name}.new'
     shutil.rmtree(made, ignore_errors=True)
     try:
         made.mkdir(parents=True)
-        _write(made / name, parts)
-        _write_history(made / name, target, _entry(run, reason, versions or {}, changes))
+        with BagCopy(made / name, _CHUNK_SIZE) as bag:
+            bag.add(parts)
+            bag.complete([], [], {})
+        entry = {
+            'date': time_text(),
+            'reason': reason.strip(),
+            'recording': run.short_name,
+            'versions': dict(versions or {}),
+            'changes': changes or ['new reference'],
+        }
+        _write_history(made / name, target, entry)
         size = _size(made / name)
         total = size + sum(_size(p) for p in folder.iterdir() if p.is_dir() and p not in (target, made))
         if total > LARGEST_TOTAL:
@@ -135,72 +134,62 @@ def accept(
                 f'all references would have {total / 1e6:.1f} MB, {name} {size / 1e6:.1f} MB of it; '
                 f'the limit is {LARGEST_TOTAL / 1e6:g} MB: drive a shorter one'
             )
-        _replace(made / name, target, folder / f'.{name}.old')
+        aside = folder / f'.{name}.old'
+        shutil.rmtree(aside, ignore_errors=True)
+        if target.exists():
+            target.rename(aside)
+        (made / name).rename(target)
+        shutil.rmtree(aside, ignore_errors=True)
     finally:
         shutil.rmtree(made, ignore_errors=True)
     return Accepted(target, size, total, tuple(changes))
 
 
 def _parts(run: Recording, before: Recording | None) -> list[Messages]:
-    for topic in ANSWERS:
-        if not _has(run, topic):
-            raise AcceptError(f'{run.path} has no {topic.name}; a reference is a drive with its answers')
-    parts = {}
+    parts: dict[Topic, Messages] = {}
     for topic in (*_INPUTS, *ANSWERS):
-        source = run if _has(run, topic) else before
-        if source is not None and _has(source, topic):
-            parts[topic] = _renamed(read_messages(source, source.resolve(topic.name))[0], topic)
+        for source in [run] if topic in ANSWERS else [run, before]:
+            if topic not in parts and source is not None and topic.name in source:
+                name = source.resolve(topic.name)
+                messages = read_messages(source, name)
+                if messages is not None and len(messages):
+                    parts[topic] = replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
+    for topic in ANSWERS:
+        if topic not in parts:
+            raise AcceptError(f'{run.path} has no {topic.name}; a reference is a drive with its answers')
     for topic in (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
-    source = run if _has(run, DISPLACEMENT) else before
-    _check_answers(run, source)
-    for topic in (COIL_RIPPLE, COIL_TEMPERATURE):
-        if topic in parts:
-            parts[topic] = _of_the_ramp(parts[topic], parts[AIR_GAP])
-    if SESSION in parts:
-        parts[SESSION] = _without_paths(parts[SESSION], run if _has(run, SESSION) else before)
-    return list(parts.values())
-
-
-def _has(recording: Recording, topic: Topic) -> bool:
-    return topic.name in recording and recording.topics[recording.resolve(topic.name)].message_count > 0
-
-
-def _renamed(messages: Messages, topic: Topic) -> Messages:
-    return replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
-
-
-def _check_answers(run: Recording, inputs: Recording | None) -> None:
-    assert inputs is not None
-    stamps = inputs[DISPLACEMENT.name].stamps
+    source = run if _has_displacement(run) else before
+    assert source is not None
+    stamps = source[DISPLACEMENT.name].stamps
     for topic in ANSWERS:
         without = np.setdiff1d(run[topic.name].stamps, stamps)
         if len(without):
             raise AcceptError(
-                f'{len(without)} samples of {topic.name} answer none of the displacements in {inputs.path}: '
+                f'{len(without)} samples of {topic.name} answer none of the displacements in {source.path}: '
                 f'{run.path} is no replay of it, or samples were lost'
             )
+    last = parts[AIR_GAP].heads['log_time'][-1]
+    for topic in (COIL_RIPPLE, COIL_TEMPERATURE):  # behind the last air gap the initialisation needs none
+        if topic in parts:
+            parts[topic] = parts[topic].at(np.flatnonzero(parts[topic].heads['log_time'] <= last))
+    if SESSION in parts:
+        session = parts[SESSION].at(np.array([len(parts[SESSION]) - 1]))
+        content = session_content(recorded_session(run) or recorded_session(before or run))
+        shortened = session_message(session_text(_shortened(content)))
+        parts[SESSION] = (
+            session if _shortened(content) == content else replace(session, payloads=Payloads([[shortened]]))
+        )
+    return list(parts.values())
 
 
-def _of_the_ramp(messages: Messages, air_gap: Messages) -> Messages:
-    """Return the messages up to the last air gap: the initialisation needs none behind it."""
-    last = air_gap.log_times[-1]
-    return messages.chosen(np.flatnonzero(messages.log_times <= last))
-
-
-def _without_paths(session: Messages, source: Recording | None) -> Messages:
-    """Return the last session with absolute paths cut to their last part: they mean nothing elsewhere."""
-    assert source is not None
-    content = session_content(recorded_session(source))
-    shortened = _shortened(content)
-    last = session.chosen(np.array([len(session) - 1]))
-    if shortened == content:
-        return last
-    return replace(last, payloads=Payloads([[session_message(session_text(shortened))]]))
+def _has_displacement(recording: Recording) -> bool:
+    return DISPLACEMENT.name in recording and len(recording[DISPLACEMENT.name]) > 0
 
 
 def _shortened(content: Any) -> Any:
+    """Return a session with absolute paths cut to their last part: they mean nothing elsewhere."""
     if isinstance(content, dict):
         return {key: _shortened(value) for key, value in content.items()}
     if isinstance(content, list):
@@ -208,34 +197,6 @@ def _shortened(content: Any) -> Any:
     if isinstance(content, str) and content.startswith('/') and len(Path(content).parts) > 2:
         return Path(content).name
     return content
-
-
-def _changes(before: Recording, run: Recording) -> list[str]:
-    comparison = compare(before, run, topics=(*_INPUTS, *ANSWERS), common_only=True)
-    if comparison.equal and not comparison.sessions:
-        raise AcceptError(f'{run.path} is equal to {before.path} to the bit; there is nothing to accept')
-    return comparison.sentences()
-
-
-def _entry(run: Recording, reason: str, versions: Mapping[str, str], changes: list[str]) -> dict[str, Any]:
-    return {
-        'date': time_text(),
-        'reason': reason.strip(),
-        'recording': run.short_name,
-        'versions': dict(versions),
-        'changes': changes or ['new reference'],
-    }
-
-
-def _write(folder: Path, parts: list[Messages]) -> None:
-    writer = BagWriter(folder, chunk_size=_CHUNK_SIZE)
-    for part in parts:
-        writer.add_topic(part.topic.name, part.topic.type, part.topic.offered_qos)
-    for number, place in in_log_order(parts):
-        part = parts[number]
-        times = int(part.log_times[place]), int(part.publish_times[place])
-        writer.write(part.topic.name, part.payloads[place], *times)
-    writer.close()
 
 
 def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
@@ -252,11 +213,3 @@ def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
 
 def _size(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.rglob('*') if path.is_file())
-
-
-def _replace(made: Path, target: Path, aside: Path) -> None:
-    if target.exists():
-        shutil.rmtree(aside, ignore_errors=True)
-        target.rename(aside)
-    made.rename(target)
-    shutil.rmtree(aside, ignore_errors=True)

@@ -4,26 +4,26 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.definitions import Definition, installed_definition
-from engine_mount.recordings.layout import HEAD, OPTIONS, Layout, LayoutError, decode, layout_of
+from engine_mount.recordings.layout import (
+    Definition,
+    Layout,
+    LayoutError,
+    decode,
+    installed_definition,
+    layout_of,
+)
 from engine_mount.recordings.times import NO_TIMES, Times
 from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
 Column = NDArray[np.float64]
 
-_SECONDS, _NANOSECONDS = 'header.stamp.sec', 'header.stamp.nanosec'
-STAMP = ((_SECONDS, 0), (_NANOSECONDS, 0))
-"""Where the stamp stands in a message: paths, and places in their runs of numbers."""
-STAMP_BYTES = 8
-STAMP_END = HEAD + STAMP_BYTES
-_LITTLE_ENDIAN = (0, 1)  # the first bytes of a message: plain CDR
+STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 
 
@@ -35,7 +35,7 @@ class Payloads:
     """Serialised messages: one block of rows where all have the same length, else one by one."""
 
     def __init__(self, pieces: Sequence[NDArray[np.uint8] | list[bytes]]):
-        """Take them in pieces, each an array (messages x bytes) or a list."""
+        """Join pieces, each an array (messages x bytes) or a list."""
         widths = {piece.shape[1] if isinstance(piece, np.ndarray) else -1 for piece in pieces}
         self.rows: NDArray[np.uint8] | None = None
         if len(widths) == 1 and -1 not in widths:
@@ -50,17 +50,21 @@ class Payloads:
     def __getitem__(self, index: int) -> bytes:
         return bytes(self.messages[index])
 
-    def chosen(self, places: NDArray[np.int64]) -> 'Payloads':
+    def at(self, places: NDArray[np.int64]) -> 'Payloads':
         """Return the messages at `places`."""
         found = [self[place] for place in places.tolist()] if self.rows is None else self.rows[places]
         return Payloads([found])
+
+
+Messages = tuple[Payloads, np.ndarray]
+"""Bytes and heads (dtype `HEAD` of a stored file) of messages."""
 
 
 class Series:
     """The messages of one topic in the order in which they were recorded.
 
     `receive_times` and `publish_times` are those of the recording, `stamps` those of the samples (from
-    the messages' headers), all in ns; `sequences` are the publisher's numbers, 0 where it gave none.
+    the messages' headers), all in ns.
     `series[name]` is a column: of a `JointState` the position of
     that name, of other types the number at that path, such as `wrench.force.z`. Unknown is NaN.
     `time` is that of all columns, to plot.
@@ -70,14 +74,14 @@ class Series:
         self,
         topic: str,
         type_name: str,
-        messages: tuple[Payloads, np.ndarray] | Callable[[], tuple[Payloads, np.ndarray]],
+        messages: Messages | Callable[[], Messages],
         *,
         definition: Definition | None = None,
         obstacle: str = '',
         zero: int = 0,
         units: Mapping[str, str] | None = None,
     ):
-        """Take bytes and heads (dtype `HEAD`) of the messages, or a function that reads them when needed.
+        """Hold the messages, or a function that reads them when needed.
 
         `definition` is that of the type, or `obstacle` the reason why there is none; without both the
         installed type counts. `zero` (ns) is where `time` begins; `units` are those that the recording has
@@ -86,35 +90,37 @@ class Series:
         self.topic = topic
         self.type = type_name
         self.columns: dict[str, Column] = {}
+        """Columns of all messages that were read without these."""
+        self.known: set[str] = set()
+        """The names of these columns, and of those that not every message has."""
+        self.count: int | None = None
+        """How many messages there are, where times or columns were read without these."""
+        self.stamp_obstacle = ''
+        """Why the messages have no stamps, where these were read without the messages."""
+        self.first_names: tuple[str, ...] = ()
+        """The names in the first messages of a `JointState`, likewise."""
         self.registered: Topic | None = registered_topic(topic, type_name)
         self._source = messages
         self._known_definition, self._obstacle = definition, obstacle
         self._zero, self._units = zero, units or {}
 
     def __len__(self) -> int:
-        return len(self.receive_times)
-
-    def add_columns(self, columns: Mapping[str, Column], received: Times, stamps: Times | None) -> None:
-        """Take columns and times (ns) of all messages, which then need not be read for them."""
-        self.columns |= columns
-        self.receive_times = received
-        if stamps is not None:
-            self.stamps = stamps
+        return len(self._messages[1]) if self.count is None else self.count
 
     @functools.cached_property
     def receive_times(self) -> Times:
         """When the messages came in, ns."""
         return np.ascontiguousarray(self._messages[1]['log_time'])
 
-    @property
+    @functools.cached_property
     def publish_times(self) -> Times:
         """When the messages were sent, ns."""
         return np.ascontiguousarray(self._messages[1]['publish_time'])
 
     @property
-    def sequences(self) -> NDArray[np.uint32]:
-        """The numbers that the publisher gave the messages."""
-        return np.ascontiguousarray(self._messages[1]['sequence'])
+    def heads(self) -> np.ndarray:
+        """The heads of the messages as a file has them, dtype `HEAD`."""
+        return self._messages[1]
 
     @property
     def payloads(self) -> Payloads:
@@ -127,7 +133,7 @@ class Series:
         return isinstance(self._source, tuple)
 
     @property
-    def _messages(self) -> tuple[Payloads, np.ndarray]:
+    def _messages(self) -> Messages:
         if not isinstance(self._source, tuple):
             self._source = self._source()
         return self._source
@@ -135,29 +141,15 @@ class Series:
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        found, rows = [NO_TIMES], self.payloads.rows
-        if rows is not None and rows.shape[1] >= STAMP_END and self._definition.has_stamp:
-            beginnings = np.ascontiguousarray(rows[:, :STAMP_END])
-            if (beginnings[:, :2] == _LITTLE_ENDIAN).all():
-                times = beginnings.view('V4,<i4,<u4')[:, 0]
-                return np.asarray(times['f1'].astype(np.int64) * 1_000_000_000 + times['f2'])
+        if self.stamp_obstacle:
+            raise SeriesError(self.stamp_obstacle)
+        found = [NO_TIMES]
         for layout, rows in self._layouts:
-            if not {_SECONDS, _NANOSECONDS} <= layout.numbers.keys():
+            if not layout.numbers.keys() >= set(STAMP):
                 raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
-            seconds = layout.numbers[_SECONDS].column(rows).astype(np.int64)
-            found.append(seconds * 1_000_000_000 + layout.numbers[_NANOSECONDS].column(rows))
+            seconds, nanoseconds = (layout.numbers[path].column(rows).astype(np.int64) for path in STAMP)
+            found.append(seconds * 1_000_000_000 + nanoseconds)
         return np.concatenate(found)
-
-    @functools.cached_property
-    def stamp_place(self) -> int | None:
-        """Where the 8 bytes of the stamp begin, None where there is no stamp or its place varies."""
-        if self.layout is not None:
-            seconds = self.layout.numbers.get(_SECONDS)
-            return None if seconds is None else seconds.offset
-        try:
-            return HEAD if self._definition.has_stamp else None
-        except SeriesError:
-            return None
 
     @functools.cached_property
     def time(self) -> Column:
@@ -169,9 +161,8 @@ class Series:
             times = self.stamps
         except SeriesError:
             times = self.receive_times
-        if times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK:
-            return np.asarray(times * 1e-9, np.float64)
-        return np.asarray((times - self._zero) * 1e-9, np.float64)
+        other = times.size and abs(int(times[0]) - self._zero) > _OTHER_CLOCK
+        return np.asarray((times - (0 if other else self._zero)) * 1e-9, np.float64)
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
@@ -215,20 +206,16 @@ class Series:
         except LayoutError as error:
             raise self._no_message(index, error) from None
 
-    def content(self, index: int) -> bytes:
-        """Return the bytes of message `index` without its stamp and without the options of its encoding."""
-        raw, place = self.payloads[index], self.stamp_place
-        if place is None:  # where it varies, it stands in the message's own layout
-            try:
-                seconds = layout_of(raw, self._definition).numbers.get(_SECONDS)
-            except (LayoutError, SeriesError):
-                seconds = None
-            place = seconds.offset if seconds is not None else len(raw)
-        return raw[: OPTIONS.start] + raw[OPTIONS.stop : place] + raw[place + STAMP_BYTES :]
-
     def messages(self) -> Iterator[Any]:
         """Yield all messages."""
         return (self.message(index) for index in range(len(self)))
+
+    def layout_at(self, index: int) -> Layout | None:
+        """Return the layout of one message, None if it cannot be read."""
+        try:
+            return self.layout or layout_of(self.payloads[index], self._definition)
+        except (LayoutError, SeriesError):
+            return None
 
     @functools.cached_property
     def layout(self) -> Layout | None:
@@ -270,7 +257,7 @@ class Series:
         return SeriesError(f'{self.topic}: message {place} is no {self.type} ({error})')
 
     def _check_part(self, part: str) -> None:
-        if part not in self._definition.types[self._definition.name]:
+        if part not in dict(self._definition.types[self._definition.name]):
             raise SeriesError(f'{self.topic}: its definition of {self.type} has no {part!r}')
 
     def _joint_column(self, name: str, part: str) -> Column:
@@ -301,26 +288,6 @@ class Series:
                 raise SeriesError(f'{self.topic} has no number {path!r}; it has {", ".join(self.names)}')
             found.append(numbers.column(rows, place).astype(np.float64))
         return np.concatenate(found)
-
-
-@dataclass(frozen=True)
-class TopicTimes:
-    """Times in ns in the order of the recording; `obstacle` is the reason where `stamps` are None.
-
-    `receive_times` and `publish_times` are None where nobody needs them.
-    """
-
-    topic: str
-    type: str
-    count: int
-    stamps: Times | None
-    receive_times: Times | None
-    publish_times: Times | None
-    names: tuple[str, ...] = ()  # of the scalars in the first message of a JointState
-    obstacle: str = ''
-
-    def __len__(self) -> int:
-        return self.count
 
 
 def _names_in(layout: Layout) -> list[str]:

@@ -4,32 +4,32 @@ The step between neighbouring stamps is rounded to whole sample periods. So a cl
 that runs a little fast or slow, as every clock does, is not taken for lost samples, and where the rate
 is kept the expected number is round((last - first) * rate) + 1.
 
-Stamps that jitter, as a phone's do, have no such steps. Each sample then has a place on the grid of the rate,
-which follows the stamps slowly, and one that shares a place because its stamp is late or early takes the
-empty one near it. Only equal stamps, or more samples than places, are samples twice.
+A stamp that is late or early by part of a period is neither lost nor twice; where many are, as in those of a
+phone, nothing can be counted.
 
 A stamp far from those of the samples around it is no time of a sample: misdated, and counted as that alone.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mount_recorder.stamp_watch import FARTHEST, LONGEST_PAUSE
+from mount_recorder.topic_groups import registered_topic
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 Times = NDArray[np.int64]
 
 NO_TIMES: Times = np.empty(0, np.int64)
 _NANOSECONDS = 1_000_000_000
-_LEAST_SAMPLES = 10
-_MOSTLY = 0.9  # share, chosen
 _JITTER = 0.25  # periods, chosen: steps so far from whole ones are no clock's drift
-_FOLLOWS = 0.05  # chosen: share of a stamp's distance by which the grid follows it
-_NEAR = 3  # periods, chosen: a stamp farther off than that is no late one
-_MOST = 0.7  # share, chosen: a topic that lost more than that has no rate to speak of
+MOST_JITTER = 0.01
+"""Share of the stamps, chosen: of more that are beside the rate, losses cannot be counted."""
+_ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, COIL_RIPPLE, CONTROL_TRACE, SIM_TRUTH)
+_OTHER_CLOCK = 86_400.0  # s, chosen: what is so far off is of another clock
 _AROUND = 5  # samples, chosen: before and behind; so many stamps in a row may be misdated
 
 
@@ -51,15 +51,6 @@ def each_once(times: Times) -> tuple[Times, 'slice | NDArray[np.intp]']:
     if bool((times[1:] > times[:-1]).all()):
         return times, slice(None)
     return np.unique(times, return_index=True)
-
-
-def shared(times: Times, known: list[Times]) -> Times:
-    """Return the array in `known` that equals `times`, which is added if there is none."""
-    for each in known:
-        if np.array_equal(each, times):
-            return each
-    known.append(times)
-    return times
 
 
 def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
@@ -91,7 +82,7 @@ def stamp_statistics(stamps: Times, rate: float) -> StampStatistics:
     steps = np.rint(periods)
     expected, filled = 1 + int(steps.sum()), 1 + int(np.count_nonzero(steps))
     if np.any((np.abs(periods - steps) > _JITTER) | ((steps == 0) & (differences > 0))):
-        expected, filled = _places(rising, rate)
+        filled = min(expected, 1 + int(np.count_nonzero(differences)))
     return StampStatistics(
         expected=expected,
         present=len(stamps),
@@ -100,6 +91,12 @@ def stamp_statistics(stamps: Times, rate: float) -> StampStatistics:
         out_of_order=0 if rising is stamps else _out_of_order(stamps),
         longest_gap_s=int(differences.max()) / _NANOSECONDS if len(stamps) > 1 else math.nan,
     )
+
+
+def jitter_share(stamps: Times, rate: float) -> float:
+    """Return the share of stamps (ns) that are more than a quarter of a period beside the rate (Hz)."""
+    periods = np.diff(distinct(stamps)) * (rate / _NANOSECONDS)
+    return float(np.mean(np.abs(periods - np.rint(periods)) > _JITTER)) if periods.size else 0.0
 
 
 def _out_of_order(stamps: Times) -> int:
@@ -166,38 +163,6 @@ def _covered(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> int:
     return int(np.maximum(ends - np.maximum(begins, reached), 0).sum())
 
 
-def _places(stamps: Times, rate: float) -> tuple[int, int]:
-    """Return how many places the grid under jittering `stamps` (ns, sorted) has, and how many are filled."""
-    places = _grid(stamps, rate)
-    first, last = 0, int(places[-1])
-    shared = places[np.diff(places, prepend=-1) == 0]
-    nearest = np.array(sorted(range(-_NEAR, _NEAR + 1), key=abs))
-    empty = ~is_in(shared[:, None] + nearest, places)
-    added: set[int] = set()
-    for place, is_empty in zip(shared.tolist(), empty, strict=True):
-        near = (place + nearest[is_empty]).tolist()
-        inside = [one for one in near if one not in added and first <= one <= last]
-        if inside:
-            added.add(inside[0])
-        elif place - first < _NEAR:  # a late first stamp hides the place before it
-            first -= 1
-            added.add(first)
-        elif last - place < _NEAR:
-            last += 1
-            added.add(last)
-    return last - first + 1, len(places) - len(shared) + len(added)
-
-
-def _grid(stamps: Times, rate: float) -> Times:
-    """Return the place of each distinct stamp on a grid that follows them."""
-    phase, place, places = 0.0, 0, list[int]()
-    for position in ((distinct(stamps) - stamps[0]) * (rate / _NANOSECONDS)).tolist():
-        place = max(place, round(position - phase))
-        phase += _FOLLOWS * (position - phase - place)
-        places.append(place)
-    return np.array(places, np.int64)
-
-
 def stamp_jitter(stamps: Times, rate: float) -> tuple[float, float]:
     """Return how far steps between samples at `rate` (Hz) are from their median, in s: rms and at most.
 
@@ -213,17 +178,65 @@ def stamp_jitter(stamps: Times, rate: float) -> tuple[float, float]:
     return math.sqrt(square), float(np.abs(deviation).max())
 
 
-def regular_rate(stamps: Times) -> float | None:
-    """Return the rate (Hz) of samples without a declared one, None where their stamps (ns) show none.
+class TimeAxis:
+    """Time of a recording in s from the stamp `zero` (ns) of its first displacement sample.
 
-    Regular are at least 10 samples of which nearly none is repeated, where most steps are one period and
-    nearly all are within a quarter of a period of whole ones.
+    A recording without displacement counts from the first sample of what it has, one without stamps from its
+    first message. What only has a log time happened when the sample was taken that came in just then: in
+    lock-step the clock of reception knows nothing of the time in the stamps.
     """
-    steps = np.diff(distinct(stamps))
-    if steps.size + 1 < _LEAST_SAMPLES or steps.size + 1 < _MOSTLY * len(stamps):
-        return None
-    period = float(np.median(steps))
-    periods = np.rint(steps / period)
-    fitting = np.abs(steps - periods * period) <= 0.25 * period
-    single = np.mean(periods == 1)
-    return _NANOSECONDS / period if np.mean(fitting) >= _MOSTLY and single >= _MOST else None
+
+    def __init__(self, stamps: Times, received: Times, inherited: Sequence[int] = ()):
+        """Take the samples, at least one, as they came in (ns), and zeros that origins tell of."""
+        wrong = misdated(stamps)
+        sound = np.flatnonzero(~wrong | wrong.all())
+        order = sound[np.argsort(received[sound], kind='stable')]
+        stamps, received = stamps[order], received[order]
+        self.zero = min([int(stamps.min()), *inherited])
+        on_time = np.append(True, stamps[1:] > np.maximum.accumulate(stamps)[:-1])
+        self._stamps, self._received = stamps[on_time], received[on_time]
+
+    def of_stamps(self, stamps: Times) -> NDArray[np.float64]:
+        """Return the times of stamps (ns)."""
+        return np.asarray((stamps - self.zero) / 1e9, np.float64)
+
+    def of_stamp(self, stamp: int) -> float:
+        """Return the time of one stamp (ns)."""
+        return (stamp - self.zero) / 1e9
+
+    def of_log(self, log_time: int) -> float:
+        """Return the time at which a message was logged (ns)."""
+        return float(self.of_logs(np.array([log_time]))[0])
+
+    def of_logs(self, log_times: Times) -> NDArray[np.float64]:
+        """Return the times at which messages were logged (ns)."""
+        return self.of_stamps(self.stamps_at(log_times))
+
+    def stamps_at(self, log_times: Times) -> Times:
+        """Return the stamps (ns) that samples would have which came in at log times (ns)."""
+        return _related(log_times, self._received, self._stamps)
+
+    def of_mark(self, stamp: int, log_time: int) -> float:
+        """Return the time of a mark: of its own stamp, unless it has none or one of another clock."""
+        time = self.of_stamp(stamp)
+        own = stamp != log_time and abs(time) < _OTHER_CLOCK
+        return time if own else self.of_log(log_time)
+
+    def log_time(self, seconds: float) -> int:
+        """Return the log time (ns) that belongs to a time."""
+        return int(_related(np.array([self.zero + round(1e9 * seconds)]), self._stamps, self._received)[0])
+
+
+def anchors(types: Mapping[str, str]) -> list[str]:
+    """Return which of the topics {name: type} may tell the time of a recording, the best first."""
+    return [
+        name for topic in _ANCHORS for name, kind in types.items() if registered_topic(name, kind) is topic
+    ]
+
+
+def _related(times: Times, known: Times, wanted: Times) -> Times:
+    """Return what belongs to times: linear between known ones, at the same pace before and behind (ns)."""
+    passed = ((each - each[0]).astype(float) for each in (known, wanted))
+    inside = np.rint(np.interp(times - known[0], *passed)).astype(np.int64)
+    before, behind = np.minimum(times - known[0], 0), np.maximum(times - known[-1], 0)
+    return np.asarray(wanted[0] + inside + before + behind)

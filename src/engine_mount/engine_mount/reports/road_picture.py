@@ -30,26 +30,18 @@ def draw_road(profile: RoadProfile, found: Unevenness, file: Path) -> None:
     above.set(xlabel='distance (m)', ylabel=f'height (mm), waves up to {LONGEST_WAVE:g} m')
     ends = np.array([found.frequency[0], found.frequency[-1]])
     for number, letter in enumerate(CLASSES[:-1]):
-        limit = FIRST_LIMIT * 4.0**number
-        below.loglog(ends, limit * (ends / REFERENCE_FREQUENCY) ** -2.0, color=SPAN_COLOUR, linewidth=0.6)
-        below.annotate(
-            letter,
-            (ends[0], 0.5 * limit * (ends[0] / REFERENCE_FREQUENCY) ** -2.0),
-            color=SPAN_COLOUR,
-            fontsize=8,
-            ha='right',
-            va='center',
-        )
+        limits = FIRST_LIMIT * 4.0**number * (ends / REFERENCE_FREQUENCY) ** -2.0
+        below.loglog(ends, limits, color=SPAN_COLOUR, linewidth=0.6)
+        place = (ends[0], 0.5 * limits[0])
+        below.annotate(letter, place, color=SPAN_COLOUR, fontsize=8, ha='right', va='center')
     below.loglog(found.frequency, found.density, color=COLOURS[0], label='measured, smoothed')
     fitted = np.array([found.lowest, found.highest])
     line = found.roughness * (fitted / REFERENCE_FREQUENCY) ** -found.waviness
-    below.loglog(
-        fitted, line, '--', color=LEVEL_COLOUR, label=f'class {found.letter}, waviness {found.waviness:.2f}'
-    )
+    label = f'class {found.letter}, waviness {found.waviness:.2f}'
+    below.loglog(fitted, line, '--', color=LEVEL_COLOUR, label=label)
     for period in found.periods:
-        below.axvline(
-            1.0 / period.wavelength, color=COLOURS[1], linewidth=0.8, label=f'every {period.wavelength:.3g} m'
-        )
+        label = f'every {period.wavelength:.3g} m'
+        below.axvline(1.0 / period.wavelength, color=COLOURS[1], linewidth=0.8, label=label)
     below.set(xlabel='spatial frequency (cycles/m)', ylabel='density of the height (m³)')
     below.legend(loc='lower left', fontsize='small')
     for axes in (above, below):

@@ -7,7 +7,6 @@ from typing import Any
 from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.automatic_marks import mark_kinds
 from mount_recorder.bag_writer import SplitRule, checked_rule
-from mount_recorder.diagnosis import OnFull
 from mount_recorder.parameters import RecorderParameters, split_of
 
 _SIZES = {'B': 1, 'kB': 10**3, 'MB': 10**6, 'GB': 10**9, 'KiB': 1 << 10, 'MiB': 1 << 20, 'GiB': 1 << 30}
@@ -48,7 +47,7 @@ def checked_recorder(options: Mapping[str, Any]) -> RecorderParameters:
     parameters = with_flattened(RecorderParameters(), options)
     split_of(parameters)
     mark_kinds(parameters.automatic_marks)
-    if parameters.on_full not in [word.value for word in OnFull]:
+    if parameters.on_full not in ('stop', 'continue'):
         raise ParameterError(f'on_full must be stop or continue; instead received {parameters.on_full!r}')
     return parameters
 

@@ -18,6 +18,7 @@ from mount_models.plain_yaml import YamlError, yaml_in_file
 
 MEAN = 'mean'
 """The offset that is the mean of the signal."""
+_KEYS = ('system', 'time', 'columns', 'others', 'decimal', 'delimiter')
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,15 @@ class ColumnChoice:
     scale: float | None = None
     offset: float | str | None = None
 
+    def __post_init__(self) -> None:
+        """Raise `SignalError` for what cannot be meant."""
+        if self.unit:
+            unit_of(self.unit)
+        if not (self.scale is None or (_is_number(self.scale) and self.scale)):
+            raise SignalError(f'scale ({self.scale!r}) must be a number other than 0')
+        if not (self.offset in (None, MEAN) or _is_number(self.offset)):
+            raise SignalError(f'offset ({self.offset!r}) must be a number, or {MEAN}')
+
 
 @dataclass(frozen=True)
 class TimeChoice:
@@ -42,6 +52,18 @@ class TimeChoice:
     column: str = ''
     unit: str = ''
     rate: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise `SignalError` for what cannot be meant."""
+        if self.unit and not is_unit(self.unit, 'time'):
+            raise SignalError(f'unit of time ({self.unit}) must be s, ms, us, ns, min or h')
+        if not (self.rate is None or (_is_number(self.rate) and self.rate > 0.0)):
+            raise SignalError(f'rate ({self.rate!r} Hz) must be a number above 0')
+        if self.rate is not None and self.column:
+            raise SignalError(
+                f'column {self.column!r} and a rate of {self.rate:g} Hz both say the times; a rate is for '
+                'files without times: give one of them'
+            )
 
 
 @dataclass(frozen=True)
@@ -92,18 +114,18 @@ def mapping_in_file(path: Path) -> Mapping:
     Raises `SignalError`, for a key that is not known too.
     """
     try:
-        found = _keys(yaml_in_file(path), ('system', 'time', 'columns', 'others', 'decimal', 'delimiter'))
-        columns, others = (_keys(found.get(name, {}), None, name) for name in ('columns', 'others'))
-        for name in others:
+        found = _section(yaml_in_file(path), _KEYS, 'a mapping')
+        columns, others = (found.get(name, {}) for name in ('columns', 'others'))
+        for name in _dict(others, 'others'):
             if name in QUANTITIES or not (name.isidentifier() and name.isascii()):
                 raise SignalError(
                     f'others: {name!r} must be a name of letters, digits and _ that is no quantity; '
                     'a quantity stands below columns'
                 )
         return Mapping(
-            {quantity(name).name: _column(value, name) for name, value in columns.items()},
-            {name: _column(value, name) for name, value in others.items()},
-            _time(found.get('time', {})),
+            {quantity(name).name: _column(one, name) for name, one in _dict(columns, 'columns').items()},
+            {name: _column(one, name) for name, one in others.items()},
+            TimeChoice(**_section(found.get('time', {}), ('column', 'unit', 'rate'), 'time')),
             str(found.get('system', '')),
             stated=Stated(decimal=str(found.get('decimal', '')), delimiter=str(found.get('delimiter', ''))),
         )
@@ -142,15 +164,10 @@ def with_options(
             choice if before.column != choice.column else replace(before, unit=choice.unit or before.unit)
         )
     if scale is not None:
-        scale = _number(scale, '--scale', 'other than 0')
         said = {name: replace(one, scale=scale) for name, one in (said or mapping.columns).items()}
-    if time and rate is not None:
-        raise SignalError(f'--time {time} and --rate {rate:g} both tell the times; give one of them')
     times = mapping.time
-    if rate is not None:
-        times = _time({'rate': rate})
-    elif time:
-        times = _time(dict(zip(('column', 'unit'), split_unit(time), strict=True)))
+    if time or rate is not None:
+        times = TimeChoice(*split_unit(time), rate)
     told = mapping.stated
     if stated is not None:
         dialect = {'decimal': stated.decimal or told.decimal, 'delimiter': stated.delimiter or told.delimiter}
@@ -185,47 +202,31 @@ def column_option(text: str, default: str = '', known: Quantities = QUANTITIES) 
 def split_unit(text: str, dimension: str = '') -> tuple[str, str]:
     """Return column and unit of `COLUMN[:UNIT]`; what follows the colon must be a unit, else it is a name."""
     column, colon, unit = text.rpartition(':')
-    return (column, unit) if colon and (is_unit(unit) or is_unit(unit, dimension)) else (text, '')
+    if colon and is_unit(unit, dimension):
+        return column, unit_of(unit, dimension).symbol
+    return (column, unit) if colon and is_unit(unit) else (text, '')
 
 
 def _column(value: Any, name: str) -> ColumnChoice:
-    found = _keys(value, ('column', 'unit', 'scale', 'offset'), name)
+    found = _section(value, ('column', 'unit', 'scale', 'offset'), name)
     if 'column' not in found:
         raise SignalError(f'{name} names no column; write {name}: {{column: NAME, unit: UNIT}}')
-    unit, scale, offset = str(found.get('unit', '')), found.get('scale'), found.get('offset')
-    if unit:
-        unit_of(unit)
-    if scale is not None:
-        scale = _number(scale, f'scale of {name}', 'other than 0')
-    if offset not in (None, MEAN):
-        offset = _number(offset, f'offset of {name}')
-    return ColumnChoice(str(found['column']), unit, scale, offset)
+    return ColumnChoice(**{**found, 'column': str(found['column'])})
 
 
-def _time(value: Any) -> TimeChoice:
-    found = _keys(value, ('column', 'unit', 'rate'), 'time')
-    unit, rate = str(found.get('unit', '')), found.get('rate')
-    if unit and not is_unit(unit, 'time'):
-        raise SignalError(f'unit of time ({unit}) must be s, ms, us, ns, min or h')
-    if rate is not None:
-        rate = _number(rate, 'rate in Hz', 'above 0')
-    if rate is not None and len(found) > 1:
-        raise SignalError('time has a rate and a column or unit; a rate is for files without times')
-    return TimeChoice(str(found.get('column', '')), unit, rate)
+def _section(value: Any, known: Sequence[str], what: str) -> dict[str, Any]:
+    """Return a section of a file that has no other keys; raises `SignalError`."""
+    unknown = [str(key) for key in _dict(value, what) if key not in known]
+    if unknown:
+        raise SignalError(f'{what}: {", ".join(unknown)} is not known; known are {", ".join(known)}')
+    return dict(value)
 
 
-def _keys(value: Any, known: Sequence[str] | None, what: str = 'a mapping') -> dict[str, Any]:
+def _dict(value: Any, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise SignalError(f'{what} must have keys with values; instead it is {value!r}')
-    unknown = [str(key) for key in value if known and key not in known]
-    if known and unknown:
-        raise SignalError(f'{what}: {", ".join(unknown)} is not known; known are {", ".join(known)}')
-    return {str(key): one for key, one in value.items()}
+    return value
 
 
-def _number(value: Any, what: str, kind: str = '') -> float:
-    """Return a finite number, `other than 0` or `above 0`; raises `SignalError`."""
-    number = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-    if not math.isfinite(number) or (kind and number == 0.0) or (kind == 'above 0' and number < 0.0):
-        raise SignalError(f'{what} ({value!r}) must be a number {kind}'.rstrip())
-    return float(number)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

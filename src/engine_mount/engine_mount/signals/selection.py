@@ -14,6 +14,7 @@ from engine_mount.signals.formats.measured import (
     Measured,
     MeasuredColumn,
     Provenance,
+    TimeBase,
     found,
     listed,
 )
@@ -21,11 +22,12 @@ from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
 from engine_mount.signals.times import SLOWEST, may_hold_times, times_of
 from engine_mount.signals.units import is_unit, unit_of
 from mount_models.arithmetic.averages import mean
 
+_ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
 
 
@@ -57,17 +59,7 @@ def select(
     Samples without a number (NaN) are left out, with a note. Raises `SignalError` with file, column, value,
     guess and remedy, or `SourceError`.
     """
-    mapping = _mapping(choices, known)
-    measured = _opened(source, mapping)
-    if not mapping.choices:
-        raise SignalError(f'{measured.provenance.uri}: no column is named; say one as in {mapping.option}')
-    signals, quantities, columns = {}, {}, {}
-    for name, choice in mapping.choices.items():
-        column = measured.column(heading_of(_headings(measured), choice.column, measured.provenance.uri).name)
-        wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
-        quantities[name] = wanted
-        signals[name], columns[name] = _signal(measured, mapping, column, wanted, choice)
-    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
+    return _select(source, _mapping(choices, known), known)
 
 
 def select_rows(
@@ -97,23 +89,12 @@ def select_rows(
             raise SignalError(
                 f'{uri} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
             )
-    measured = _opened(source, mapping, timed=timed)
-    columns = [measured.column(choice.column) for choice in mapping.columns.values()]
-    base = times_of(measured, columns[0], mapping.time, slowest)[0] if timed else columns[0].time
-    inside = np.full(columns[0].values.size, True)
-    rows = {}
-    for name, column in zip(mapping.columns, columns, strict=True):
-        where = f'{name_of(uri)}, column {column.name!r}'
-        at_first = replace(column, values=_at_times_of(columns[0], column, where, inside))
-        bad = np.flatnonzero(inside & ~np.isfinite(at_first.values))
-        if bad.size:
-            raise SignalError(
-                f'{where}: row {bad[0] + 1} is {column.values[bad[0]]} ({bad.size} '
-                f'such of {column.values.size}); leave these rows out'
-            )
-        rows[name], _ = _in_si(where, at_first, known[name], mapping.columns[name], mapping.option)
-    times = {'time': base.times[inside]} if base is not None and timed else {}
-    return {**times, **{name: values[inside] for name, values in rows.items()}}
+    signals = _select(source, mapping, known, timed=timed, slowest=slowest, whole=True).signals
+    first = next(iter(signals.values()))
+    inside = np.full(first.values.size, True)
+    rows = {'time': first.times} if timed else {}
+    rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
+    return {name: values[inside] for name, values in rows.items()}
 
 
 def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
@@ -146,16 +127,52 @@ def _headings(measured: Measured) -> list[Heading]:
     return [*measured.columns.values(), *measured.others]
 
 
-def _opened(source: str | Path | Measured, mapping: Mapping, *, timed: bool = True) -> Measured:
+def _select(
+    source: str | Path | Measured,
+    mapping: Mapping,
+    known: Quantities,
+    *,
+    timed: bool = True,
+    slowest: float = SLOWEST,
+    whole: bool = False,
+) -> Selection:
+    """Return the columns that `mapping` names; `timed` at their times, `whole` without a missing number."""
+    if not mapping.choices:
+        raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
+    measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
+    uri = measured.provenance.uri
+    signals, quantities, columns = {}, {}, {}
+    for name, choice in mapping.choices.items():
+        column = measured.column(heading_of(_headings(measured), choice.column, uri).name)
+        wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
+        where = f'{name_of(uri)}, column {column.name!r}'
+        base, notes = column.time, ()
+        if timed:
+            base, notes = times_of(measured, column, mapping.time, slowest)
+        elif base is None:
+            base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
+        known_ones = _known(where, column, base, whole=whole)
+        values, told, more = _in_si(
+            where, replace(column, values=column.values[known_ones]), wanted, choice, mapping.option
+        )
+        times = base.times[known_ones]
+        begin = base.begin + round(SECOND * float(times[0]))
+        missing = column.values.size - values.size
+        left_out = (f'{column.name}: {missing} samples without a number are left out',) if missing else ()
+        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more, *left_out))
+        told |= {'times': base.told, 'samples': int(values.size)}
+        columns[name] = {**told, 'offset': choice.offset} if choice.offset else told
+        quantities[name] = wanted
+    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
+
+
+def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     """Return a file with the columns that `mapping` names, and those that may hold their times."""
-    if isinstance(source, Measured):
-        return source
     there = headings(source, mapping.stated)
     wanted = [choice.column for choice in mapping.choices.values()]
+    wanted += [mapping.time.column] if timed and mapping.time.column else []
     names = {heading_of(there, text, str(source)).name for text in wanted}
-    if timed and mapping.time.column:
-        names.add(heading_of(there, mapping.time.column, str(source)).name)
-    elif timed:
+    if timed and not mapping.time.column:
         names |= may_hold_times(there)
     return read(source, [one.name for one in there if one.name in names], mapping.stated)
 
@@ -167,7 +184,7 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
     for one in there:
         before, _, unit = one.header.lower().partition(f'{wanted.name}_')
         if not before and is_unit(unit, wanted.dimension) and not fitting:
-            fitting.append(ColumnChoice(one.name, unit))
+            fitting.append(ColumnChoice(one.name, unit_of(unit, wanted.dimension).symbol))
     if len(fitting) > 1:
         names = ', '.join(choice.column for choice in fitting)
         raise SignalError(f'{wanted.name} may be each of the columns {names}; name one')
@@ -184,39 +201,27 @@ def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
     return Quantity(name, unit.dimension, f'{name}, in {Quantity(name, unit.dimension, "").unit.symbol}')
 
 
-def _signal(
-    measured: Measured, mapping: Mapping, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice
-) -> tuple[Signal, dict[str, Any]]:
-    base, notes = times_of(measured, column, mapping.time)
-    where = f'{name_of(measured.provenance.uri)}, column {column.name!r}'
+def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:
+    """Return which samples hold a number; raises `SignalError` for values without times or bounds."""
     if base.times.size != column.values.size:
         raise SignalError(
             f'{where} has {column.values.size} values but {base.times.size} times; name its own with --time'
         )
-    infinite = np.flatnonzero(np.isinf(column.values))
-    if infinite.size:
-        raise SignalError(
-            f'{where}: value number {infinite[0]} is {column.values[infinite[0]]}, at '
-            f'{base.times[infinite[0]]:.4f} s; repair it or cut it out'
-        )
     known = np.isfinite(column.values)
-    missing = int(known.size - np.count_nonzero(known))
-    check_count(where, known.size - missing)
-    values, told = _in_si(where, replace(column, values=column.values[known]), wanted, choice, mapping.option)
-    times = base.times[known]
-    left_out = (f'{column.name}: {missing} samples without a number are left out',) if missing else ()
-    begin = base.begin + round(SECOND * float(times[0]))
-    signal = Signal(
-        where, times - times[0], values, begin, base.told, (*notes, *told.pop('notes'), *left_out)
-    )
-    told |= {'times': base.told, 'samples': int(values.size)}
-    return signal, {**told, 'offset': choice.offset} if choice.offset else told
+    bad = np.flatnonzero(~known if whole else np.isinf(column.values))
+    if bad.size:
+        raise SignalError(
+            f'{where}: value number {bad[0]} is {column.values[bad[0]]}, at {base.times[bad[0]]:.4f} s '
+            f'({bad.size} such of {known.size}); repair it or cut it out'
+        )
+    check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
+    return known
 
 
 def _in_si(
     where: str, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice, option: str
-) -> tuple[FloatArray, dict[str, Any]]:
-    """Return the values in SI, and what is to be told of them."""
+) -> tuple[FloatArray, dict[str, Any], list[str]]:
+    """Return the values in SI, what a session tells of them, and sentences."""
     unit, scale, notes = unit_of_column(where, column, wanted, choice, option)
     values = unit.to_si(column.values)
     values *= scale  # in place: it can be an hour
@@ -226,27 +231,18 @@ def _in_si(
         values -= offset
         which = 'its mean' if choice.offset == MEAN else 'as said'
         notes.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
-    return values, {**told, 'notes': notes}
+    return values, told, notes
 
 
-def _at_times_of(
-    first: MeasuredColumn, column: MeasuredColumn, where: str, inside: NDArray[np.bool_]
-) -> FloatArray:
-    """Return a column at the times of the first, and mark in `inside` when it does not last."""
-    if column.time is first.time or column.time is None or first.time is None:
-        if column.values.size != first.values.size:
-            raise SignalError(
-                f'{where} has {column.values.size} samples, {first.name} has '
-                f'{first.values.size}, and no times tell which belong together; give columns of one length'
-            )
-        return column.values
-    at = first.time.times + 1e-9 * (first.time.begin - column.time.begin)
-    known = np.isfinite(column.values)
-    own = column.time.times[known]
-    if own.size:
-        inside &= (at >= own[0] - _SAME_TIME) & (at <= own[-1] + _SAME_TIME)
-    if not (own.size and inside.any()):
+def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:
+    """Return a signal at the times of the first, and mark in `inside` when it does not last."""
+    if signal.begin == first.begin and np.array_equal(signal.times, first.times):
+        return signal.values
+    at = first.times + (first.begin - signal.begin) / SECOND
+    inside &= (at >= -_SAME_TIME) & (at <= signal.times[-1] + _SAME_TIME)
+    if signal.clock == _ROWS or not inside.any():
         raise SignalError(
-            f'{where}, and {first.name} have no time in common; give columns that were sampled together'
+            f'{signal.name} ({signal.values.size} samples) and {first.name} ({first.values.size}) have no '
+            'time in common; give columns of one length, or that were sampled together'
         )
-    return np.interp(at, own, column.values[known])
+    return np.interp(at, signal.times, signal.values)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 SECOND = 1_000_000_000  # ns
-_FEWEST = 10
+FEWEST = 10
 
 
 class SignalError(ValueError):
@@ -47,10 +47,10 @@ def signal_of(name: str, times: FloatArray, values: FloatArray) -> Signal:
     return Signal(name, times - times[0], values, round(SECOND * float(times[0])))
 
 
-def check_count(name: str, count: int) -> None:
+def check_count(name: str, count: int, fewest: int = FEWEST) -> None:
     """Raise `SignalError` if a signal has too few samples to be one."""
-    if count < _FEWEST:
-        raise SignalError(f'{name} has {count} samples; at least {_FEWEST} are needed')
+    if count < fewest:
+        raise SignalError(f'{name} has {count} samples; at least {fewest} are needed')
 
 
 def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:

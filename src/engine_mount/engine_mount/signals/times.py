@@ -6,7 +6,7 @@ import numpy as np
 
 from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, TimeBase, listed
 from engine_mount.signals.mapping import TimeChoice
-from engine_mount.signals.signal import SECOND, FloatArray, SignalError
+from engine_mount.signals.signal import SECOND, SignalError
 from engine_mount.signals.units import Unit, unit_of
 
 SLOWEST, FASTEST = 10.0, 2e5
@@ -16,8 +16,7 @@ TITLES = (
     'elapsed', 'elapsed_time', 'time_stamp', 'seconds_elapsed',
 )  # fmt: skip
 """Titles of columns that hold times, in small letters."""
-_LIKELY = (20.0, 2e4)  # Hz, chosen: a unit is only guessed where the rate that follows is common
-_SHORTEST = 0.5  # s, chosen: what is shorter shows no motion of an engine
+_COMMON = 2e4  # Hz, chosen: faster ones must last for half a second, else the unit is doubted
 _EPOCH = (5e8, 4e9)  # s, chosen: 1985 .. 2096, what counts from 1970 lies here
 _SAME_RATE = 0.02  # chosen: a stated rate may differ so much from that of times that stand there
 
@@ -45,12 +44,15 @@ def times_of(
     """
     if choice.column:
         return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
-    found = _time_column(measured, column)
+    others = [one for one in measured.columns.values() if one is not column]
+    titled = sorted(
+        filter(is_time, others),
+        key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
+    )
+    rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
+    found = next(iter([*titled, *rising]), None)
     if choice.rate is not None:
-        own = column.time.times if column.time else None
-        if own is None and found is not None and found.unit:
-            own = unit_of(found.unit, 'time').to_si(found.values)
-        return _at_rate(measured, column, choice.rate, own)
+        return _at_rate(measured, column, choice.rate, found)
     if column.time is not None:
         return column.time, ()
     if found is None:
@@ -60,7 +62,7 @@ def times_of(
             'the rate with --rate HZ'
         )
     base, notes = _in_column(measured, found, choice.unit, slowest)
-    first = () if is_time(found) else (f'{found.name}: the first column rises: taken as the time',)
+    first = () if titled else (f'{found.name}: the first column rises: taken as the time',)
     return base, (*first, *notes)
 
 
@@ -69,47 +71,38 @@ def _group(heading: Heading) -> str:
     return heading.name[: max(heading.name.rfind('/'), heading.name.rfind('.')) + 1]
 
 
-def _time_column(measured: Measured, column: MeasuredColumn) -> MeasuredColumn | None:
-    """Return the column of times by its title, in the nearest group first, else the first if it rises."""
-    others = [one for one in measured.columns.values() if one is not column]
-    titled = sorted(
-        filter(is_time, others),
-        key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
-    )
-    rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
-    return next(iter([*titled, *rising]), None)
-
-
-def _at_rate(measured: Measured, column: MeasuredColumn, rate: float, own: FloatArray | None) -> Times:
-    told = f'the stated rate of {rate:g} Hz'
-    if own is not None and own.size == column.values.size > 1 and own[-1] > own[0]:
-        found = (own.size - 1) / (own[-1] - own[0])
-        if abs(found / rate - 1.0) > _SAME_RATE:
+def _at_rate(measured: Measured, column: MeasuredColumn, rate: float, found: MeasuredColumn | None) -> Times:
+    """Return the times of a stated rate, which those in the file may not contradict."""
+    told, own = f'the stated rate of {rate:g} Hz', column.time.times if column.time else np.zeros(0)
+    if not own.size and found is not None and found.unit:
+        own = unit_of(found.unit, 'time').to_si(found.values)
+    if own.size == column.values.size > 1 and own[-1] > own[0]:
+        real = (own.size - 1) / (own[-1] - own[0])
+        if abs(real / rate - 1.0) > _SAME_RATE:
             raise SignalError(
-                f'{measured.provenance.uri}: its times tell {found:.5g} samples per second, --rate says '
+                f'{measured.provenance.uri}: its times tell {real:.5g} samples per second, --rate says '
                 f'{rate:g}; leave --rate out, or remove the times if they are wrong'
             )
-        told += f' (the times in the file tell {found:.5g})'
+        told += f' (the times in the file tell {real:.5g})'
     begin = column.time.begin if column.time else 0
     return TimeBase(np.arange(column.values.size) / rate, begin, told), ()
 
 
 def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: float) -> Times:
-    where = f'{measured.provenance.uri}, column {column.name!r}'
-    if column.time is not None and not np.isfinite(column.values).any():
+    where, raw = f'{measured.provenance.uri}, column {column.name!r}', column.values
+    bad = np.flatnonzero(~np.isfinite(raw))
+    if column.time is not None and bad.size == raw.size:
         return column.time, ()  # dates, which are no numbers
-    bad = np.flatnonzero(~np.isfinite(column.values))
-    if bad.size or column.values.size < 2:
-        what = f'time number {bad[0]} is no number' if bad.size else 'at least 2 times are needed'
+    if bad.size or raw.size < 2:
         raise SignalError(
-            f'{where}: {what} ({bad.size} such of {column.values.size}); remove these samples, or say the '
-            'rate with --rate HZ'
+            f'{where}: {bad.size} of {raw.size} times are no numbers (the first: number {bad[:1]}); at least '
+            '2 are needed: remove these samples, or say the rate with --rate HZ'
         )
     unit, notes = _unit(where, column, said, slowest)
-    raw = column.values
-    epoch = _EPOCH[0] < raw[0] * unit.factor < _EPOCH[1]
+    origin = float(raw[0]) * unit.factor
+    told = f'column {column.name!r} in {unit.symbol}'
+    told += ', counted from 1970' if _EPOCH[0] < origin < _EPOCH[1] else ''
     begin = round(float(raw[0]) * round(unit.factor * SECOND))
-    told = f'column {column.name!r} in {unit.symbol}' + (', counted from 1970' if epoch else '')
     return TimeBase((raw - raw[0]) * unit.factor, begin, told), notes
 
 
@@ -121,25 +114,25 @@ def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tupl
         raise SignalError(
             f'{where} is in {chosen}, which is no unit of time; name another with --time COLUMN:UNIT'
         )
-    notes: tuple[str, ...] = ()
-    if said and column.unit and unit_of(column.unit, 'time') != unit:
-        notes = (f'{column.name}: its header says {column.unit}; taken as {said}, as you say',)
     count = column.values.size
     # the mean step: stamps in bursts have a median of 0
     step = float((column.values.max() - column.values.min()) / (count - 1))
-    if step <= 0.0:
-        return unit, notes  # of times that do not rise the even grid tells
-    rate = 1.0 / (step * unit.factor)
-    if slowest <= rate <= FASTEST and (rate <= _LIKELY[1] or count >= _SHORTEST * rate):
-        assumed = f'{column.name}: no unit is said; taken as s: {rate:.4g} samples per second'
-        return unit, notes if chosen else (assumed,)
-    units = ('s', 'ms', 'us', 'ns', 'min')
-    guess = next((u for u in units if _LIKELY[0] <= 1.0 / (step * unit_of(u).factor) <= _LIKELY[1]), '')
-    if chosen and not guess:
-        return unit, notes  # of a rate that is too low the even grid tells
-    looks = f'these look like {guess}: write --time {column.name}:{guess}'
-    raise SignalError(
-        f'{where}: steps of {step:.4g} are {rate:.4g} samples per second in {unit.symbol}'
-        f'{", as you say" if said else ", as its header says" if chosen else ""}; '
-        f'{looks if guess else "say the unit with --time COLUMN:UNIT, or the rate with --rate HZ"}'
-    )
+    rate = 1.0 / (step * unit.factor) if step > 0.0 else SLOWEST  # of these the even grid tells
+    who = 'as you say' if said else 'as its header says' if chosen else 'for no unit is said'
+    if not slowest <= rate <= FASTEST or rate > max(_COMMON, 2.0 * count):
+        fitting = (one for one in ('s', 'ms', 'us', 'ns', 'min') if _is_common(step * unit_of(one).factor))
+        guess = next(fitting, '')
+        raise SignalError(
+            f'{where}: steps of {step:.4g} are {rate:.4g} samples per second in {unit.symbol}, {who}; '
+            + (f'these look like {guess}: write --time {column.name}:{guess}, or ' if guess else '')
+            + 'say the rate with --rate HZ'
+        )
+    if not chosen:
+        return unit, (f'{column.name}: no unit is said; taken as s: {rate:.4g} samples per second',)
+    if said and column.unit and unit_of(column.unit, 'time') != unit:
+        return unit, (f'{column.name}: its header says {column.unit}; taken as {said}, as you say',)
+    return unit, ()
+
+
+def _is_common(step: float) -> bool:
+    return 2.0 * SLOWEST * step <= 1.0 <= _COMMON * step

@@ -19,6 +19,7 @@ _INCH = 0.0254  # m, exact
 _FOOT = 0.3048  # m, exact
 _MILE = 1609.344  # m, exact
 _POUND_FORCE = 0.45359237 * STANDARD_GRAVITY  # N, exact
+_PSI = _POUND_FORCE / (_INCH * _INCH)  # Pa, exact
 _TURN = 6.283185307179586  # rad
 _WORD = 3  # letters, chosen: shorter spellings differ by case alone (mS and ms, MN and mN)
 
@@ -37,81 +38,81 @@ class Unit:
         return values * self.factor + self.zero if self.zero else values * self.factor
 
 
-_UNITS_OF: dict[str, tuple[tuple[str, float], ...]] = {
-    'length': (
-        ('mm millimetre millimeter', 1e-3),
-        ('um micron microns micrometre micrometer', 1e-6),
-        ('m metre meter metres meters', 1.0),
-        ('in inch inches " zoll', _INCH),
-        ('cm centimetre centimeter', 1e-2),
-        ('nm', 1e-9),
-        ('km', 1e3),
-        ('mil thou', 1e-3 * _INCH),
-        ("ft foot feet '", _FOOT),
-    ),
-    'velocity': (
-        ('m/s mps m*s^-1', 1.0),
-        ('mm/s', 1e-3),
-        ('um/s', 1e-6),
-        ('cm/s', 1e-2),
-        ('km/h kmh kph km/hr', 1.0 / 3.6),
-        ('mph mi/h', _MILE / 3600.0),
-        ('in/s ips in/sec', _INCH),
-        ('ft/s fps ft/sec', _FOOT),
-    ),
-    'acceleration': (
-        ('m/s^2 m/s2 m/s/s mps2 m/sec^2 m/sec2 m*s^-2 m*s-2 m*s^-2 ms^-2 ms-2', 1.0),
-        ('g g_n gn g0 g_0', STANDARD_GRAVITY),
-        ('mg milli-g', 1e-3 * STANDARD_GRAVITY),
-        ('mm/s^2 mm/s2', 1e-3),
-        ('cm/s^2 cm/s2 gal', 1e-2),
-        ('ug', 1e-6 * STANDARD_GRAVITY),
-        ('ft/s^2 ft/s2', _FOOT),
-        ('in/s^2 in/s2', _INCH),
-    ),
-    'force': (
-        ('N newton newtons', 1.0),
-        ('kN', 1e3),
-        ('mN', 1e-3),
-        ('MN', 1e6),
-        ('daN', 10.0),
-        ('lbf lb lbs lb_f pound pounds', _POUND_FORCE),
-        ('kip kips klbf', 1e3 * _POUND_FORCE),
-        ('kgf kp', STANDARD_GRAVITY),
-    ),
-    'current': (('A amp amps ampere', 1.0), ('mA', 1e-3), ('uA', 1e-6), ('kA', 1e3)),
-    'voltage': (('V volt volts', 1.0), ('mV', 1e-3), ('uV', 1e-6)),
-    'time': (
-        ('s sec secs second seconds sek sekunde sekunden', 1.0),
-        ('ms msec millisecond milliseconds millisekunden', 1e-3),
-        ('us usec microsecond microseconds', 1e-6),
-        ('ns nsec nanosecond nanoseconds', 1e-9),
-        ('min minute minutes minuten', 60.0),
-        ('h hour hours', 3600.0),
-    ),
-    'temperature': (('degC celsius C grdC gradC', 1.0), ('K kelvin', 1.0), ('degF fahrenheit F', 5.0 / 9.0)),
-    'pressure': (
-        ('Pa pascal', 1.0),
-        ('hPa mbar', 100.0),
-        ('kPa', 1e3),
-        ('MPa N/mm^2', 1e6),
-        ('bar', 1e5),
-        ('psi lbf/in^2', _POUND_FORCE / (_INCH * _INCH)),
-        ('ksi', 1e3 * _POUND_FORCE / (_INCH * _INCH)),
-    ),
-    'current/time': (('A/s', 1.0), ('A/ms', 1e3), ('mA/s', 1e-3), ('mA/ms', 1.0)),
-    'inductance': (('H henry', 1.0), ('mH', 1e-3), ('uH', 1e-6), ('nH', 1e-9)),
-    'flux density/time': (('T/s', 1.0), ('T/ms', 1e3), ('mT/s', 1e-3), ('mT/ms', 1.0)),
-    'flux density': (('T tesla Vs/m^2', 1.0), ('mT', 1e-3), ('uT', 1e-6)),
-    'resistance': (('Ohm Ω', 1.0), ('mOhm mΩ', 1e-3), ('kOhm kΩ', 1e3)),
-    'frequency': (('Hz 1/s', 1.0), ('kHz', 1e3)),
-    'angle': (('rad', 1.0), ('deg degree degrees grad', _TURN / 360.0)),
-    'angular velocity': (
-        ('rad/s', 1.0),
-        ('deg/s', _TURN / 360.0),
-        ('rpm 1/min U/min', _TURN / 60.0),
-    ),
-    'ratio': (('1 -', 1.0), ('%', 1e-2)),
+_UNITS_OF: dict[str, dict[str, float]] = {
+    'length': {
+        'mm millimetre millimeter': 1e-3,
+        'um micron microns micrometre micrometer': 1e-6,
+        'm metre meter metres meters': 1.0,
+        'in inch inches " zoll': _INCH,
+        'cm centimetre centimeter': 1e-2,
+        'nm': 1e-9,
+        'km': 1e3,
+        'mil thou': 1e-3 * _INCH,
+        "ft foot feet '": _FOOT,
+    },
+    'velocity': {
+        'm/s mps m*s^-1': 1.0,
+        'mm/s': 1e-3,
+        'um/s': 1e-6,
+        'cm/s': 1e-2,
+        'km/h kmh kph km/hr': 1.0 / 3.6,
+        'mph mi/h': _MILE / 3600.0,
+        'in/s ips in/sec': _INCH,
+        'ft/s fps ft/sec': _FOOT,
+    },
+    'acceleration': {
+        'm/s^2 m/s2 m/s/s mps2 m/sec^2 m/sec2 m*s^-2 m*s-2 m*s^-2 ms^-2 ms-2': 1.0,
+        'g g_n gn g0 g_0': STANDARD_GRAVITY,
+        'mg milli-g': 1e-3 * STANDARD_GRAVITY,
+        'mm/s^2 mm/s2': 1e-3,
+        'cm/s^2 cm/s2 gal': 1e-2,
+        'ug': 1e-6 * STANDARD_GRAVITY,
+        'ft/s^2 ft/s2': _FOOT,
+        'in/s^2 in/s2': _INCH,
+    },
+    'force': {
+        'N newton newtons': 1.0,
+        'kN': 1e3,
+        'mN': 1e-3,
+        'MN': 1e6,
+        'daN': 10.0,
+        'lbf lb lbs lb_f pound pounds': _POUND_FORCE,
+        'kip kips klbf': 1e3 * _POUND_FORCE,
+        'kgf kp': STANDARD_GRAVITY,
+    },
+    'current': {'A amp amps ampere': 1.0, 'mA': 1e-3, 'uA': 1e-6, 'kA': 1e3},
+    'voltage': {'V volt volts': 1.0, 'mV': 1e-3, 'uV': 1e-6},
+    'time': {
+        's sec secs second seconds sek sekunde sekunden': 1.0,
+        'ms msec millisecond milliseconds millisekunden': 1e-3,
+        'us usec microsecond microseconds': 1e-6,
+        'ns nsec nanosecond nanoseconds': 1e-9,
+        'min minute minutes minuten': 60.0,
+        'h hour hours': 3600.0,
+    },
+    'temperature': {'degC celsius C grdC gradC': 1.0, 'K kelvin': 1.0, 'degF fahrenheit F': 5.0 / 9.0},
+    'pressure': {
+        'Pa pascal': 1.0,
+        'hPa mbar': 100.0,
+        'kPa': 1e3,
+        'MPa N/mm^2': 1e6,
+        'bar': 1e5,
+        'psi lbf/in^2': _PSI,
+        'ksi': 1e3 * _PSI,
+    },
+    'current/time': {'A/s': 1.0, 'A/ms': 1e3, 'mA/s': 1e-3, 'mA/ms': 1.0},
+    'inductance': {'H henry': 1.0, 'mH': 1e-3, 'uH': 1e-6, 'nH': 1e-9},
+    'flux density/time': {'T/s': 1.0, 'T/ms': 1e3, 'mT/s': 1e-3, 'mT/ms': 1.0},
+    'flux density': {'T tesla Vs/m^2': 1.0, 'mT': 1e-3, 'uT': 1e-6},
+    'resistance': {'Ohm Ω': 1.0, 'mOhm mΩ': 1e-3, 'kOhm kΩ': 1e3},
+    'frequency': {'Hz 1/s': 1.0, 'kHz': 1e3},
+    'angle': {'rad': 1.0, 'deg degree degrees grad': _TURN / 360.0},
+    'angular velocity': {
+        'rad/s': 1.0,
+        'deg/s': _TURN / 360.0,
+        'rpm 1/min U/min': _TURN / 60.0,
+    },
+    'ratio': {'1 -': 1.0, '%': 1e-2},
 }
 _ZEROS = {'degC': ZERO_CELSIUS, 'degF': ZERO_CELSIUS - 32.0 * 5.0 / 9.0}  # K
 _SIGNS = str.maketrans({'µ': 'u', 'μ': 'u', '²': '^2', '·': '*', '⋅': '*', '°': 'deg', '″': '"', 'Ω': 'Ω'})
@@ -126,7 +127,7 @@ _TRAPS = {
 _UNITS = {
     spelling: Unit(spellings.split()[0], dimension, factor, _ZEROS.get(spellings.split()[0], 0.0))
     for dimension, rows in _UNITS_OF.items()
-    for spellings, factor in rows
+    for spellings, factor in rows.items()
     for spelling in spellings.split()
 }
 _WORDS = {

@@ -17,7 +17,6 @@ from engine_mount.identification.friction.looks.force_zero import zeroed
 from engine_mount.identification.rack.given import described
 from engine_mount.recordings.place import recording_hash
 from engine_mount.settings.chosen import chosen_control
-from engine_mount.signals.signal import SignalError
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen, load_specimen
@@ -206,17 +205,6 @@ def test_the_folder_of_a_run_is_read_as_the_recording_in_it(in_mcap, tmp_path):
     np.testing.assert_array_equal(whole.force, read_recording(in_mcap[1]).force)
 
 
-def test_channels_of_mcap_are_chosen_with_their_unit(in_mcap):
-    recorded, folder = in_mcap
-    read = read_recording(folder, said(['friction_force=sim/clamp_force.wrench.force.z:lb']))
-    assert read.force == pytest.approx(4.4482216152605 * recorded.normal_force, rel=1e-9)
-    assert read.normal_force[:, 0] == pytest.approx(recorded.normal_force, rel=1e-9)
-    with pytest.raises(SignalError, match=r"column 'force.z' is ambiguous: .*clamp_force"):
-        read_recording(folder, said(['friction_force=force.z']))
-    with pytest.raises(SignalError, match=r"has no column '/cell.z'; its columns are .*clamp_force"):
-        read_recording(folder, said(['friction_force=/cell.z']))
-
-
 def test_a_held_out_recording_must_be_unseen(rack, capsys):
     with pytest.raises(SystemExit):
         main(['identify', 'friction', '--train', str(rack / '40.csv'), '--held-out', str(rack / '40.csv')])
@@ -258,20 +246,6 @@ def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, capsys):
         main(['identify', 'friction', '--train', str(rack / 'ramp.csv'), '--out', str(tmp_path / 'f.yaml')])
     assert 'the sawtooth is missing' in capsys.readouterr().err.replace('\n', ' ')
     assert not (tmp_path / 'f.yaml').exists()
-
-
-def test_channels_name_column_and_unit(tmp_path):
-    time = np.arange(0.0, 2.0, 1e-3)
-    table = np.column_stack([time, np.sin(6 * time), 0.05 * np.cos(6 * time), np.full(time.size, 0.1)])
-    file = tmp_path / 'own.csv'
-    np.savetxt(file, table, delimiter=',', header='time,way,cell,load', comments='')
-    with pytest.raises(SignalError, match='name it as in --channel'):
-        read_recording(file)
-    chosen = said(['displacement=way:mm', 'friction_force=cell:kN', 'normal_force=load:kN'])
-    read = read_recording(file, chosen)
-    assert read.displacement.max() == pytest.approx(1e-3, rel=1e-3)
-    assert read.force.max() == pytest.approx(50.0, rel=1e-3)
-    assert np.mean(read.normal_force) == pytest.approx(100.0)
 
 
 def rig_file(folder):
@@ -358,10 +332,3 @@ def test_channels_are_heard_for_json_too(tmp_path):
 def test_a_channel_that_json_does_not_have_is_refused(text, words, tmp_path):
     with pytest.raises(ValueError, match=words):
         read_recording(_rig_file(tmp_path), said([text]))
-
-
-def test_a_channel_that_cannot_be_heard_is_refused(in_mcap):
-    with pytest.raises(SignalError, match='must be s, ms'):
-        said(['time=t:mm'])
-    with pytest.raises(SignalError, match="has no column 't'; its columns are"):
-        read_recording(in_mcap[1], said(['time=t']))

@@ -11,8 +11,7 @@ import engine_mount
 from engine_mount.cli.command import app
 from engine_mount.cli.commands.record import _told
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.audit_report import sentences
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.losses import losses, sentences
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
 from mount_ros.messages.scalars import ScalarsLayout

@@ -163,7 +163,7 @@ def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, tmp_path, 
     said = refused(
         capsys, 'drive', '--road', blocks, '--speed', '20', '--scenario', 'bench', '--core', code=2
     )
-    assert 'a scenario of its own' in said
+    assert 'or the file' in said
     flat = tmp_path / 'acc.csv'
     numbers = np.random.default_rng(1).normal(0.0, 1.0, 2000)
     flat.write_text('x [m],acc\n' + ''.join(f'{0.05 * k:.2f},{each:.4f}\n' for k, each in enumerate(numbers)))

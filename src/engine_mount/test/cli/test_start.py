@@ -11,7 +11,7 @@ import pytest
 from engine_mount.cli.bench import chains
 from engine_mount.cli.commands import faults, view
 from engine_mount.view import view as looking
-from engine_mount.view.feed.feed import FeedError
+from engine_mount.view.feed import FeedError
 from mount_ros import environment
 
 
@@ -42,8 +42,9 @@ def test_programs_of_the_command_import_nothing_from_the_working_directory(tmp_p
 
 def test_status_ends_with_the_reason_when_its_model_fails(monkeypatch):
     model = SimpleNamespace(failure='the view has ended: ValueError: broken')
-    given = contextlib.nullcontext((SimpleNamespace(title='a graph'), model))
-    monkeypatch.setattr(looking, 'model_of', lambda _: given)
+    feed = contextlib.nullcontext(SimpleNamespace(title='a graph'))
+    monkeypatch.setattr(looking, 'open_feed', lambda **options: feed)
+    monkeypatch.setattr(looking, 'running_model', lambda _, **options: contextlib.nullcontext(model))
     monkeypatch.setattr('engine_mount.view.screen.status_screen', lambda *_: 'figures')
     with pytest.raises(FeedError, match='the view has ended: ValueError: broken'):
         view.status(domain=5)

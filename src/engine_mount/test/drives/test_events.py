@@ -55,13 +55,6 @@ def test_the_states_fit_a_line_of_80_columns_on_the_way_of_every_node(events):
         events.on_state(node, 'active')
 
 
-def test_many_nodes_are_counted_but_those_that_are_being_activated_are_named():
-    nodes = of_mounts(SIMULATED, ('left', 'right'))
-    events = DriveEvents(nodes, lambda text: None)
-    events.on_state(nodes[1], 'activating')
-    assert events.states == 'starting: 7; activating: left/driver'
-
-
 def test_all_nodes_active_are_told_once_with_the_time_since_the_start(events, told, clock):
     clock.now = 3.2
     for node in SIMULATED:

@@ -9,8 +9,7 @@ from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
 
 import engine_mount
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.audit_report import as_json, as_table
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.losses import as_json, as_table, losses
 from engine_mount.recordings.screen import Screen
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.scalars import ScalarsLayout

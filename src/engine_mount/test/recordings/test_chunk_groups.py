@@ -11,10 +11,10 @@ from recorded_drive import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.merge import merge
+from engine_mount.recordings.recording import column_parts
 from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.mcap_writer import MESSAGE
@@ -134,7 +134,7 @@ def test_who_wants_one_group_unpacks_no_chunk_of_the_other(drive, group):
     parts = list(column_parts(recording, {topic.name: names}))
     np.testing.assert_array_equal(np.concatenate([part.stamps for part in parts]), stamps)
     for name in names:
-        np.testing.assert_array_equal(np.concatenate([part.column(name) for part in parts]), columns[name])
+        np.testing.assert_array_equal(np.concatenate([part.columns[name] for part in parts]), columns[name])
     np.testing.assert_array_equal(recording[topic.name].stamps, stamps)
     assert recording.warnings == []
     other = SIM_TRUTH if group == OF_OTHERS else DISPLACEMENT

@@ -8,8 +8,8 @@ from recorded_drive import PERIOD, START, joint_state, write_drive
 
 import engine_mount
 from engine_mount.recordings import SeriesError
-from engine_mount.recordings.columns import column_parts
 from engine_mount.recordings.mcap_file import McapFile
+from engine_mount.recordings.recording import column_parts
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
@@ -64,7 +64,7 @@ def test_parts_put_together_are_all_messages(changing, size):
     assert max(map(len, parts)) <= size
     assert not any('nothing' in part.columns for part in parts)
     for found, expected in (
-        ([part.column('mount') for part in parts], whole['mount']),
+        ([part.columns['mount'] for part in parts], whole['mount']),
         ([part.stamps for part in parts], whole.stamps),
         ([part.receive_times for part in parts], whole.receive_times),
     ):

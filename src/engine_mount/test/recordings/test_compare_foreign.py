@@ -11,8 +11,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import engine_mount
 from engine_mount.recordings.compare import compare
+from engine_mount.recordings.difference import Tolerances
 from engine_mount.recordings.events import recorded_events, recorded_marks
-from engine_mount.recordings.tolerances import Tolerances
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 50

@@ -12,8 +12,7 @@ from ros_testing import serialised
 import engine_mount
 from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_answers
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.audit_report import as_json, sentences
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.losses import as_json, losses, sentences
 from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import (

@@ -272,16 +272,14 @@ def test_pieces_are_read_in_their_order_and_missing_ones_are_named(tmp_path):
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))
-@pytest.mark.parametrize('chunked', [True, False])
 @pytest.mark.parametrize('indexed', [True, False])
-def test_files_of_other_writers_are_read(tmp_path, compression, chunked, indexed):
+def test_files_of_other_writers_are_read(tmp_path, compression, indexed):
     path = tmp_path / 'other.mcap'
     with path.open('wb') as file:
         writer = Writer(
             file,
             chunk_size=2000,
             compression=compression,
-            use_chunking=chunked,
             index_types=IndexType.ALL if indexed else IndexType.NONE,
             repeat_channels=indexed,
             repeat_schemas=indexed,
@@ -302,7 +300,15 @@ def test_files_of_other_writers_are_read(tmp_path, compression, chunked, indexed
         recording['broken'].message(0)
 
 
-# An offset beyond the head of a message lands where its bytes could pass for a record of channel 1.
+def test_messages_outside_of_chunks_are_refused_with_the_way_out(tmp_path):
+    with (tmp_path / 'other.mcap').open('wb') as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start('ros2', 'another')
+        writer.register_channel('/event', 'cdr', writer.register_schema(STRING, 'ros2msg', b'string data'))
+        writer.add_message(1, START, string('the text'), START)
+        writer.finish()
+    with pytest.raises(ReadingError, match='outside of chunks: copy it by rosbags-convert'):
+        engine_mount.open(tmp_path / 'other.mcap')
 
 
 def records_of(content):

@@ -94,7 +94,7 @@ def test_quantity_and_unit_of_an_option(option, quantity, column, unit):
         ({'columns': ['foo:G']}, 'for gravity write g'),
         ({'columns': ['a:mm', 'b:um']}, 'displacement is named twice'),
         ({'time': 't:mm'}, 'must be s, ms'),
-        ({'time': 't', 'rate': 100.0}, 'both tell the times'),
+        ({'time': 't', 'rate': 100.0}, 'both say the times'),
         ({'rate': 0.0}, 'above 0'),
     ],
 )

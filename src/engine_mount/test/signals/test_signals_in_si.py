@@ -48,14 +48,6 @@ def test_the_hand_goes_before_the_header_and_is_noted():
     assert found['displacement'].notes == ('Weg: its header says m; taken as in, as you say',)
 
 
-def test_the_factor_of_a_unit_may_be_said_twice():
-    found = read({'t [s]': TIMES, 'Weg [mm]': 1e3 * TRAVEL}, 'displacement=Weg', scale=1e-3)
-    assert found['displacement'].values == pytest.approx(TRAVEL)
-    turned = read({'t [s]': TIMES, 'Weg [mm]': 1e3 * TRAVEL}, 'displacement=Weg', scale=-1.0)
-    assert turned['displacement'].values == pytest.approx(-TRAVEL)
-    assert 'the scale says 0.01' in refusal({'t': TIMES, 'Weg [mm]': TRAVEL}, 'displacement=Weg', scale=0.01)
-
-
 @pytest.mark.parametrize(
     ('values', 'guess'),
     [

@@ -30,27 +30,20 @@ def audit(
     json_file: JsonFile = None,
 ) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
+    from engine_mount import audit as audit_recording
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.audit import audit as audited
-    from engine_mount.recordings.audit_report import as_json, as_table, latency_sentences, sentences
-    from engine_mount.recordings.losses import losses
-    from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
     place = local(recording, console)
     with console.status('reading'):
-        opened = open_run(place)
-        audits = audited(opened)
-        found = losses(opened, audits)
-    TerminalScreen(console).table(as_table(audits))
-    for line in latency_sentences(audits):
-        console.print(line, soft_wrap=True)
-    for sentence in sentences(audits, found):
+        found = audit_recording(place)
+    TerminalScreen(console).table(found.table)
+    for sentence in found.sentences():
         console.print(sentence, soft_wrap=True)
-    for warning in opened.warnings:
+    for warning in found.warnings:
         note(console, warning)
     if json_file is not None:
-        write_json(as_json(audits, found), json_file)
+        write_json(found.figures, json_file)
     if not found.sound:
         raise typer.Exit(1)

@@ -35,7 +35,7 @@ def compare(
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
     json_file: JsonFile = None,
     figure: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='draw the most important differences (PNG)')
+        Path | None, typer.Option(metavar='FILE', help='draw both and their difference (PNG)')
     ] = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
@@ -56,17 +56,16 @@ def _told(
     a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
+    from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.alignment import alignment_sentence
-    from engine_mount.recordings.compare import compare as compare_recordings
     from engine_mount.recordings.difference import signal_table
+    from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.place import open_run
-    from engine_mount.recordings.tolerances import Tolerances
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
     recordings = open_run(local(a, console)), open_run(local(b, console))
-    comparison = compare_recordings(*recordings, Tolerances(tolerances), common_only=common)
+    comparison = compare_recordings(*recordings, tolerances, common=common)
     console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
     for sentence in comparison.sentences():
         console.print(f'- {sentence}', soft_wrap=True)
@@ -82,7 +81,7 @@ def _told(
     if json_file is not None:
         write_json(comparison.figures(), json_file)
     if figure is not None:
-        from engine_mount.reports.compare_picture import draw_comparison
+        from engine_mount.reports.pictures import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
         console.print(f'figure {figure}', soft_wrap=True)

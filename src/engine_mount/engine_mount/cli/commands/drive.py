@@ -19,6 +19,9 @@ from engine_mount.cli.commands.options import (
     Snapshot,
     Split,
     TimeColumn,
+    flag,
+    option,
+    refuse_without,
     stated,
 )
 from engine_mount.cli.commands.road_arguments import (
@@ -27,9 +30,7 @@ from engine_mount.cli.commands.road_arguments import (
     Lateral,
     Repeat,
     SpeedText,
-    given_without_road,
     height_column,
-    road_excitation,
 )
 from engine_mount.cli.completion import faults, listed, named
 from engine_mount.cli.fetching import local
@@ -68,31 +69,29 @@ Examples:
 def drive(
     scenario: Annotated[
         str,
-        typer.Option(
-            metavar='NAME',
-            help='motorway, bench, sweep, recorded or road; default: that of a file, or motorway',
-            autocompletion=named('scenario'),
+        option(
+            'motorway, bench, sweep, recorded or road; default: that of a file, or motorway',
+            'NAME',
+            named('scenario'),
         ),
     ] = '',
     mount: Annotated[
         str,
-        typer.Option(
-            metavar='NAME',
-            help='friction, friction_off, friction_always_on, hydro or elastomer; default: friction',
-            autocompletion=named('mount'),
+        option(
+            'friction, friction_off, friction_always_on, hydro or elastomer; default: friction',
+            'NAME',
+            named('mount'),
         ),
     ] = '',
     mounts: Annotated[
         str,
-        typer.Option(
-            metavar='NAME,...',
-            help='mounts with electronics under one engine: of left, right, front, rear',
-            autocompletion=listed('place'),
+        option(
+            'mounts with electronics under one engine: of left, right, front, rear',
+            'NAME,...',
+            listed('place'),
         ),
     ] = '',
-    file: Annotated[
-        str, typer.Option(metavar='FILE', help='recorded: any file or folder of signals, or its URI')
-    ] = '',
+    file: Annotated[str, option('recorded: any file or folder of signals, or its URI', 'FILE')] = '',
     column: Columns = None,
     time: TimeColumn = '',
     rate: Rate = None,
@@ -100,16 +99,12 @@ def drive(
     dbc: Dbc = None,
     decimal: Decimal = '',
     delimiter: Delimiter = '',
-    topic: Annotated[str, typer.Option(help='recorded: topic of a bag, --column being the field')] = '',
+    topic: Annotated[str, option('recorded: topic of a bag, --column being the field')] = '',
     scale: Annotated[
         float | None,
-        typer.Option(
-            help='recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'
-        ),
+        option('recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
     ] = None,
-    road: Annotated[
-        str, typer.Option(metavar='FILE', help='measured road: height over distance, CSV or OpenCRG')
-    ] = '',
+    road: Annotated[str, option('measured road: height over distance, CSV or OpenCRG', 'FILE')] = '',
     speed: SpeedText = '',
     lateral: Lateral = 0.0,
     distance: Distance = '',
@@ -117,34 +112,30 @@ def drive(
     repeat: Repeat = False,
     fault: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar='NAME@t[:duration]',
-            help='a fault from t s after the start of the simulator on, for so many s or for good; '
-            'may be repeated; list: what there is',
-            autocompletion=faults,
+        option(
+            'a fault from t s after the start of the simulator on, for so many s or for good; may be '
+            'repeated; list: what there is',
+            'NAME@t[:duration]',
+            faults,
         ),
     ] = None,
     lockstep: Annotated[
-        bool, typer.Option('--lockstep', help='the electronics wait for each answer: deterministic, faster')
+        bool, flag('--lockstep', 'the electronics wait for each answer: deterministic, faster')
     ] = False,
     apart: Annotated[
-        bool,
-        typer.Option('--apart', help='lock-step: each node in its own process, as in the car; slower'),
+        bool, flag('--apart', 'lock-step: each node in its own process, as in the car; slower')
     ] = False,
     composed: Annotated[
-        bool,
-        typer.Option('--composed', help='driver, initialisation and control of the mount share a process'),
+        bool, flag('--composed', 'driver, initialisation and control of the mount share a process')
     ] = False,
-    core: Annotated[bool, typer.Option('--core', help='without middleware: plain function calls')] = False,
+    core: Annotated[bool, flag('--core', 'without middleware: plain function calls')] = False,
     duration: Annotated[
-        float | None,
-        typer.Option(metavar='S', help='length of the excitation, s; default: the recording, or 15 s'),
+        float | None, option('length of the excitation, s; default: the recording, or 15 s', 'S')
     ] = None,
     sample_rate: Annotated[
-        float | None,
-        typer.Option(metavar='HZ', help='how often the electronics measure, 500 .. 2000 Hz; default: 1000'),
+        float | None, option('how often the electronics measure, 500 .. 2000 Hz; default: 1000', 'HZ')
     ] = None,
-    seed: Annotated[int | None, typer.Option(help='seed of noise and road')] = None,
+    seed: Annotated[int | None, option('seed of noise and road')] = None,
     settings: Settings = None,
     out: NewFolder = None,
     json_file: JsonFile = None,
@@ -152,24 +143,15 @@ def drive(
         bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
     on_full: Annotated[
-        str,
-        typer.Option(
-            metavar='WORD',
-            help='full disk: stop the run, or continue without recording',
-            autocompletion=named('on_full'),
-        ),
+        str, option('full disk: stop the run, or continue without recording', 'WORD', named('on_full'))
     ] = 'stop',
     split: Split = None,
     snapshot: Snapshot = '',
     priority: Annotated[
-        int,
-        typer.Option(min=0, max=90, help='real-time priority of the 1 kHz loop where permitted; 0: none'),
+        int, option('real-time priority of the 1 kHz loop where permitted; 0: none', min=0, max=90)
     ] = 10,
     restarts: Annotated[
-        int,
-        typer.Option(
-            min=0, help='times that a node may be lost within a minute before the drive ends; 0: none'
-        ),
+        int, option('times that a node may be lost within a minute before the drive ends; 0: none', min=0)
     ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',
@@ -178,7 +160,7 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
-    from engine_mount.reports.drive.telling import tell_drive, tell_snapshots
+    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.amounts import checked_recorder, recorder_options
     from engine_mount.settings.options import settings_of_options
@@ -187,13 +169,15 @@ def drive(
     if 'list' in (fault or []):
         _list_faults()
         raise typer.Exit
-    of_files = {'time': time, 'rate': rate, 'map-file': map_file, 'dbc': dbc, 'topic': topic, 'scale': scale}
-    of_files |= {'decimal': decimal, 'delimiter': delimiter}
     if not file:
-        given_without_file(**of_files, column=None if road else column)
+        others = {} if road else {'column': column}
+        refuse_without(
+            'file', 'recording', time=time, rate=rate, map_file=map_file, dbc=dbc, topic=topic, scale=scale,
+            decimal=decimal, delimiter=delimiter, **others,
+        )  # fmt: skip
     of_roads = {'lateral': lateral, 'distance': distance, 'contact_length': contact_length, 'repeat': repeat}
     if not road:
-        given_without_road(speed=speed, **of_roads)
+        refuse_without('road', 'road', speed=speed, **of_roads)
     elif file:
         raise typer.BadParameter('--road is a scenario of its own; leave out --file')
     try:
@@ -207,8 +191,15 @@ def drive(
     console = terminal()
     excitation = None
     if road:
-        length = duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0)
-        excitation = road_excitation(road, speed, height_column(column or []), length, **of_roads)
+        from engine_mount import road as read_road
+        from engine_mount.drives.external_excitation import measured_road
+
+        if not speed:
+            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s), or a file of it over time')
+        named = height_column(column or [])
+        found = read_road(road, lateral=lateral, column=named, distance=distance, speed=speed)
+        length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
+        excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:
         from engine_mount.drives.external_excitation import recorded_acceleration
 
@@ -229,29 +220,20 @@ def drive(
         raise typer.BadParameter(str(error)) from None
     recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
     if recorded.snapshot:
-        told = tell_snapshots(driven.folder, recorded, driven.figures, screen)
+        told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
     else:
-        told = tell_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     if json_file is not None:
         write_json(told.figures, json_file)
-    for figure in told.pictures:
-        console.print(f'figure     {figure}', soft_wrap=True)
-    if driven.folder.report.exists():
-        console.print(f'report     {driven.folder.report}', soft_wrap=True)
-    for place in told.recordings:
-        console.print(f'recording  {place}', soft_wrap=True)
+    page = [driven.folder.report] if driven.folder.report.exists() else []
+    for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):
+        for place in places:
+            console.print(f'{word:<10} {place}', soft_wrap=True)
     complaints = [*driven.complaints, *told.complaints]
     for complaint in complaints:
         note(console, complaint)
     if complaints:
         raise typer.Exit(1)
-
-
-def given_without_file(**options: object) -> None:
-    """Refuse options that say something of a recording where there is none."""
-    for name, value in options.items():
-        if value not in (None, '', []):
-            raise typer.BadParameter(f'--{name} is for a recording: name it with --file FILE')
 
 
 def _list_faults() -> None:

@@ -1,19 +1,13 @@
 """`engine-mount ls` and `info`: which recordings there are, and what one of them is."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from datetime import datetime
+from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from engine_mount.cli.commands.options import Dbc, Decimal, Delimiter, JsonFile, RecordingPlace, stated
 from engine_mount.cli.fetching import local, named
 from engine_mount.cli.terminal import note, terminal
-
-if TYPE_CHECKING:
-    from engine_mount.reports.listing import Listed
-    from engine_mount.reports.recording_facts import RecordingFacts
-    from engine_mount.signals.formats.content import Stated
 
 EPILOG = """Exit code: 0, also where a recording is damaged, which its line tells; 1 when a folder is
 not there.
@@ -54,7 +48,7 @@ def ls(
 ) -> None:
     """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
     from engine_mount.reports.json_file import write_json
-    from engine_mount.reports.listing import listed
+    from engine_mount.reports.listing import list_recordings
     from engine_mount.signals.sources.uris import is_local, local_path, shown
 
     console = terminal()
@@ -63,36 +57,27 @@ def ls(
     if missing:
         raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
     with console.status('reading'):
-        found = listed(places)
+        found = list_recordings(places)
     if json_file is not None:
-        write_json({'recordings': [one.as_json() for one in found]}, json_file)
+        write_json({'recordings': found}, json_file)
     if not found:
         console.print(f'no recordings in {", ".join(map(shown, places))}', soft_wrap=True)
-    _print_listed(found, console)
-
-
-def _print_listed(found: 'list[Listed]', console: Console) -> None:
-    """Print two lines for each, so that paths stay whole in 80 columns."""
-    rows = [
-        (
-            f'{one.started:%Y-%m-%d %H:%M}' if one.started else '',
-            '' if one.duration is None else f'{one.duration:.1f} s',
-            one.scenario,
-            one.mode,
-            one.mount,
-            one.policy,
-        )
-        for one in found
-    ]
+    # Two lines for each, so that paths stay whole in 80 columns.
+    rows = [_cells(one) for one in found]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for one, row in zip(found, rows, strict=True):
-        style = 'yellow' if one.sound is False else None
-        console.print(f'{one.path}: {one.verdict}', style=style, soft_wrap=True)
-        cells = [
-            text.rjust(width) if place == 1 else text.ljust(width)
-            for place, (text, width) in enumerate(zip(row, widths, strict=True))
-        ]
+        style = 'yellow' if one['sound'] is False else None
+        console.print(f'{one["recording"]}: {one["verdict"]}', style=style, soft_wrap=True)
+        started, duration, *others = (text.ljust(width) for text, width in zip(row, widths, strict=True))
+        cells = (started, duration.strip().rjust(widths[1]), *others)
         console.print('  ' + '  '.join(cells).strip(), soft_wrap=True)
+
+
+def _cells(one: dict[str, Any]) -> list[str]:
+    started = one['started'] and f'{datetime.fromisoformat(one["started"]):%Y-%m-%d %H:%M}'
+    duration = '' if one['duration_s'] is None else f'{one["duration_s"]:.1f} s'
+    others = [one[name] or '' for name in ('scenario', 'mode', 'mount', 'policy')]
+    return [started or '', duration, *others]
 
 
 def info(
@@ -106,84 +91,41 @@ def info(
 
     Of a file of others, its columns.
     """
-    from engine_mount.recordings.place import open_run
-    from engine_mount.reports.json_file import write_json
-    from engine_mount.reports.recording_facts import recording_facts
-    from engine_mount.signals.formats.reading import is_foreign
-
-    console = terminal()
-    place = local(recording, console)
-    if is_foreign(place):
-        _info_of_columns(place, stated(dbc, decimal, delimiter), console, json_file)
-        return
-    with console.status('reading'):
-        facts = recording_facts(open_run(place))
-    _print_facts(facts, console)
-    if json_file is not None:
-        write_json(facts.as_json(), json_file)
-
-
-def _info_of_columns(place: Path, said: 'Stated', console: Console, json_file: Path | None) -> None:
     from dataclasses import asdict
 
     from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.recordings.place import open_run
     from engine_mount.reports.json_file import write_json
+    from engine_mount.reports.listing import describe_recording
     from engine_mount.signals.formats.described import columns_table, described
-    from engine_mount.signals.formats.reading import read
+    from engine_mount.signals.formats.reading import is_foreign, read
 
-    with console.status('reading'):
-        measured = read(place, None, said)
-    facts = described(measured)
-    told = measured.provenance
-    console.print(f'{"file":<20}{told.uri}, {told.format}, read by {told.reader}', soft_wrap=True)
-    console.print(f'{"SHA-256":<20}{told.sha256}', soft_wrap=True)
-    TerminalScreen(console).table(columns_table(facts))
-    for sentence in measured.notes:
+    console = terminal()
+    place = local(recording, console)
+    figures: dict[str, Any]
+    if is_foreign(place):
+        with console.status('reading'):
+            measured = read(place, None, stated(dbc, decimal, delimiter))
+        columns, origin = described(measured), measured.provenance
+        rows = [
+            ('file', f'{origin.uri}, {origin.format}, read by {origin.reader}'),
+            ('SHA-256', origin.sha256),
+        ]
+        tables, notes = [columns_table(columns)], measured.notes
+        columns_json = [one.as_json() for one in columns]
+        figures = {'provenance': asdict(origin), 'columns': columns_json, 'notes': notes}
+    else:
+        opened = open_run(place)
+        with console.status('reading'):
+            figures, rows, tables = describe_recording(opened)
+        whole = 'whole' if opened.whole else 'not whole'
+        rows.insert(0, ('recording', f'{named(opened.path)}, {whole}'))
+        notes = opened.warnings
+    for label, text in rows:
+        console.print(f'{label:<20}{text}' if label else text, soft_wrap=True)
+    for table in tables:
+        TerminalScreen(console).table(table)
+    for sentence in notes:
         note(console, sentence)
     if json_file is not None:
-        columns = [one.as_json() for one in facts]
-        write_json({'provenance': asdict(told), 'columns': columns, 'notes': measured.notes}, json_file)
-
-
-def _print_facts(facts: 'RecordingFacts', console: Console) -> None:
-    from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.session import duration_of, started_of, versions_sentence
-    from mount_recorder.versions import versions
-
-    def tell(label: str, text: str) -> None:
-        console.print(f'{label:<20}{text}', soft_wrap=True)
-
-    opened, session = facts.recording, facts.session
-    started, duration = started_of(session, opened), duration_of(session, opened)
-    tell('recording', f'{named(opened.path)}, {"whole" if opened.whole else "not whole"}')
-    tell('started', f'{started:%Y-%m-%d %H:%M:%S}' if started else 'unknown')
-    tell('duration', 'unknown' if duration is None else f'{duration:.3f} s')
-    replay = 'replay of ' if 'replay' in session else ''
-    driven = f'{replay}{session.get("scenario", "")}, {session.get("mode", "")}'
-    tell('session', driven if session else 'none: the recording does not tell what it is')
-    for mount, gap in facts.gaps.items():
-        texts = [f'{name} {_gap_text(gap, f"{name}_gap")}' for name in ('rest', 'contact')]
-        tell(f'gap {mount}'.strip(), ', '.join(texts))
-    if facts.versions:
-        parts = ('mount_bringup', 'rclpy', 'python', 'numpy')
-        tell(
-            'versions',
-            ', '.join(f'{name} {facts.versions[name]}' for name in parts if name in facts.versions),
-        )
-    if session:
-        console.print(versions_sentence(facts.others, versions()), soft_wrap=True)
-    marks = ', '.join(f'{kind}: {count}' for kind, count in facts.marks.items())
-    tell('marks', marks or 'none')
-    for label, text in facts.losses.rows():
-        tell(label, text.replace('\n', ' '))
-    screen = TerminalScreen(console)
-    if facts.changed:
-        screen.table(facts.parameters_table())
-    screen.table(facts.topics_table())
-    for warning in opened.warnings:
-        note(console, warning)
-
-
-def _gap_text(gap: dict[str, float], name: str) -> str:
-    value, std = (1e6 * gap.get(key, float('nan')) for key in (name, f'{name}_std'))
-    return f'{value:.1f} ± {std:.1f} µm'
+        write_json(figures, json_file)

@@ -35,7 +35,7 @@ def merge(
         soft_wrap=True,
     )
     warnings = [warning for recording in opened for warning in recording.warnings]
-    for sentence in (*warnings, *done.holes, *done.losses):
+    for sentence in (*warnings, *done.losses):
         note(console, sentence)
     if done.losses:
         raise typer.Exit(1)

@@ -5,11 +5,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.completion import recordings, setting
+from engine_mount.cli.completion import Completer, recordings, setting
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
+
+
+def option(text: str, metavar: str | None = None, complete: Completer | None = None, **more: Any) -> Any:
+    """Return an option with its help `text` and the placeholder of its value."""
+    return typer.Option(help=text, metavar=metavar, autocompletion=complete, **more)
+
+
+def flag(name: str, text: str) -> Any:
+    """Return an option without a value, which is never negated."""
+    return typer.Option(name, help=text)
+
+
+def refuse_without(source: str, kind: str, **options: object) -> None:
+    """Refuse `options` that are given although the option `source`, which names a `kind`, is not."""
+    for name, value in options.items():
+        if value not in (None, '', [], False, 0.0):
+            name = name.replace('_', '-')
+            raise typer.BadParameter(f'--{name} is for a {kind}: name it with --{source} FILE')
 
 
 def recording_argument(metavar: str | None = None, instead: str = '') -> Any:

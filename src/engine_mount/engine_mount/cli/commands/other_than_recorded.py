@@ -27,6 +27,4 @@ def changes_of(settings: list[str]) -> dict[str, dict[str, Any]]:
         given = settings_of_options(settings)
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    return parsed_changes(
-        {f'{node}.{name}': value for node, own in given.items() for name, value in own.items()}
-    )
+    return parsed_changes(given)

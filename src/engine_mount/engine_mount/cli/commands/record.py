@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split
+from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split, option
 from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import terminal
 
@@ -36,18 +36,14 @@ def record(
     out: NewFolder = None,
     split: Split = None,
     snapshot: Snapshot = '',
-    snapshot_after: Annotated[
-        str, typer.Option(metavar='DURATION', help='snapshot: and with so much after an event')
-    ] = '10s',
-    duration: Annotated[
-        float | None, typer.Option(metavar='S', help='length, s; default: until Ctrl-C')
-    ] = None,
+    snapshot_after: Annotated[str, option('snapshot: and with so much after an event', 'DURATION')] = '10s',
+    duration: Annotated[float | None, option('length, s; default: until Ctrl-C', 'S')] = None,
     on_full: Annotated[
         str,
-        typer.Option(
-            metavar='WORD',
-            help='full disk: stop, or continue without recording until the end is asked for',
-            autocompletion=named('on_full'),
+        option(
+            'full disk: stop, or continue without recording until the end is asked for',
+            'WORD',
+            named('on_full'),
         ),
     ] = 'stop',
     domain: Domain = None,
@@ -85,8 +81,7 @@ def record(
 def _told(folder: Path, console: Console) -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
     from engine_mount.recordings.audit import audit
-    from engine_mount.recordings.audit_report import sentences
-    from engine_mount.recordings.losses import losses
+    from engine_mount.recordings.losses import losses, sentences
     from engine_mount.recordings.recording import open_recording
 
     recording = open_recording(folder)

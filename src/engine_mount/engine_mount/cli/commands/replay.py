@@ -14,6 +14,8 @@ from engine_mount.cli.commands.options import (
     MapFile,
     NewFolder,
     TimeColumn,
+    flag,
+    option,
     recording_argument,
     stated,
 )
@@ -29,7 +31,7 @@ Examples:
 
 `engine-mount replay bags/first/recording` - equal to what was recorded?
 
-`engine-mount replay RECORDING --lockstep` - the same through the real nodes over topics
+`engine-mount replay RECORDING --lockstep` - the same through the real node over topics
 
 `engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
 
@@ -46,19 +48,15 @@ def replay(
             instead='folder of a run or recording, MCAP file, or its URI; with --map any file of signals'
         ),
     ],
-    core: Annotated[
-        bool, typer.Option('--core', help='through the controller as function calls; the default')
-    ] = False,
+    core: Annotated[bool, flag('--core', 'through the controller as function calls; the default')] = False,
     lockstep: Annotated[
-        bool, typer.Option('--lockstep', help='through the real nodes over topics, sample by sample')
+        bool, flag('--lockstep', 'control through its real node over topics, sample by sample')
     ] = False,
     live: Annotated[
-        bool, typer.Option('--live', help='publish the recorded topics by the wall clock, to look at')
+        bool, flag('--live', 'publish the recorded topics by the wall clock, to look at')
     ] = False,
     settings: OtherThanRecorded = None,
-    table: Annotated[
-        str, typer.Option(help='current-force table of another RECORDING, or "default": calculated')
-    ] = '',
+    table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     maps: Annotated[
         list[str] | None,
         typer.Option(
@@ -74,32 +72,24 @@ def replay(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Annotated[
-        float | None,
-        typer.Option(help='foreign recording: factor to m, or on what --map names with a unit'),
+        float | None, option('foreign recording: factor to m, or on what --map names with a unit')
     ] = None,
     offset: Annotated[
         str,
-        typer.Option(
-            metavar='M',
-            help='foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean',
+        option(
+            'foreign recording: what is subtracted, in m, or mean; default: that of --map-file, or mean', 'M'
         ),
     ] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[
-        str,
-        typer.Option(
-            metavar='NAME', help='which of several mounts, such as left', autocompletion=named('place')
-        ),
-    ] = '',
-    rate: Annotated[float | None, typer.Option(help=f'live: factor on the speed of time; {RATE}')] = None,
+    mount: Annotated[str, option('which of several mounts, such as left', 'NAME', named('place'))] = '',
+    rate: Annotated[float | None, option(f'live: factor on the speed of time; {RATE}')] = None,
     start: Annotated[float, typer.Option('--from', metavar='S', help='live: where to begin, s')] = 0.0,
     with_control: Annotated[
-        bool,
-        typer.Option('--with-control', help='live: mount_control answers, not the recording'),
+        bool, flag('--with-control', 'live: mount_control answers, not the recording')
     ] = False,
     domain: Domain = None,
-    namespace: Annotated[str, typer.Option(help='live: namespace of the published topics')] = '',
+    namespace: Annotated[str, option('live: namespace of the published topics')] = '',
 ) -> None:
     """Replay a recorded displacement through the same controller and tell whether its answers are the same.
 

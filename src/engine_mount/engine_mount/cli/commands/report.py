@@ -1,6 +1,5 @@
 """`engine-mount report`: one page about one or several recordings."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -54,33 +53,23 @@ def report(
     Several recordings share the charts. What a recording lacks stands in the page in words.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.place import open_run
-    from engine_mount.reports.pages import default_pictures, write_report
+    from engine_mount.reports.report import default_page, default_pictures
+    from engine_mount.reports.report import report as make_report
 
     console = terminal()
     places = [local(recording, console) for recording in recordings]
-    opened = [part for place in places for part in open_run(place).by_mount()]
-    compared = None if other is None else open_run(local(other, console))
-    file = out or _page(places[0])
-    files = write_report(opened, compared, file, pictures or default_pictures(file), TerminalScreen(console))
-    for recording in (*opened, *([compared] if compared else [])):
-        for warning in recording.warnings:
-            note(console, f'{named(recording.path)}: {warning}')
+    compared = None if other is None else local(other, console)
+    first = places[0]
+    fetched = beside(first) / f'{first.name if first.is_dir() else first.stem}_report.html'
+    file = out or (fetched if is_fetched(first) else default_page(first))
+    folder = pictures or default_pictures(file)
+    with TerminalScreen(console).bar('reading', transient=True) as show:
+        made = make_report(places, compare_with=compared, out=file, pictures=folder, on_step=show)
+    for failure in made.failures:
+        note(console, failure)
+    for subject in made.subjects:
+        for warning in subject.recording.warnings:
+            note(console, f'{named(subject.recording.path)}: {warning}')
     console.print(f'report     {file}', soft_wrap=True)
-    console.print(_pictures_line(files), soft_wrap=True)
-
-
-def _page(recording: Path) -> Path:
-    from engine_mount.reports.pages import default_page
-
-    if is_fetched(recording):
-        return beside(recording) / f'{recording.name if recording.is_dir() else recording.stem}_report.html'
-    return default_page(recording)
-
-
-def _pictures_line(files: Sequence[Path]) -> str:
-    return (
-        f'pictures   {len(files)} in {files[0].parent}'
-        if files
-        else 'pictures   none, there is nothing to draw'
-    )
+    drawn = f'{len(made.pictures)} in {folder}' if made.pictures else 'none, there is nothing to draw'
+    console.print(f'pictures   {drawn}', soft_wrap=True)

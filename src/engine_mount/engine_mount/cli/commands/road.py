@@ -11,7 +11,6 @@ from engine_mount.cli.commands.road_arguments import (
     HeightColumn,
     Lateral,
     SpeedText,
-    road_of_options,
 )
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import note, terminal
@@ -59,25 +58,23 @@ def show(
 
     With `--speed` also which frequencies it holds at that speed.
     """
+    from engine_mount import road
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.roads.driving import as_figures, as_rows, speed_of
-    from engine_mount.signals.roads.iso8608 import unevenness
 
     console = terminal()
-    profile = road_of_options(file, lateral, column, distance)
-    found, driven = unevenness(profile), speed_of(speed) if speed else None
-    TerminalScreen(console).table(Table(profile.name, 'll', as_rows(profile, found, driven)))
-    for sentence in profile.notes:
+    found = road(file, lateral=lateral, column=column, distance=distance, speed=speed)
+    TerminalScreen(console).table(Table(found.profile.name, 'll', found.rows()))
+    for sentence in found.profile.notes:
         note(console, sentence)
     if figure is not None:
         from engine_mount.reports.road_picture import draw_road
 
-        draw_road(profile, found, figure)
+        draw_road(found.profile, found.unevenness, figure)
         console.print(f'figure     {figure}', soft_wrap=True)
     if json_file is not None:
-        write_json(as_figures(profile, found), json_file)
+        write_json(found.figures, json_file)
 
 
 @app.command(cls=Command, epilog=_INVERT_EPILOG)

@@ -1,14 +1,12 @@
 """Options that say which road, and how it is driven; for `drive` and `road`."""
 
-import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from engine_mount.drives.external_excitation import ExternalExcitation
-    from engine_mount.signals.roads.iso8608 import RoadProfile
+    pass
 
 Lateral = Annotated[
     float, typer.Option(metavar='M', help='road: track of an OpenCRG file, m left of its reference line')
@@ -30,68 +28,8 @@ ContactLength = Annotated[
 Repeat = Annotated[bool, typer.Option('--repeat', help='road: drive it forth and back until the end')]
 
 
-def road_of_options(road: str, lateral: float, column: str, distance: str) -> 'RoadProfile':
-    """Return the road that the options name."""
-    from engine_mount.signals.roads.table import road_profile
-
-    spacing = _number(distance)
-    return road_profile(
-        road,
-        lateral=lateral,
-        column=column,
-        distance='' if math.isfinite(spacing) else distance,
-        spacing=spacing,
-    )
-
-
-def road_excitation(
-    road: str,
-    speed: str,
-    column: str,
-    duration: float,
-    *,
-    lateral: float,
-    distance: str,
-    contact_length: float | None,
-    repeat: bool,
-) -> 'ExternalExcitation':
-    """Return the road that the options name as excitation: at their speed, for `duration` s (0: once)."""
-    from engine_mount.drives.external_excitation import ExternalExcitation
-    from engine_mount.signals.roads.driving import speed_of, wheel_height
-    from engine_mount.signals.roads.iso8608 import unevenness
-
-    if not speed:
-        raise typer.BadParameter(
-            '--road needs a speed: --speed 60/3.6 (m/s), or a file of the speed over time'
-        )
-    profile = road_of_options(road, lateral, column, distance)
-    over = wheel_height(
-        profile,
-        speed_of(speed),
-        contact_length=contact_length,
-        duration=float(duration),
-        repeat=repeat,
-    )
-    notes = (f'{profile.name}: {sentence}' for sentence in (*unevenness(profile).sentences(), *over.notes))
-    return ExternalExcitation('road.file', over.write, over.told, tuple(notes))
-
-
 def height_column(columns: Sequence[str]) -> str:
     """Return the one column of the height, '' where none is named."""
     if len(columns) > 1:
         raise typer.BadParameter('--column is given once for a road: the column of its height')
     return columns[0] if columns else ''
-
-
-def given_without_road(**options: Any) -> None:
-    """Refuse options that say something of a road where there is none."""
-    for name, value in options.items():
-        if value not in (None, '', False, 0.0):
-            raise typer.BadParameter(f'--{name.replace("_", "-")} is for a road: name it with --road FILE')
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan

@@ -1,5 +1,6 @@
 """`engine-mount view` and `status`: what the graph does now, or a recording by the clock."""
 
+import functools
 from typing import Annotated
 
 import typer
@@ -18,8 +19,8 @@ Examples:
 
 `engine-mount view --host 0.0.0.0` - from a phone in the same network: with the token that is printed
 
-The page shows beside the mount that is driven what the hydromount, the mount without damping and the other
-policies would do on the same acceleration of the chassis. It needs nothing from the internet.
+The page shows beside the mount that is driven what the hydromount and the mount without damping would do
+on the same acceleration of the chassis. It needs nothing from the internet.
 """
 
 STATUS_EPILOG = """Exit code: 0; 1 with `--once` when no node of the graph tells anything within 3 s.
@@ -49,20 +50,20 @@ def view(
     ] = '127.0.0.1',
     port: Annotated[int, typer.Option(help='of the page')] = 8137,
     foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
-    beside: Annotated[
-        bool, typer.Option('--beside/--no-beside', help='simulate other mounts and policies beside')
-    ] = True,
+    beside: Annotated[bool, typer.Option('--beside/--no-beside', help='simulate other mounts beside')] = True,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
     """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
-    from engine_mount.view.view import ViewOrder, serve_view
+    from engine_mount.view.view import open_feed, serve_view
     from mount_bringup.graph.domain import chosen_domain
 
     console = terminal()
     place = None if recording is None else local(recording, console)
-    order = ViewOrder(place, rate, begin, chosen_domain(domain), namespace, host, port, foxglove_port, beside)
-    serve_view(order, lambda text: console.print(text, soft_wrap=True))
+    number = chosen_domain(domain)
+    with open_feed(place, rate=rate, begin=begin, domain=number, namespace=namespace) as feed:
+        say = functools.partial(console.print, soft_wrap=True)
+        serve_view(feed, say, host=host, port=port, foxglove_port=foxglove_port, beside=beside)
 
 
 def status(
@@ -77,22 +78,24 @@ def status(
     from rich.live import Live
 
     from engine_mount.reports.json_file import write_json
-    from engine_mount.view.feed.feed import FeedError
+    from engine_mount.view.feed import FeedError
     from engine_mount.view.screen import status_screen
-    from engine_mount.view.view import ViewOrder, model_of, wait_for_state
-    from engine_mount.view.window.told import told_state
+    from engine_mount.view.view import open_feed, running_model, wait_for_state
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
 
     console = terminal()
-    order = ViewOrder(domain=chosen_domain(domain), namespace=namespace, beside=not once)
     ending = threading.Event()
-    with ending_signals(ending.set), model_of(order) as (feed, model):
+    with (
+        ending_signals(ending.set),
+        open_feed(domain=chosen_domain(domain), namespace=namespace) as feed,
+        running_model(feed, beside=not once) as model,
+    ):
         if once or json_file is not None:
             wait_for_state(model, _ONCE_LIMIT)
             console.print(status_screen(model, feed.title))
             if json_file is not None:
-                write_json(told_state(model), json_file)
+                write_json(model.state_json(), json_file)
             if not model.state.nodes:
                 raise typer.Exit(1)
             return

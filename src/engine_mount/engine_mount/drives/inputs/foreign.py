@@ -13,7 +13,7 @@ from engine_mount.settings.chosen import Parameters, chosen_specimen, control_pa
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.importing.one_grid import (
+from engine_mount.signals.importing.channels import (
     CHASSIS,
     DISPLACEMENT,
     ENGINE,

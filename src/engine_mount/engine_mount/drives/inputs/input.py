@@ -95,10 +95,9 @@ class ReplayInput:
         """Time between two samples in s."""
         return 1.0 / control_parameters(self.parameters).sample_rate
 
-    @property
-    def duration(self) -> float:
-        """Length of what is replayed in s: the samples of ramps and runs."""
-        return sum(len(part.stamps) for part in self.parts) * self.sample_time
+    def seconds(self, stamps: Times) -> Column:
+        """Return the times (s) of stamps (ns) on the recording's time axis."""
+        return (stamps - self.zero) / 1e9
 
 
 def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> ReplayInput:

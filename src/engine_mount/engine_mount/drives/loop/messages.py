@@ -58,9 +58,8 @@ class CoreMessages:
         mount: str = '',
     ):
         """`sim`: parameters of mount_sim. Without `write_columns` every message goes to `write`."""
-        parameters = mount_parameters(sim, mount)
-        self._coil_celsius = quantised_coil_temperature(parameters.electronics.coil_temperature)
-        rate = parameters.sample_rate
+        rate = mount_parameters(sim, mount).sample_rate
+        self._coil_celsius = coil_temperature(sim, mount)
         self._status_period = status_every(rate) * sample_time_ns(rate)
         self._write = write
         self._write_columns = write_columns or self._one_by_one
@@ -136,3 +135,8 @@ def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
     if len(flags):
         yield from zip([0, *changes], [*changes, len(flags)], strict=True)
+
+
+def coil_temperature(values: Mapping[str, Any], mount: str = '') -> float:
+    """Return the coil temperature (degC) that the status frame reports; `values`: those of mount_sim."""
+    return quantised_coil_temperature(mount_parameters(values, mount).electronics.coil_temperature)

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from engine_mount.drives.loop import compiled_loop as loop
-from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns
+from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns, coil_temperature
 from engine_mount.settings.chosen import Parameters, chosen_control, chosen_initialisation
 from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
@@ -25,7 +25,7 @@ from mount_sim.electronics.faults.schedule import check_without_bus
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.plant.places import ALONE
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount, mount_parameters
-from mount_sim.quantisation import quantised_coil_temperature, quantised_setpoint_current
+from mount_sim.quantisation import quantised_setpoint_current
 
 BLOCK = 1000
 """Samples, chosen: packed and written together."""
@@ -225,8 +225,3 @@ def run_core_into(
         ),
         control_faults=sum(run.chain.loop.faults for run in runs),
     )
-
-
-def coil_temperature(values: Mapping[str, object], mount: str = '') -> float:
-    """Return the coil temperature (degC) that the status frame reports; `values`: those of mount_sim."""
-    return quantised_coil_temperature(mount_parameters(values, mount).electronics.coil_temperature)

@@ -16,10 +16,10 @@ from engine_mount.experiments.harness.many_runs import TruthOnly
 from engine_mount.experiments.harness.measures import first_extremum, rms_in_bands
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.audit import audit
+from engine_mount.recordings.events import Switching
 from engine_mount.recordings.losses import Losses, losses
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
-from engine_mount.recordings.switching import Switching
 from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth, load_drive
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods

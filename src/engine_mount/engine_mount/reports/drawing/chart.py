@@ -1,7 +1,8 @@
-"""A drawing as plain data: what is shown, with labels and units. Both ways to draw it take it as it is."""
+"""A drawing as plain data, with labels and units; page, picture and live view show it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,17 +10,14 @@ from numpy.typing import NDArray
 from engine_mount.reports.drawing.style import COLOURS, LEVEL_COLOUR
 
 Array = NDArray[np.float64]
+Limits = tuple[float, float]
 
 SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
 
 
-class ChartError(ValueError):
-    """What is to be drawn does not fit together; the text says what."""
-
-
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it. `colour` is one of `style`."""
+    """A line through points; NaN interrupts it. Raises `ValueError` where x and y differ in number."""
 
     name: str
     x: Array
@@ -31,21 +29,11 @@ class Curve:
 
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y):
-            raise ChartError(f'curve {self.name!r}: {len(self.x)} x but {len(self.y)} y')
+            raise ValueError(f'{self.name!r} cannot be drawn: {len(self.x)} x but {len(self.y)} y')
 
 
-@dataclass(frozen=True)
-class Dots:
+class Dots(Curve):
     """Single values `y` at the places `x`."""
-
-    name: str
-    x: Array
-    y: Array
-    colour: str = COLOURS[0]
-
-    def __post_init__(self) -> None:
-        if len(self.x) != len(self.y):
-            raise ChartError(f'dots {self.name!r}: {len(self.x)} x but {len(self.y)} y')
 
 
 @dataclass(frozen=True)
@@ -77,13 +65,14 @@ class Panel:
     levels: Sequence[Level] = ()
     log: bool = False
     share: float = 1.0  # of the height, against the other panels
+    least: Sequence[float] = ()  # values that the page always shows
 
 
 @dataclass(frozen=True)
 class Chart:
     """Panels above each other over one x axis.
 
-    `name` is that of the file, `title` stands above, `remark` below. `spans` are shaded in all panels and
+    `name` is that of the file, `title` stands above. `spans` are shaded in all panels and
     called `span_name`; `limits` are those of the x axis, None for all. `view` is the part of the x axis that
     is looked at first: a picture shows only that.
     """
@@ -94,11 +83,14 @@ class Chart:
     panels: Sequence[Panel]
     spans: Sequence[Span] = ()
     span_name: str = ''
-    limits: tuple[float, float] | None = None
-    view: tuple[float, float] | None = None
-    remark: str = ''
-    ticks: Sequence[float] = field(default_factory=tuple)  # of the x axis; empty: chosen by the drawing
+    limits: Limits | None = None
+    view: Limits | None = None
+    ticks: Sequence[float] = ()  # of the x axis; empty: chosen by the drawing
 
-    def __post_init__(self) -> None:
-        if not self.panels:
-            raise ChartError(f'chart {self.name!r} has no panel')
+
+def level_lines(levels: Mapping[str, float], *, both: bool = True) -> list[Level]:
+    """Return displacements (m) by their labels as lines over mm, by turns dashed and dotted."""
+    return [
+        Level(f'{name}, {1e3 * value:g} mm', 1e3 * value, dash, both)
+        for (name, value), dash in zip(levels.items(), cycle((DASHED, DOTTED)), strict=False)
+    ]

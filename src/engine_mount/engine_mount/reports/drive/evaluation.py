@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.audit import TopicAudit
+from engine_mount.recordings.events import Switching, switching_times
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.switching import Switching, switching_times
 from engine_mount.reports.drive.signals import DriveSignals, Seen
 from mount_control import band_pass
 from mount_control.delay import LOOP_DELAY, delay_at

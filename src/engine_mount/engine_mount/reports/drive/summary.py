@@ -1,8 +1,7 @@
-"""What a drive says at its end: the figures of `--json`, and the same for people."""
+"""The figures of a drive: those of `--json`, and the same for people."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,10 @@ import numpy as np
 
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, control_spans
+from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.screen import Screen, Table
-from engine_mount.recordings.switching import switching_times
+from engine_mount.recordings.screen import Table
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
@@ -22,8 +21,9 @@ from mount_recorder.parameters import RecorderParameters
 from mount_sim.mount_choice import seat_of
 from mount_sim.plant.mounts import without_friction
 
-_UM, _MM, _US = 1e6, 1e3, 1e6
 _LATE_CONTROL = 0.5  # s, chosen: so much of the excitation may pass before control answers
+_SWITCHINGS = 6  # printed
+_MEASURED = ('rest_gap', 'contact_gap', 'rest_gap_std', 'contact_gap_std')
 
 
 def summarise(
@@ -40,67 +40,47 @@ def summarise(
     `restarts`, `recordings`. Times are s on the recording's time axis, from which `drive` counts too. Unknown
     or not applicable is null.
     """
-    gap = recording['air_gap']
-    truth = recording['sim/truth']
+    gap, truth = recording['air_gap'], recording['sim/truth']
     start = (excitation_stamp(recording, run['excitation_start']) - drive.zero) / 1e9
-    friction = _friction_figures(recording, audits, drive, parameters)
+    mount = seat_of(parameters)
+    begin = switched_on = switched_off = peak = error = None  # with a mount without friction
+    if not without_friction(mount):
+        trace = recording['control_trace']
+        order = np.argsort(trace.stamps, kind='stable')
+        time = (trace.stamps[order] - drive.zero) / 1e9
+        begin = float(time[0]) if len(time) else None
+        on, off = switching_times(time, trace['damping_active'][order])
+        switched_on, switched_off = on.tolist(), off.tolist()
+        peak = _known(peak_current(recording, control_spans(audits)))
+        error = _known(tracking_error(drive, *policy_of(parameters)))
     return {
         'recording': str(recording.path),
         'recordings': run['recordings'],
         'scenario': run['scenario'],
         'mode': run['mode'],
-        'mount': seat_of(parameters),
+        'mount': mount,
         'excitation_start_s': start,
-        'control_from_s': friction.control_from,
+        'control_from_s': begin,
         'duration_s': float(drive.seen.time[-1] - max(drive.seen.time[0], start)),
         **found.as_json(),
         'restarts': [_restart(entry, drive.zero) for entry in run['restarts']],
         'real_time_factor': run['real_time_factor'],
-        'rest_gap_m': float(gap['rest_gap'][-1]),
-        'contact_gap_m': float(gap['contact_gap'][-1]),
-        'rest_gap_std_m': float(gap['rest_gap_std'][-1]),
-        'contact_gap_std_m': float(gap['contact_gap_std'][-1]),
-        'true_rest_gap_m': float(truth['rest_gap'][-1]),
-        'true_contact_gap_m': float(truth['contact_gap'][-1]),
+        **{f'{name}_m': float(gap[name][-1]) for name in _MEASURED},
+        **{f'true_{name}_m': float(truth[name][-1]) for name in _MEASURED[:2]},
         'offset_current_a': float(gap['offset_current'][-1]),
-        'switch_on_s': friction.switch_on,
-        'switch_off_s': friction.switch_off,
+        'switch_on_s': switched_on,
+        'switch_off_s': switched_off,
         'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
-        'peak_current_a': friction.peak_current,
-        'tracking_error_rms': friction.tracking_error,
-        'latency_median_s': _known(run['latency_median_s']),
-        'latency_p99_s': _known(run['latency_p99_s']),
+        'peak_current_a': peak,
+        'tracking_error_rms': error,
+        **_latencies(run),
     }
 
 
-@dataclass(frozen=True)
-class _FrictionFigures:
-    """What the control did to the friction; all None with a mount in which it can do nothing."""
-
-    control_from: float | None = None
-    switch_on: list[float] | None = None
-    switch_off: list[float] | None = None
-    peak_current: float | None = None
-    tracking_error: float | None = None
-
-
-def _friction_figures(
-    recording: Recording, audits: Mapping[str, TopicAudit], drive: DriveSignals, parameters: Parameters
-) -> _FrictionFigures:
-    if without_friction(seat_of(parameters)):
-        return _FrictionFigures()
-    trace = recording['control_trace']
-    order = np.argsort(trace.stamps, kind='stable')
-    time = (trace.stamps[order] - drive.zero) / 1e9
-    on, off = switching_times(time, trace['damping_active'][order])
-    error = tracking_error(drive, *policy_of(parameters))
-    return _FrictionFigures(
-        control_from=float(time[0]) if len(time) else None,
-        switch_on=on.tolist(),
-        switch_off=off.tolist(),
-        peak_current=_known(peak_current(recording, control_spans(audits))),
-        tracking_error=_known(error),
-    )
+def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
+    figures = {name: run[name] for name in ('scenario', 'mode', 'samples', 'real_time_factor')}
+    return {'snapshots': [str(place) for place in snapshots], **figures, **_latencies(run)}
 
 
 def late_control(figures: Mapping[str, Any]) -> list[str]:
@@ -120,29 +100,6 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _restart(restart: Restart, zero: int) -> dict[str, Any]:
-    return {
-        'time_s': (restart.time - zero) / 1e9,
-        'nodes': [node.name for node in restart.nodes],
-        'reason': restart.reason,
-        'remedy': restart.action.value,
-        'took_s': restart.took,
-    }
-
-
-def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
-    """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
-    return {
-        'snapshots': [str(place) for place in snapshots],
-        'scenario': run['scenario'],
-        'mode': run['mode'],
-        'samples': run['samples'],
-        'real_time_factor': run['real_time_factor'],
-        'latency_median_s': _known(run['latency_median_s']),
-        'latency_p99_s': _known(run['latency_p99_s']),
-    }
-
-
 def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     """Return what a drive with `--snapshot` saved."""
     if not count:
@@ -154,75 +111,68 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     )
 
 
-def print_summary(figures: dict[str, Any], found: Losses, screen: Screen, mount: str = '') -> None:
-    """Print the figures, `mount` before their title; times are s from the first displacement sample."""
-    rows = [
-        *(_gap_row(figures, name) for name in ('rest', 'contact')),
-        ('excitation', f'from {figures["excitation_start_s"]:.2f} s on'),
-        *_control_row(figures),
-        ('peak displacement', f'{_MM * figures["peak_displacement_m"]:.2f} mm'),
-        *_friction_rows(figures),
-        *found.rows(),
-        *_restart_rows(figures),
-        ('latency', _latency_text(figures)),
-        ('speed', f'{figures["real_time_factor"]:.2f} x real time'),
-    ]
-    screen.table(Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows))
+def summary_table(figures: dict[str, Any], found: Losses, mount: str = '') -> Table:
+    """Return the figures for people, `mount` before their title; times in s from the first displacement."""
+    rows = []
+    for name in ('rest', 'contact'):
+        measured, std, true = (
+            1e6 * figures[key] for key in (f'{name}_gap_m', f'{name}_gap_std_m', f'true_{name}_gap_m')
+        )
+        rows.append((f'{name} gap', f'{measured:.1f} ± {std:.1f} µm measured, {true:.1f} µm true'))
+    rows.append(('excitation', f'from {figures["excitation_start_s"]:.2f} s on'))
+    reason = without_friction(figures['mount'])
+    begin, peak, error = (
+        figures[name] for name in ('control_from_s', 'peak_current_a', 'tracking_error_rms')
+    )
+    if not reason:
+        rows.append(('control', 'answered no sample' if begin is None else f'from {begin:.2f} s on'))
+    rows.append(('peak displacement', f'{1e3 * figures["peak_displacement_m"]:.2f} mm'))
+    if reason:
+        rows.append(('friction', f'not applicable: {reason}'))
+    else:
+        percent = (
+            'damping was never on' if error is None else f'{100 * error:.1f} % rms of the peak wanted force'
+        )
+        rows += [
+            ('damping switched', _switching_text(figures)),
+            ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
+            ('friction force error', percent or 'damping was never on'),
+        ]
+    rows += found.rows()
+    for entry in figures['restarts']:
+        text = f'{entry["reason"]}; {entry["remedy"]} ({entry["took_s"]:.1f} s)'
+        rows.append((f'lost at {entry["time_s"]:.1f} s', text))
+    latency, median, p99 = 'none (no middleware)', figures['latency_median_s'], figures['latency_p99_s']
+    if median is not None and p99 is not None:
+        latency = (
+            f'{1e6 * median:.0f} µs median, {1e6 * p99:.0f} µs in 99 of 100 (sample sent to setpoint back)'
+        )
+    rows += [('latency', latency), ('speed', f'{figures["real_time_factor"]:.2f} x real time')]
+    return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
 
-def _gap_row(figures: dict[str, Any], name: str) -> tuple[str, str]:
-    measured, std = _UM * figures[f'{name}_gap_m'], _UM * figures[f'{name}_gap_std_m']
-    true = _UM * figures[f'true_{name}_gap_m']
-    return f'{name} gap', f'{measured:.1f} ± {std:.1f} µm measured, {true:.1f} µm true'
-
-
-def _control_row(figures: dict[str, Any]) -> list[tuple[str, str]]:
-    if without_friction(figures['mount']):
-        return []
-    begin = figures['control_from_s']
-    return [('control', 'answered no sample' if begin is None else f'from {begin:.2f} s on')]
+def _restart(restart: Restart, zero: int) -> dict[str, Any]:
+    return {
+        'time_s': (restart.time - zero) / 1e9,
+        'nodes': [node.name for node in restart.nodes],
+        'reason': restart.reason,
+        'remedy': restart.action.value,
+        'took_s': restart.took,
+    }
 
 
 def _switching_text(figures: dict[str, Any]) -> str:
     ons, offs = figures['switch_on_s'], figures['switch_off_s']
     if not ons:
         return 'never on'
-    pairs = [(on, next((off for off in offs if off > on), None)) for on in ons]
-    shown = [f'{on:.2f} s to {f"{off:.2f} s" if off is not None else "the end"}' for on, off in pairs]
-    more = f' and {len(shown) - 6} more' if len(shown) > 6 else ''
-    return 'on from ' + ', '.join(shown[:6]) + more
+    ends = (next((f'{off:.2f} s' for off in offs if off > on), 'the end') for on in ons)
+    shown = [f'{on:.2f} s to {end}' for on, end in zip(ons, ends, strict=True)]
+    more = f' and {len(shown) - _SWITCHINGS} more' if len(shown) > _SWITCHINGS else ''
+    return f'on from {", ".join(shown[:_SWITCHINGS])}{more}'
 
 
-def _friction_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
-    if reason := without_friction(figures['mount']):
-        return [('friction', f'not applicable: {reason}')]
-    peak = figures['peak_current_a']
-    return [
-        ('damping switched', _switching_text(figures)),
-        ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
-        ('friction force error', _percent(figures['tracking_error_rms'], 'rms of the peak wanted force')),
-    ]
-
-
-def _latency_text(figures: dict[str, Any]) -> str:
-    median, p99 = figures['latency_median_s'], figures['latency_p99_s']
-    if median is None or p99 is None:
-        return 'none (no middleware)'
-    return f'{_US * median:.0f} µs median, {_US * p99:.0f} µs in 99 of 100 (sample sent to setpoint back)'
-
-
-def _restart_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
-    return [
-        (
-            f'lost at {entry["time_s"]:.1f} s',
-            f'{entry["reason"]}; {entry["remedy"]} ({entry["took_s"]:.1f} s)',
-        )
-        for entry in figures['restarts']
-    ]
-
-
-def _percent(value: float | None, of_what: str) -> str:
-    return 'damping was never on' if value is None else f'{100 * value:.1f} % {of_what}'
+def _latencies(run: dict[str, Any]) -> dict[str, float | None]:
+    return {name: _known(run[name]) for name in ('latency_median_s', 'latency_p99_s')}
 
 
 def _known(value: float) -> float | None:

@@ -1,125 +1,158 @@
 """What a report begins with: the verdict, the figures that one wants to see first, and what is missing."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from engine_mount.recordings.answers import peak_current
-from engine_mount.recordings.audit import control_spans
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.sections.run_sections import HEAD_OF_SESSION
-from engine_mount.reports.sections.section import Cell, Link, Section, Table
-from engine_mount.reports.sections.subject import Subject
-from engine_mount.reports.sections.verdict import findings
-from engine_mount.reports.sections.wording import Sentences
-from engine_mount.reports.signals import Signal
-
-_DIFFERENCE = 'B - A'
+from engine_mount.reports.sections.motion import peak_cell
+from engine_mount.reports.sections.run import HEAD_OF_SESSION
+from engine_mount.reports.sections.section import (
+    BAD,
+    GOOD,
+    LOOK,
+    UNKNOWN,
+    Cell,
+    Finding,
+    Link,
+    Section,
+    Table,
+    moment,
+)
+from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
 
 
 def overview(subjects: Sequence[Subject]) -> Section:
     """Return the verdict, the figures, and what the recordings lack, in words."""
-    columns = [_figures(subject) for subject in subjects]
+    columns = [_cells(subject) for subject in subjects]
     head = ['', *(each.name for each in subjects)]
     rows = [[name, *(column[name] for column in columns)] for name in columns[0]]
-    if subjects[-1].comparison is not None:
-        head.append(_DIFFERENCE)
-        differences = _differences(subjects[0], subjects[-1])
-        rows = [[*row, differences.get(str(row[0]), '')] for row in rows]
-    words, said = [], Sentences(subjects)
-    for subject in subjects:
-        prefix = f'{subject.name}: ' if len(subjects) > 1 else ''
-        words += [f'{prefix}{warning}.' for warning in subject.signals.recording.warnings]
-        if subject.signals.missing:
-            said.say(subject, f'missing: {"; ".join(subject.signals.missing)}')
-    words += said.told()
-    verdict = [
-        finding
-        for subject in subjects
-        for finding in findings(subject, subject.name if len(subjects) > 1 else '')
-    ]
+    words = [f'{subject.prefix}{warning}.' for subject in subjects for warning in subject.recording.warnings]
+    missing = [(each, f'missing: {"; ".join(each.missing)}') for each in subjects if each.missing]
+    words += shared_sentences(subjects, missing)
+    verdict = [finding for subject in subjects for finding in findings(subject)]
     return Section('overview', 'Overview', words, None, [Table(head, rows)], verdict)
 
 
-def _figures(subject: Subject) -> dict[str, Cell]:
-    recording, session = subject.signals.recording, session_values(subject.signals.session)
-    moved = subject.displacement()
+def findings(subject: Subject) -> list[Finding]:
+    """Return the four findings on a recording, with its name where there are several."""
+    parts: dict[str, Callable[[Subject], tuple[str, Sequence[Cell]]]] = {
+        'Switching': _switching,
+        'Faults': _faults,
+        'Losses': _losses,
+        'Isolation': _isolation,
+    }
+    of = f', {subject.name}' if subject.prefix else ''
+    return [Finding(f'{what}{of}', *judge(subject)) for what, judge in parts.items()]
+
+
+def _cells(subject: Subject) -> dict[str, Cell]:
+    session, figures = session_values(subject.session), subject.figures
+    length = figures['duration_s']
     return {
-        'recording': str(recording.path),
+        'recording': str(subject.recording.path),
         **{name: str(session.get(name, 'not known')) for name in HEAD_OF_SESSION},
-        'messages': str(recording.message_count),
-        'length': 'not known' if moved is None else quantity_text(float(np.ptp(moved.time)), 's', 5),
-        'peak displacement': _highest(moved, 'm'),
-        **_friction_figures(subject),
+        'messages': str(subject.recording.message_count),
+        'length': 'not known' if length is None else quantity_text(length, 's', 5),
+        'peak displacement': peak_cell(subject['displacement'], 'm'),
+        **_friction_cells(subject),
         **{name: Link(text, 'losses') for name, text in subject.losses.rows()},
     }
 
 
-def _friction_figures(subject: Subject) -> dict[str, Cell]:
-    if subject.facts.without_friction:
-        names = ('peak current', 'damping switched on', 'friction force error')
-        return dict.fromkeys(names, f'not applicable: {subject.facts.without_friction}')
-    spans, setpoint = subject.signals.damping(), subject.setpoint()
-    peak = peak_current(subject.signals.recording, control_spans(subject.audits))
-    error = subject.facts.tracking.error if subject.facts.tracking else math.nan
-    told = 'not recorded' if spans is None else f'{len(spans)} times' if len(spans) != 1 else 'once'
-    return {
-        'peak current': 'not recorded' if math.isnan(peak) else _at_value(setpoint, peak, 'A'),
-        'damping switched on': told if spans is None else Link(told, 'switching'),
-        'friction force error': 'not known'
-        if math.isnan(error)
-        else Link(f'{100.0 * error:.1f} % rms of the peak wanted force', 'tracking'),
-    }
-
-
-def _highest(signal: Signal | None, unit: str) -> Cell:
-    if signal is None or not np.isfinite(signal.values).any():
-        return 'not recorded'
-    place = int(np.nanargmax(np.abs(signal.values)))
-    return Link(quantity_text(abs(float(signal.values[place])), unit), 'traces', float(signal.time[place]))
-
-
-def _at_value(signal: Signal | None, value: float, unit: str) -> Cell:
-    """Return `value`, with a link to where the signal first has it."""
-    text = quantity_text(value, unit)
-    if signal is None or not (signal.values == value).any():
-        return text
-    return Link(text, 'traces', float(signal.time[np.argmax(signal.values == value)]))
-
-
-def _differences(first: Subject, last: Subject) -> dict[str, str]:
-    """Return how far the figures of the last recording lie from those of the first, by their names."""
-    found = {}
-    for name, value, unit in (
-        ('peak displacement', _peak, 'm'),
-        ('peak current', _peak_current, 'A'),
-        ('damping switched on', _times_on, ''),
-        ('friction force error', _error, '%'),
+def _friction_cells(subject: Subject) -> dict[str, Cell]:
+    figures, cells = subject.figures, {}
+    for name, figure, section, text in (
+        ('peak current', 'peak_current_a', 'traces', lambda value: quantity_text(value, 'A')),
+        ('damping switched on', 'damping_switched_on', 'switching', _times),
+        ('friction force error', 'tracking_error_rms', 'tracking', _percent),
     ):
-        difference = value(last) - value(first)
-        if not math.isnan(difference):
-            found[name] = f'{"+" if difference > 0.0 else ""}{quantity_text(difference, unit)}'
-    return found
+        known: Cell = 'not known' if figures[figure] is None else Link(text(figures[figure]), section)
+        reason = subject.run.without_friction
+        cells[name] = f'not applicable: {reason}' if reason else known
+    return cells
 
 
-def _peak(subject: Subject) -> float:
-    moved = subject.displacement()
-    known = moved is not None and np.isfinite(moved.values).any()
-    return float(np.nanmax(np.abs(moved.values))) if moved is not None and known else math.nan
+def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
+    if subject.run.without_friction:
+        return UNKNOWN, [f'not applicable: {subject.run.without_friction}']
+    spans = subject.damping
+    if spans is None:
+        return UNKNOWN, ['when damping was switched was not recorded']
+    if not spans:
+        return LOOK, ['damping was never switched on']
+    total = sum(end - begin for begin, end in spans)
+    begin, end = map(moment, spans[0])
+    words = ('damping was switched on', f'and on for {quantity_text(total, "s")} in all, first from')
+    return GOOD, [words[0], Link(_times(len(spans)), 'switching'), words[1], begin, 'to', end]
 
 
-def _peak_current(subject: Subject) -> float:
-    if subject.facts.without_friction:
-        return math.nan
-    return peak_current(subject.signals.recording, control_spans(subject.audits))
+def _faults(subject: Subject) -> tuple[str, Sequence[Cell]]:
+    faults = subject.losses.faults
+    if not faults:
+        return GOOD, [Link('none', 'losses')]
+    first = faults[0]
+    sentence = f'{first.node}: {first.sentence}' if first.node else first.sentence
+    return BAD, [Link(f'{len(faults)}, the first', 'losses'), 'at', moment(first.time), sentence]
 
 
-def _times_on(subject: Subject) -> float:
-    spans = None if subject.facts.without_friction else subject.signals.damping()
-    return math.nan if spans is None else float(len(spans))
+def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
+    found = subject.losses
+    lost, unanswered = Link(found.lost_text(), 'losses'), Link(found.answers_text(), 'losses')
+    text: list[Cell] = ['lost:', lost, '· unanswered:', unanswered]
+    if found.lost_samples is None and found.lost_messages is None:
+        return UNKNOWN, text
+    if not found.whole:
+        text.append('· the recording is not whole')
+    wrong = not found.lossless or found.unanswered or found.misdated
+    return (LOOK if wrong else GOOD), text
 
 
-def _error(subject: Subject) -> float:
-    return 100.0 * subject.facts.tracking.error if subject.facts.tracking else math.nan
+def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
+    unknown = 'against the undamped run unknown:'
+    undamped, moved, shaken = subject.undamped, subject['displacement'], subject['acceleration']
+    if isinstance(undamped, str):
+        return UNKNOWN, [f'{unknown} {undamped}']
+    if moved is None:
+        return UNKNOWN, [f'{unknown} no displacement was recorded']
+    time, begin = subject.seconds(undamped.stamps), (undamped.begin - subject.zero) / 1e9
+    calm = Signal(time, undamped.displacement)
+    (peak, at), (other, other_at) = moved.peak(begin), calm.peak(begin)
+    if math.isnan(peak) or math.isnan(other):
+        return UNKNOWN, [f'{unknown} the recording ends before the excitation begins']
+    text: list[Cell] = [
+        'peak displacement',
+        Link(quantity_text(peak, 'm'), 'traces', at),
+        'against',
+        Link(quantity_text(other, 'm'), 'traces', other_at),
+        f'undamped ({_change(peak, other)})',
+        f'· rms {_rms_text(moved, calm, begin, "m")}',
+    ]
+    if shaken is not None:
+        rms = _rms_text(shaken, Signal(time, undamped.chassis_acceleration), begin, 'm/s²')
+        text += ['·', Link('acceleration of the chassis', 'spectra'), f'rms {rms}']
+    return (GOOD if peak <= other else LOOK), text
+
+
+def _rms_text(driven: Signal, undamped: Signal, begin: float, unit: str) -> str:
+    """Return the rms about the mean of drive and undamped run from `begin` (s) on, in words."""
+    known = (each.values[(each.time >= begin) & np.isfinite(each.values)] for each in (driven, undamped))
+    rms, other = (float(np.std(values)) if len(values) else math.nan for values in known)
+    return f'{quantity_text(rms, unit)} against {quantity_text(other, unit)} ({_change(rms, other)})'
+
+
+def _change(value: float, reference: float) -> str:
+    if not reference > 0.0 or math.isnan(value):
+        return 'unknown'
+    percent = round(100.0 * (value / reference - 1.0))
+    return f'{percent:+d} %' if percent else 'no change'
+
+
+def _times(count: int) -> str:
+    return 'once' if count == 1 else f'{count} times'
+
+
+def _percent(share: float) -> str:
+    return f'{100.0 * share:.1f} % rms of the peak wanted force'

@@ -1,4 +1,4 @@
-"""Periodic signals: their frequency, their harmonics, the work of a closed loop."""
+"""Signals by frequency: sines and their harmonics, the work of a closed loop, spectra, sweeps."""
 
 import math
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from engine_mount.reports.drawing.chart import Array
 
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _STEPS = 40  # of the search: the bracket shrinks to 5e-9 of itself
+_SEGMENT = 2.048  # s, chosen: lines 0.5 Hz apart tell the modes of the car apart
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,62 @@ def cycle_work(displacement: Array, force: Array, periods: int) -> float:
     return float(np.sum(0.5 * (force[1:] + force[:-1]) * steps)) / periods
 
 
+def decibels(amplitudes: Array) -> Array:
+    """Return 20 log10 of `amplitudes`, NaN where one is 0."""
+    known = np.where(np.asarray(amplitudes) > 0.0, amplitudes, np.nan)
+    return np.asarray(20.0 * np.log10(known))
+
+
+def amplitude_density(values: Array, rate: float, segment: float = _SEGMENT) -> tuple[Array, Array]:
+    """Return frequencies (Hz) and one-sided amplitude spectral density (unit / sqrt(Hz)) of `values`.
+
+    `values` are evenly spaced at `rate` (Hz) and known. The sum of its squares times the spacing of the
+    frequencies is the variance. Hann window, half overlap, the mean of each segment taken off. A signal
+    shorter than `segment` (s) is one segment (Welch's method).
+    """
+    if len(values) < 8:
+        raise ValueError(f'a spectrum needs at least 8 samples, these are {len(values)}')
+    length = min(len(values), round(segment * rate))
+    window = np.hanning(length + 1)[:-1]
+    begins = range(0, len(values) - length + 1, max(1, length // 2))
+    power = np.zeros(length // 2 + 1)
+    for begin in begins:
+        piece = values[begin : begin + length]
+        power += np.abs(np.fft.rfft((piece - piece.mean()) * window)) ** 2
+    power *= 2.0 / (len(begins) * rate * float(np.sum(window**2)))
+    return np.fft.rfftfreq(length, 1.0 / rate), np.sqrt(power)
+
+
+def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
+    """Return the signal at even steps of `rate` (Hz), and how many of these samples were made up.
+
+    Missing and unknown (NaN) samples are replaced by a straight line between those that are known.
+    """
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    if len(time) < 2:
+        return time, values, 0
+    count = math.floor((time[-1] - time[0]) * rate + 0.5) + 1
+    grid = time[0] + np.arange(count) / rate
+    return grid, np.interp(grid, time, values), max(0, count - len(time))
+
+
+def peak_per_band(frequency: Array, values: Array, width: float = 1.0) -> tuple[Array, Array]:
+    """Return the lower edges of the bands of `width` (Hz) and the highest absolute value in each.
+
+    `frequency` is that of the excitation at each sample; samples where it is unknown do not count, nor do
+    unknown values. Bands without a sample are left out.
+    """
+    edges, groups = _bands(frequency, values, width)
+    return edges, np.array([np.max(np.abs(group)) for group in groups])
+
+
+def rms_per_band(frequency: Array, values: Array, width: float = 1.0) -> tuple[Array, Array]:
+    """Return the same with the rms of the values, their mean over the band included."""
+    edges, groups = _bands(frequency, values, width)
+    return edges, np.array([np.sqrt(np.mean(group**2)) for group in groups])
+
+
 def _amplitudes(time: Array, values: Array, frequency: float, count: int) -> Array:
     solution = np.linalg.lstsq(_base(time, frequency, count), values, rcond=None)[0]
     return np.hypot(solution[1::2], solution[2::2])
@@ -100,3 +157,11 @@ def _base(time: Array, frequency: float, count: int) -> Array:
     for number in range(1, count + 1):
         columns += [np.cos(number * angle), np.sin(number * angle)]
     return np.column_stack(columns)
+
+
+def _bands(frequency: Array, values: Array, width: float) -> tuple[Array, list[Array]]:
+    known = np.isfinite(frequency) & np.isfinite(values)
+    numbers = np.floor(frequency[known] / width + 1e-9).astype(int)
+    inside = values[known]
+    bands = np.unique(numbers)
+    return bands * width, [inside[numbers == band] for band in bands]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from engine_mount.recordings.difference import time_text
 from engine_mount.reports.drawing.chart import Chart
 
 GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
@@ -10,12 +11,11 @@ GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
 
 @dataclass(frozen=True)
 class Link:
-    """A text that leads to a section; where it has a chart, to the time `at` (s) and so much `around` it."""
+    """A text that leads to a section; where it has a chart, to the time `at` (s) in it."""
 
     text: str
     section: str
     at: float | None = None
-    around: float = 0.5
 
 
 Cell = str | Link
@@ -57,3 +57,8 @@ class Section:
     commands: Sequence[str] = ()  # of the shell, shown as they are typed
     half: bool = False
     is_listed: bool = True  # at the top of the page
+
+
+def moment(time: float) -> Link:
+    """Return a time (s) that links to the traces there."""
+    return Link(time_text(time), 'traces', time)

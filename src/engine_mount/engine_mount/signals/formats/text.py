@@ -184,13 +184,15 @@ def _read(
     """Return the columns at `places`; raises `SignalError` with line, column and cell."""
     if not places:
         return []
-    parts = []
+    columns: list[list[NDArray[Any]]] = [[] for _ in places]
     for number, block in _samples(path, codec, dialect, first):
         found = _in_bulk(block, dialect, places)
-        parts.append(found or _cell_by_cell(path, number, block, dialect, places, titles))
-    if not parts:
+        found = found or _cell_by_cell(path, number, block, dialect, places, titles)
+        for parts, part in zip(columns, found, strict=True):
+            parts.append(part)
+    if not columns[0]:
         raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+    return [np.concatenate(columns.pop(0)) for _ in places]  # so no more than one is held twice
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:

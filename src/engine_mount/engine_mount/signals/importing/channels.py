@@ -1,27 +1,67 @@
 """Signals in SI as they are recorded: those that drive something at its rate, others as sampled."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from engine_mount.signals.even_grid import evenly_spaced
+from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
-from engine_mount.signals.importing.one_grid import (
-    CHASSIS,
-    DISPLACEMENT,
-    ENGINE,
-    LOWEST_RATE,
-    displacement_on_grid,
-    rate_text,
-)
-from engine_mount.signals.importing.pieces import LONGEST_GAP
-from engine_mount.signals.importing.topics import recorded_as
-from engine_mount.signals.importing.writing import Channel, Times
 from engine_mount.signals.quantities import Quantity, quantity
 from engine_mount.signals.resampling import has_step, resampled
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_size
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
+from mount_ros import topics
+from mount_ros.messages.cdr import accelerometer
+from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.topics import JOINT_STATE, Delivery, Scalar, Topic
+
+DISPLACEMENT, ENGINE, CHASSIS = 'displacement', 'engine_displacement', 'chassis_displacement'
+ACCELERATION = 'acceleration'
+LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
+SHORTEST = 0.5  # s, chosen: four periods of the band
+LONGEST_GAP = 0.125
+"""s: one period of the 8 Hz at which an engine moves on its mounts cannot be interpolated."""
+PREFIX = 'measured/'
+"""The beginning of topics that only foreign recordings have."""
+Times = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class RecordedAs:
+    """The topic and the field of its messages that hold a quantity."""
+
+    topic: Topic
+    field: str
+
+    def rows(self, stamps: Times, values: FloatArray) -> Rows:
+        """Return the messages of `stamps` (ns) and `values` (n,), SI, as bytes."""
+        if self.topic.type == JOINT_STATE:
+            return ScalarsLayout(self.topic).pack_rows(stamps, values[:, None])
+        return OneNumberLayout(accelerometer).pack_rows(stamps, values)
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """What is written under one topic: stamps (ns, rising) and values (n,) in the SI unit `unit`."""
+
+    place: RecordedAs
+    unit: str
+    stamps: Times
+    values: FloatArray
+
+
+def recorded_as(wanted: Quantity) -> RecordedAs:
+    """Return where a quantity is recorded: displacement and acceleration where every command takes them."""
+    if wanted.name == DISPLACEMENT:
+        return RecordedAs(topics.DISPLACEMENT, topics.DISPLACEMENT.names[0])
+    if wanted.name == ACCELERATION:
+        return RecordedAs(topics.SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
+    scalar = Scalar(wanted.name, wanted.unit.symbol)
+    topic = Topic(PREFIX + wanted.name, JOINT_STATE, Delivery.STREAM, 0.0, wanted.sentence, (scalar,))
+    return RecordedAs(topic, wanted.name)
 
 
 def channels_of(
@@ -31,54 +71,79 @@ def channels_of(
 
     Raises `SignalError` for what no command could follow.
     """
-    notes: list[str] = []
-    channels = []
-    pair = [name for name in (DISPLACEMENT, ENGINE, CHASSIS) if name in signals]
-    if DISPLACEMENT in pair:
-        channels.append(_displacement({DISPLACEMENT: signals[DISPLACEMENT]}, notes))
-    elif len(pair) == 2:
-        channels.append(_displacement({name: signals[name] for name in pair}, notes))
+    notes: dict[str, None] = {}
+    found: dict[str, tuple[Times, FloatArray]] = {}
+    for names in ((DISPLACEMENT,), (ENGINE, CHASSIS)):
+        if DISPLACEMENT not in found and all(name in signals for name in names):
+            found[DISPLACEMENT] = _displacement({name: signals[name] for name in names}, notes)
     for name, signal in signals.items():
-        if name == DISPLACEMENT:
-            continue
-        if name == 'acceleration':
-            stamps, values = _acceleration(signal, channels[0].stamps if pair and channels else None, notes)
-        else:
-            stamps, values = _as_sampled(signal)
-        known = (one.stamps for one in channels)
-        shared = next((each for each in known if each is stamps or np.array_equal(each, stamps)), stamps)
-        channels.append(Channel(recorded_as(quantities[name]), quantities[name].unit.symbol, shared, values))
-    return channels, notes
+        if name == ACCELERATION:
+            found[name] = _acceleration(signal, notes)
+        elif name != DISPLACEMENT:
+            found[name] = _as_sampled(signal)
+    wanted = {name: quantities.get(name) or quantity(name) for name in found}
+    return [
+        Channel(recorded_as(wanted[name]), wanted[name].unit.symbol, *pair) for name, pair in found.items()
+    ], list(notes)
 
 
-def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> Channel:
+def displacement_on_grid(
+    signals: Mapping[str, EvenSignal], sample_rate: float, notes: list[str]
+) -> tuple[Times, FloatArray]:
+    """Return stamps (ns) of `sample_rate` (Hz) and the displacement on them, in the unit of the signals.
+
+    `signals` are {`displacement`: signal} or those of engine and chassis, whose difference it is. Adds what
+    was done to `notes`; raises `SignalError`.
+    """
+    step, step_ns = 1.0 / sample_rate, sample_time_ns(sample_rate)
+    begin = max(even.begin for even in signals.values())
+    end = min(even.begin + round(even.length * SECOND) for even in signals.values())
+    count = round((end - begin) / step_ns) + 1
+    if count * step < SHORTEST:
+        spans = '; '.join(
+            f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
+            for even in signals.values()
+        )
+        raise SignalError(f'no overlap of {SHORTEST:g} s or more: {spans}')
+    values = {
+        name: resampled(even, step, (begin - even.begin) / SECOND, count)[:] for name, even in signals.items()
+    }
+    notes += [_resampled(even, sample_rate) for even in signals.values() if not has_step(even, step)]
+    stamps = np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64)
+    return stamps, values[DISPLACEMENT] if DISPLACEMENT in values else values[ENGINE] - values[CHASSIS]
+
+
+def rate_text(sample_rate: float) -> str:
+    """Return a sample rate (Hz) in words."""
+    return f'{sample_rate / 1000.0:g} kHz'
+
+
+def _resampled(even: EvenSignal, sample_rate: float) -> str:
+    return f'{even.name}: resampled from {even.rate:.4g} Hz to {rate_text(sample_rate)}, band-limited'
+
+
+def _displacement(signals: Mapping[str, Signal], notes: dict[str, None]) -> tuple[Times, FloatArray]:
     even = {name: evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE) for name, signal in signals.items()}
-    for one in even.values():
-        notes += [note for note in one.notes if note not in notes]
-    stamps, values = displacement_on_grid(even, SAMPLE_RATE, notes)
-    limit = ControlParameters().displacement_range
+    done = [note for one in even.values() for note in one.notes]
+    stamps, values = displacement_on_grid(even, SAMPLE_RATE, done)
+    notes.update(dict.fromkeys(done))
     check_size(
-        ' and '.join(one.name for one in even.values()), values, 1.0 / SAMPLE_RATE, limit, 'm',
+        ' and '.join(one.name for one in even.values()), values, 1.0 / SAMPLE_RATE,
+        ControlParameters().displacement_range, 'm',
         'is its unit another one, its zero another offset (in a mapping file), or is this sample a fault to '
         'cut out?',
     )  # fmt: skip
-    wanted = quantity(DISPLACEMENT)
-    return Channel(recorded_as(wanted), wanted.unit.symbol, stamps, values)
+    return stamps, values
 
 
-def _acceleration(signal: Signal, grid: Times | None, notes: list[str]) -> tuple[Times, FloatArray]:
-    """Return the acceleration at the rate that its topic has; its stamps are those of `grid` if equal."""
+def _acceleration(signal: Signal, notes: dict[str, None]) -> tuple[Times, FloatArray]:
+    """Return the acceleration at the rate that its topic has."""
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE_OF_ACCELERATION)
-    notes += [note for note in even.notes if note not in notes]
-    step = 1.0 / SAMPLE_RATE
+    notes.update(dict.fromkeys(even.notes))
+    step, step_ns = 1.0 / SAMPLE_RATE, sample_time_ns(SAMPLE_RATE)
     if not has_step(even, step):
-        notes.append(
-            f'{even.name}: resampled from {even.rate:.4g} Hz to {rate_text(SAMPLE_RATE)}, band-limited'
-        )
+        notes[_resampled(even, SAMPLE_RATE)] = None
     values = resampled(even, step, 0.0, round(even.length / step) + 1)[:]
-    step_ns = sample_time_ns(SAMPLE_RATE)
-    if grid is not None and (int(grid[0]), grid.size) == (even.begin, values.size):
-        return grid, values
     return np.arange(even.begin, even.begin + values.size * step_ns, step_ns, dtype=np.int64), values
 
 

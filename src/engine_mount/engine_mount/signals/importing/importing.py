@@ -1,20 +1,18 @@
-"""Files of others made into recordings that every command takes."""
+"""Foreign files made into recordings that every command takes."""
 
 from collections.abc import Callable, Sequence
-from collections.abc import Mapping as Keys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.signals.importing.channels import channels_of
-from engine_mount.signals.importing.joined import joined
-from engine_mount.signals.importing.pieces import Piece, pieces, within
+from engine_mount.signals.importing.channels import Channel, channels_of
+from engine_mount.signals.importing.parts import join_files, parts_of, within
 from engine_mount.signals.importing.provenance import SCENARIO, told_mapping, told_provenance
 from engine_mount.signals.importing.reading import read_files
-from engine_mount.signals.importing.writing import Channel, write_channels
+from engine_mount.signals.importing.writing import write_channels
 from engine_mount.signals.mapping import Mapping
 from engine_mount.signals.selection import Selection
-from engine_mount.signals.signal import SECOND, Signal
+from engine_mount.signals.signal import SECOND
 from mount_recorder.session import new_session
 
 Progress = Callable[[float, str], None]
@@ -55,63 +53,41 @@ def import_recording(order: ImportOrder, progress: Progress = lambda share, what
     """
     progress(0.0, 'reading')
     files = read_files(order.files, order.mapping)
-    signals, notes = joined([(one.name, one.signals) for one in files])
+    signals, notes = join_files([(one.name, one.signals) for one in files])
     notes = [note for one in files for note in one.notes] + notes
-    imported = Imported(notes=[*notes, *_notes_of(signals)])
-    parts, cuts = pieces(within(signals, order.first, order.last))
-    parts, shifted = _with_room_before(parts)
-    imported.notes += [*cuts, *shifted]
+    notes += [note for signal in signals.values() for note in signal.notes]
+    parts, cuts = parts_of(within(signals, order.first, order.last))
+    notes += cuts
+    shift = SECOND - parts[0].begin  # a replay dates the force table before the first sample
+    if shift > 0:
+        parts = [part.later(shift) for part in parts]
+        notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
     quantities = {name: quantity for one in files for name, quantity in one.quantities.items()}
     files, signals = [replace(one, signals={}) for one in files], {}  # else an hour is held to the end
-    written = []
+    imported, written = Imported(), []
     while parts:
         part = parts.pop(0)
         channels, done = channels_of(part.signals, quantities)
-        imported.notes += [note for note in done if note not in imported.notes]
-        written.append((channels, (part.end - part.begin) / SECOND))
+        notes += done
+        written.append(channels)
+        imported.lengths.append((part.end - part.begin) / SECOND)
     del part
-    for number, (channels, length) in enumerate(written):
-        folder = _place(order.out, number, len(written))
+    imported.notes = list(dict.fromkeys(notes))
+    for number, channels in enumerate(written):
+        folder = order.out
+        if len(written) > 1:
+            folder = folder.with_name(f'{folder.name}_{number + 1}')
         session = _session(order, files, channels, imported.notes, f'{number + 1} of {len(written)}')
 
         def show(share: float, begun: int = number) -> None:
             progress((begun + share) / len(written), 'writing')
 
         write_channels(folder, channels, session, show)
-        _count(imported, folder, length, channels)
+        imported.recordings.append(folder)
+        for channel in channels:
+            topic = f'/{channel.place.topic.name}'
+            imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
     return imported
-
-
-def _place(out: Path, number: int, count: int) -> Path:
-    return out if count == 1 else out.with_name(f'{out.name}_{number + 1}')
-
-
-def _count(imported: Imported, folder: Path, length: float, channels: Sequence[Channel]) -> None:
-    imported.recordings.append(folder)
-    imported.lengths.append(length)
-    for channel in channels:
-        topic = f'/{channel.place.topic.name}'
-        imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
-
-
-def _notes_of(signals: Keys[str, Signal]) -> list[str]:
-    return list(dict.fromkeys(note for signal in signals.values() for note in signal.notes))
-
-
-def _with_room_before(parts: Sequence[Piece]) -> tuple[list[Piece], list[str]]:
-    """Return the parts from 1 s on where they begin earlier: a replay dates the force table before them."""
-    shift = SECOND - min(part.begin for part in parts)
-    if shift <= 0:
-        return list(parts), []
-    moved = [
-        Piece(
-            part.begin + shift,
-            part.end + shift,
-            {name: replace(signal, begin=signal.begin + shift) for name, signal in part.signals.items()},
-        )
-        for part in parts
-    ]
-    return moved, [f'stamps are those of the file and {shift / SECOND:.3f} s']
 
 
 def _session(
@@ -121,21 +97,13 @@ def _session(
     notes: Sequence[str],
     piece: str,
 ) -> dict[str, Any]:
-    columns = {name: told for one in files for name, told in one.columns.items()}
-    return new_session(
-        {
-            'scenario': SCENARIO,
-            'mode': 'import',
-            'imported': {
-                'files': [told_provenance(one.provenance) for one in files],
-                'piece': piece,
-                'mapping': told_mapping(order.mapping, order.mapping_file),
-                'columns': columns,
-                'topics': {
-                    f'/{channel.place.topic.name}': f'{channel.place.field} in {channel.unit}'
-                    for channel in channels
-                },
-                'notes': list(notes),
-            },
-        }
-    )
+    places = [(channel.place, channel.unit) for channel in channels]
+    imported = {
+        'files': [told_provenance(one.provenance) for one in files],
+        'piece': piece,
+        'mapping': told_mapping(order.mapping, order.mapping_file),
+        'columns': {name: told for one in files for name, told in one.columns.items()},
+        'topics': {f'/{place.topic.name}': f'{place.field} in {unit}' for place, unit in places},
+        'notes': list(notes),
+    }
+    return new_session({'scenario': SCENARIO, 'mode': 'import', 'imported': imported})

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from engine_mount.signals.formats.measured import Heading
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.one_grid import CHASSIS, DISPLACEMENT, ENGINE
+from engine_mount.signals.importing.channels import CHASSIS, DISPLACEMENT, ENGINE
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping
 from engine_mount.signals.quantities import QUANTITIES, titled
 from engine_mount.signals.selection import Selection, heading_of, select

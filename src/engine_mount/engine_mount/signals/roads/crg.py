@@ -55,12 +55,12 @@ def read_track(name: str, content: bytes, lateral: float) -> Track:
             f'{places[-1]:g} m: choose one with --lateral'
         )
     notes = [f'track at v = {lateral:g} m of {places[0]:g} .. {places[-1]:g} m']
-    left = min(max(int(np.searchsorted(places, lateral - _SAME)), 1), places.size - 1)
-    share = (lateral - places[left - 1]) / (places[left] - places[left - 1])
-    share = round(share) if abs(share - round(share)) < _SAME else share
-    # linear between two sections, and the one alone where it is hit, for the other may lack a height
-    parts = [(1.0 - share, columns[left - 1]), (share, columns[left])]
-    height = sum((weight * table[:, column] for weight, column in parts if weight), np.zeros(len(table)))
+    weights = [float(np.interp(lateral, places, one)) for one in np.eye(places.size)]
+    # a section without weight has no say, for it may lack a height
+    parts = (
+        weight * table[:, column] for weight, column in zip(weights, columns, strict=True) if weight > _SAME
+    )
+    height = sum(parts, np.zeros(len(table)))
 
     def reference_line(word: str, constant: str) -> FloatArray:
         if f'reference line {word}' in titles:

@@ -4,6 +4,7 @@ The vehicle model stands on one wheel, so there is one track and no second axle.
 long waves, averaged over the length on which a tyre stands, and is faded in as the simulated roads are.
 """
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from engine_mount.signals.roads.iso8608 import (
     unevenness,
     without_long_waves,
 )
+from engine_mount.signals.roads.table import road_profile
 from engine_mount.signals.selection import name_of, select_rows
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.units import unit_of
@@ -195,57 +197,82 @@ def kept_frequency(profile: RoadProfile, speed: Speed) -> float:
     return _KEPT * min(speed.mean / profile.spacing, 1.0 / STEP_TIME)
 
 
-def as_rows(profile: RoadProfile, found: Unevenness, speed: Speed | None) -> list[tuple[str, str]]:
-    """Return rows of a table about a road, and at `speed` which frequencies it holds."""
-    short = without_long_waves(profile.height, profile.spacing)
-    rows = [
-        ('format', profile.provenance.format),
-        ('length', f'{profile.length:.1f} m, a height every {1e3 * profile.spacing:.4g} mm'),
-        ('heights', f'{np.ptp(profile.height):.3g} m from the lowest to the highest'),
-        (
-            f'up to {LONGEST_WAVE:g} m',
-            f'{1e3 * root_mean_square(profile):.3g} mm rms, {1e3 * np.ptp(short):.3g} mm in all',
-        ),
-        ('ISO 8608', f'class {found.letter}{" (a guess)" if found.beyond else ""}'),
-        ('Gd(0.1 cycles/m)', f'{1e6 * found.roughness:.3g}e-6 m^3'),
-        ('waviness', f'{found.waviness:.2f}'),
-    ]
-    rows += [
-        ('comes again', f'every {period.wavelength:.3g} m, {1e3 * period.amplitude:.2g} mm')
-        for period in found.periods
-    ]
-    if speed is not None:
-        lowest, highest = speed.mean / min(profile.length, LONGEST_WAVE), kept_frequency(profile, speed)
-        rows.append(
+@dataclass(frozen=True, eq=False)
+class Road:
+    """A measured road: its profile, what that is by ISO 8608, and a speed at which it is driven."""
+
+    profile: RoadProfile
+    unevenness: Unevenness
+    speed: Speed | None = None
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return name and text of each figure, and at the speed which frequencies the road holds."""
+        profile, found, speed = self.profile, self.unevenness, self.speed
+        short = without_long_waves(profile.height, profile.spacing)
+        rows = [
+            ('format', profile.provenance.format),
+            ('length', f'{profile.length:.1f} m, a height every {1e3 * profile.spacing:.4g} mm'),
+            ('heights', f'{np.ptp(profile.height):.3g} m from the lowest to the highest'),
             (
-                f'at {3.6 * speed.mean:.4g} km/h',
-                f'{profile.length / speed.mean:.1f} s; {lowest:.2g} .. {highest:.4g} Hz',
-            )
-        )
+                f'up to {LONGEST_WAVE:g} m',
+                f'{1e3 * root_mean_square(profile):.3g} mm rms, {1e3 * np.ptp(short):.3g} mm in all',
+            ),
+            ('ISO 8608', f'class {found.letter}{" (a guess)" if found.beyond else ""}'),
+            ('Gd(0.1 cycles/m)', f'{1e6 * found.roughness:.3g}e-6 m^3'),
+            ('waviness', f'{found.waviness:.2f}'),
+        ]
         rows += [
-            ('', f'{period.wavelength:.3g} m are met at {speed.mean / period.wavelength:.3g} Hz')
+            ('comes again', f'every {period.wavelength:.3g} m, {1e3 * period.amplitude:.2g} mm')
             for period in found.periods
         ]
-    return rows
+        if speed is not None:
+            lowest, highest = speed.mean / min(profile.length, LONGEST_WAVE), kept_frequency(profile, speed)
+            rows.append(
+                (
+                    f'at {3.6 * speed.mean:.4g} km/h',
+                    f'{profile.length / speed.mean:.1f} s; {lowest:.2g} .. {highest:.4g} Hz',
+                )
+            )
+            rows += [
+                ('', f'{period.wavelength:.3g} m are met at {speed.mean / period.wavelength:.3g} Hz')
+                for period in found.periods
+            ]
+        return rows
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The figures in SI units as plain data."""
+        profile, found = self.profile, self.unevenness
+        return {
+            'uri': profile.provenance.uri,
+            'sha256': profile.provenance.sha256,
+            'format': profile.provenance.format,
+            'length_m': profile.length,
+            'spacing_m': profile.spacing,
+            'rms_m': root_mean_square(profile),
+            'class': found.letter,
+            'roughness_m3': found.roughness,
+            'waviness': found.waviness,
+            'fitted_cycles_per_m': [found.lowest, found.highest],
+            'class_is_a_guess': found.beyond,
+            'periods': [period._asdict() for period in found.periods],
+            'notes': list(profile.notes),
+        }
 
 
-def as_figures(profile: RoadProfile, found: Unevenness) -> dict[str, Any]:
-    """Return the figures of a road as plain data."""
-    return {
-        'uri': profile.provenance.uri,
-        'sha256': profile.provenance.sha256,
-        'format': profile.provenance.format,
-        'length_m': profile.length,
-        'spacing_m': profile.spacing,
-        'rms_m': root_mean_square(profile),
-        'class': found.letter,
-        'roughness_m3': found.roughness,
-        'waviness': found.waviness,
-        'fitted_cycles_per_m': [found.lowest, found.highest],
-        'class_is_a_guess': found.beyond,
-        'periods': [period._asdict() for period in found.periods],
-        'notes': list(profile.notes),
-    }
+def road(
+    file: str | Path, *, lateral: float = 0.0, column: str = '', distance: str = '', speed: str = ''
+) -> Road:
+    """Return the road in an OpenCRG file or a table of height over distance, path or URI.
+
+    `lateral` (m, left of the reference line) chooses the track of an OpenCRG file; `column` and `distance`
+    are `NAME[:UNIT]`, the distance may be that between two heights (m). `speed`: see `speed_of`. Raises
+    `SignalError` or `SourceError`.
+    """
+    spacing = float(distance) if re.fullmatch(r'[\d.]+(e-?\d+)?', distance) else math.nan
+    named = '' if math.isfinite(spacing) else distance
+    profile = road_profile(file, lateral=lateral, column=column, distance=named, spacing=spacing)
+    return Road(profile, unevenness(profile), speed_of(speed) if speed else None)
 
 
 def _over_time(

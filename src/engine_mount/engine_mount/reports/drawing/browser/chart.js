@@ -1,0 +1,262 @@
+'use strict';
+// Charts on canvases, for the report and the live view. A curve has numbers x and y; where it has the lowest and the
+// highest value of a stretch, x stands twice. What goes wrong stands in the page: data-error of the root.
+
+const root = document.documentElement, dark = matchMedia('(prefers-color-scheme: dark)');
+window.addEventListener('error', (event) => { root.dataset.error = event.message; });
+
+const LEFT = 58, RIGHT = 8, TOP = 6, BOTTOM = 36; // pixels round the drawing area, BOTTOM of the last panel
+const NARROW = 620, HEIGHT = 190, LOW_HEIGHT = 150; // pixels: a panel of share 1, and where the page is narrow
+const UNKNOWN = -32768;
+const charts = [];
+
+function add(parent, kind, name, text = '') {
+  const made = document.createElement(kind);
+  made.className = name;
+  made.textContent = text;
+  parent.append(made);
+  return made;
+}
+
+// ---- numbers
+
+function decoded(text, Numbers) { return new Numbers(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer); }
+
+function withNumbers(curve) {
+  if (curve.points) return { ...curve, x: decoded(curve.points.x, Float64Array), y: decoded(curve.points.y, Float32Array) };
+  const { begin, step, low, size, pairs, values } = curve.even, raw = decoded(values, Int16Array);
+  const x = Float64Array.from(raw, (_, place) => begin + step * (pairs ? Math.floor(place / 2) + 0.5 : place));
+  const y = Float32Array.from(raw, (value) => (value === UNKNOWN ? NaN : low + size * (value + 32767)));
+  return { ...curve, x, y };
+}
+
+function placeOf(x, value) { // the first place whose x is at least `value`
+  let low = 0, high = x.length;
+  while (low < high) { const middle = (low + high) >> 1; if (x[middle] < value) low = middle + 1; else high = middle; }
+  return low;
+}
+
+function valuesAt({ x, y, rising }, at) { // those known nearest to x, the lowest first
+  if (!rising || !(at >= x[0] && at <= x[x.length - 1])) return [];
+  const after = placeOf(x, at), nearest = after > 0 && at - x[after - 1] < x[after] - at ? after - 1 : after;
+  const found = [nearest - 1, nearest, nearest + 1].filter((place) => x[place] === x[nearest]).map((place) => y[place]);
+  return [Math.min(...found), Math.max(...found)];
+}
+
+function niceStep(span, count) {
+  const rough = span / Math.max(1, count), power = 10 ** Math.floor(Math.log10(rough));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
+}
+
+function written(value, span, log) { // digits that tell apart a two-thousandth of what is shown
+  if (value === undefined || !isFinite(value)) return '–';
+  if (log) return value.toPrecision(3);
+  return value.toFixed(Math.min(6, Math.max(0, Math.ceil(-Math.log10(span / 2000)))));
+}
+
+function unitOf(label) { return (label.match(/\(([^()]*)\)\s*$/) || ['', ''])[1]; }
+
+// ---- a chart and what is shown of it
+
+function build(place, told) {
+  const chart = { told, place, spike: null };
+  place.replaceChildren();
+  chart.reading = add(place, 'p', 'reading');
+  chart.panels = told.panels.map((panel) => builtPanel(chart, panel));
+  if (told.spans.length) add(place, 'p', 'key', `▒ ${told.span_name}`);
+  chart.whole = wholeOf(chart);
+  chart.shown = told.view || chart.whole;
+  charts.push(chart);
+  return chart;
+}
+
+function builtPanel(chart, told) {
+  const legend = add(chart.place, 'div', 'legend');
+  add(legend, 'b', '', told.label);
+  const lines = [...told.curves.map(withNumbers), ...told.dots.map((dots) => ({ ...withNumbers(dots), dash: 'point' }))];
+  for (const line of lines) {
+    line.chip = add(legend, 'button', 'chip');
+    line.chip.type = 'button';
+    line.chip.title = 'show or hide';
+    line.chip.setAttribute('aria-pressed', 'true');
+    add(line.chip, 'i', line.dash === 'point' ? 'point' : `stroke ${line.dash}`);
+    line.chip.append(line.name);
+    line.number = add(line.chip, 'output', '');
+    line.chip.onclick = () => {
+      line.hidden = !line.hidden;
+      line.chip.setAttribute('aria-pressed', String(!line.hidden));
+      draw(chart);
+    };
+  }
+  const canvas = add(chart.place, 'canvas', '');
+  canvas.setAttribute('role', 'img');
+  canvas.setAttribute('aria-label', `${told.label} over ${chart.told.x_label}`);
+  return { told, canvas, lines, unit: unitOf(told.label) };
+}
+
+function wholeOf({ told, panels }) {
+  if (told.limits) return told.limits;
+  let low = Infinity, high = -Infinity;
+  for (const { lines } of panels) for (const { x } of lines) for (const value of x) { low = Math.min(low, value); high = Math.max(high, value); }
+  if (!(low < high)) return isFinite(low) ? [low - 0.5, low + 0.5] : [0, 1];
+  const room = told.panels.some(({ dots }) => dots.length) ? 0.02 * (high - low) : 0;
+  return [low - room, high + room];
+}
+
+// ---- drawing
+
+function colourOf(name) { // lighter on dark paper; grey stays behind, where it can still be read
+  if (!dark.matches) return name;
+  const part = (place) => parseInt(name.slice(place, place + 2), 16), lighter = part(1) === part(3) ? 0.27 : 0.42;
+  return `rgb(${[1, 3, 5].map((place) => Math.round(part(place) + lighter * (255 - part(place)))).join(',')})`;
+}
+
+function draw(chart) {
+  if (chart.waiting) return;
+  chart.waiting = true;
+  (document.hidden ? (now) => now() : requestAnimationFrame)(() => { chart.waiting = false; paintChart(chart); });
+}
+
+function paintChart(chart) {
+  const style = getComputedStyle(root), ink = (name) => style.getPropertyValue(name);
+  const width = Math.max(200, chart.place.clientWidth), { x_label } = chart.told;
+  for (const panel of chart.panels) paintPanel(chart, panel, width, ink);
+  const rising = chart.panels.some(({ lines }) => lines.some((line) => line.rising));
+  chart.reading.textContent = chart.spike === null || !rising ? '' : `${x_label.replace(/ \([^()]*\)$/, '')} ${written(chart.spike, chart.shown[1] - chart.shown[0])} ${unitOf(x_label)}`;
+}
+
+function verticalOf({ told, lines }, from, to) {
+  let low = Infinity, high = -Infinity;
+  const take = (value) => { if (value < low) low = value; if (value > high) high = value; };
+  for (const { x, y, hidden } of lines)
+    if (!hidden) for (let place = 0; place < x.length; place += 1) if (x[place] >= from && x[place] <= to) take(y[place]);
+  for (const { value, both } of told.levels) { take(value); if (both) take(-value); }
+  told.least.forEach(take);
+  if (told.log) {
+    if (!(high > 0)) return [-1, 1];
+    low = Math.log10(Math.max(low > 0 ? low : high * 1e-4, high * 1e-6)); high = Math.log10(high);
+  }
+  if (!isFinite(low + high)) return [0, 1];
+  if (!(low < high)) { low -= Math.abs(low) * 0.5 || 0.5; high += Math.abs(high) * 0.5 || 0.5; }
+  const room = 0.05 * (high - low);
+  return [low - room, high + room];
+}
+
+function paintPanel(chart, panel, width, ink) {
+  const { told, canvas, lines } = panel, last = panel === chart.panels[chart.panels.length - 1];
+  const ratio = devicePixelRatio || 1, below = last ? BOTTOM : 6;
+  const height = Math.round((width < NARROW ? LOW_HEIGHT : HEIGHT) * told.share) + below;
+  canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
+  canvas.style.height = `${height}px`;
+  const paint = canvas.getContext('2d');
+  paint.setTransform(ratio, 0, 0, ratio, 0, 0);
+  paint.font = '12px system-ui, sans-serif';
+  const [from, to] = chart.shown, [low, high] = verticalOf(panel, from, to);
+  const right = width - RIGHT, bottom = height - (last ? BOTTOM : 4);
+  const x = (value) => LEFT + ((right - LEFT) * (value - from)) / (to - from);
+  const y = (value) => bottom - ((bottom - TOP) * ((told.log ? Math.log10(value) : value) - low)) / (high - low);
+  const area = { x, y, right, bottom, low, high };
+  paintFrame(paint, chart, told, area, last, width, ink);
+  paint.save();
+  paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
+  const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
+  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, chart.shown, area);
+  paintLevels(paint, told.levels, area, ink);
+  if (chart.spike !== null) { paint.strokeStyle = ink('--ink'); stroke(paint, Math.round(x(chart.spike)) + 0.5, 0, Math.round(x(chart.spike)) + 0.5, bottom); }
+  if (chart.dragged) {
+    const [begin, end] = chart.dragged.map(x);
+    paint.globalAlpha = 0.2; paint.fillStyle = ink('--ink'); paint.fillRect(begin, 0, end - begin, bottom); paint.globalAlpha = 1;
+  }
+  paint.restore();
+  for (const line of lines) {
+    line.chip.style.color = colourOf(line.colour);
+    const found = chart.live ? [line.latest] : chart.spike === null ? [] : valuesAt(line, chart.spike);
+    const texts = new Set(found.map((value) => written(value, high - low, told.log)));
+    line.number.textContent = texts.size ? ` ${[...texts].join(' … ')} ${panel.unit}` : '';
+  }
+}
+
+function paintFrame(paint, chart, told, { x, right, bottom, low, high }, last, width, ink) {
+  const [from, to] = chart.shown;
+  paint.fillStyle = colourOf(chart.told.span_colour);
+  paint.globalAlpha = 0.15;
+  for (const { begin, end } of chart.told.spans) {
+    const first = Math.max(LEFT, x(begin)), wide = Math.min(right, x(end)) - first;
+    if (wide > 0) paint.fillRect(first, TOP, wide, bottom - TOP);
+  }
+  paint.globalAlpha = 1;
+  paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
+  paint.textAlign = 'right'; paint.textBaseline = 'middle';
+  const step = told.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
+  for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
+    const y = Math.round(bottom - ((bottom - TOP) * (place * step - low)) / (high - low)) + 0.5;
+    stroke(paint, LEFT, y, right, y);
+    paint.fillText(told.log ? Number((10 ** (place * step)).toPrecision(2)) : Number((place * step).toPrecision(6)), LEFT - 6, y);
+  }
+  const stepX = niceStep(to - from, width / 90), ticks = [...chart.told.ticks];
+  if (!ticks.length || ticks.length > width / 40) {
+    ticks.length = 0;
+    for (let place = Math.ceil(from / stepX); place * stepX <= to; place += 1) ticks.push(place * stepX);
+  }
+  paint.textBaseline = 'top';
+  for (const tick of ticks) {
+    const at = Math.round(x(tick)) + 0.5;
+    if (at < LEFT || at > right + 1 || (chart.live && tick < 0)) continue;
+    stroke(paint, at, TOP, at, bottom);
+    paint.textAlign = at > right - 8 ? 'right' : 'center'; // whole at the edge of the page too
+    if (last) paint.fillText(Number(tick.toPrecision(8)), at > right - 8 ? right + RIGHT : at, bottom + 4);
+  }
+  paint.textAlign = 'center';
+  if (last) paint.fillText(chart.told.x_label, (LEFT + right) / 2, bottom + 20);
+}
+
+function stroke(paint, x0, y0, x1, y1) { paint.beginPath(); paint.moveTo(x0, y0); paint.lineTo(x1, y1); paint.stroke(); }
+
+function paintLevels(paint, levels, { y, right }, ink) {
+  paint.textAlign = 'left'; paint.textBaseline = 'bottom';
+  for (const { name, value, both, dash, colour } of levels) {
+    paint.strokeStyle = paint.fillStyle = colourOf(colour);
+    paint.setLineDash(dash === 'dot' ? [2, 3] : [7, 4]);
+    for (const each of both ? [value, -value] : [value]) stroke(paint, LEFT, y(each), right, y(each));
+    paint.setLineDash([]);
+    paint.strokeStyle = ink('--paper'); paint.lineWidth = 3; paint.globalAlpha = 0.8;
+    paint.strokeText(name, LEFT + 4, y(value) - 1);
+    paint.lineWidth = 1; paint.globalAlpha = 1;
+    paint.fillText(name, LEFT + 4, y(value) - 1);
+  }
+}
+
+function paintCurve(paint, curve, [from, to], area) {
+  paint.strokeStyle = colourOf(curve.colour);
+  paint.lineWidth = curve.width; paint.lineJoin = 'round';
+  paint.setLineDash(curve.dash === 'dash' ? [6, 4] : curve.dash === 'dot' ? [2, 3] : []);
+  paint.beginPath();
+  const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
+  const end = rising ? Math.min(x.length, placeOf(x, to) + 2) : x.length;
+  let drawn = false, before = 0, column = NaN, highest = 0, lowest = 0;
+  for (let place = begin; place < end; place += 1) {
+    if (isNaN(y[place])) { drawn = false; continue; }
+    const across = area.x(x[place]), down = area.y(y[place]);
+    if (!drawn) paint.moveTo(across, down);
+    else if (rising && Math.floor(across) === column && down >= highest && down <= lowest) continue; // covered in this column of pixels
+    else { if (curve.steps) paint.lineTo(across, before); paint.lineTo(across, down); }
+    if (Math.floor(across) !== column || !drawn) { column = Math.floor(across); highest = lowest = down; }
+    highest = Math.min(highest, down); lowest = Math.max(lowest, down);
+    before = down; drawn = true;
+  }
+  paint.stroke();
+  paint.setLineDash([]);
+}
+
+function paintDots(paint, dots, shown, { x, y, bottom }) {
+  paint.fillStyle = paint.strokeStyle = colourOf(dots.colour);
+  dots.x.forEach((value, place) => {
+    const across = x(value), down = y(dots.y[place]);
+    paint.globalAlpha = 0.35; stroke(paint, across, down, across, bottom); paint.globalAlpha = 1;
+    paint.beginPath(); paint.arc(across, down, 4, 0, 2 * Math.PI); paint.fill();
+  });
+}
+
+const redraw = () => charts.forEach(draw);
+dark.addEventListener('change', redraw);
+window.addEventListener('resize', redraw);

@@ -1,0 +1,116 @@
+// Mouse, touch and keys of a report; data-drawn of the root counts its charts, data-ready ends that.
+
+const AROUND = 0.5; // s, chosen: shown to either side of what a number links to
+
+function show(chart, from, to) { // at most all of it, at least a ten-thousandth
+  const [low, high] = chart.whole, span = Math.min(high - low, Math.max(to - from, (high - low) / 1e4));
+  const begin = Math.min(Math.max(low, (from + to - span) / 2), high - span);
+  chart.shown = [begin, begin + span];
+  draw(chart);
+}
+
+function zoom(chart, factor, about = (chart.shown[0] + chart.shown[1]) / 2) {
+  const [from, to] = chart.shown;
+  show(chart, about - (about - from) * factor, about + (to - about) * factor);
+}
+
+function pan(chart, share) {
+  const [from, to] = chart.shown, by = share * (to - from);
+  show(chart, from + by, to + by);
+}
+
+function read(chart, x) { // one line through all panels over the same axis
+  for (const other of charts) {
+    if (other !== chart && !(other.told.x_label === chart.told.x_label && chart.told.x_label.startsWith('time'))) continue;
+    if (x !== null || other.spike !== null) { other.spike = x; draw(other); }
+  }
+}
+
+function shareAt(chart, event) { // of the width of the drawing area
+  const box = chart.panels[0].canvas.getBoundingClientRect();
+  return Math.min(1, Math.max(0, (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT)));
+}
+
+function listen(chart) {
+  const { place } = chart, at = (event) => chart.shown[0] + shareAt(chart, event) * (chart.shown[1] - chart.shown[0]);
+  let begun = null;
+  place.addEventListener('pointerdown', (event) => {
+    if (event.target.tagName !== 'CANVAS' || event.button > 0) return;
+    event.target.setPointerCapture(event.pointerId);
+    begun = { shown: chart.shown, share: shareAt(chart, event), at: at(event), x: event.clientX };
+  });
+  place.addEventListener('pointermove', (event) => {
+    if (event.target.tagName !== 'CANVAS') return;
+    if (begun && event.shiftKey) {
+      const [from, to] = begun.shown, by = (begun.share - shareAt(chart, event)) * (to - from);
+      show(chart, from + by, to + by);
+    } else {
+      if (begun) chart.dragged = [begun.at, at(event)].sort((a, b) => a - b);
+      read(chart, at(event));
+    }
+  });
+  const lift = (event) => {
+    const { dragged } = chart, far = begun && Math.abs(event.clientX - begun.x) > 5;
+    chart.dragged = begun = null;
+    if (event.type !== 'pointerup') return;
+    if (dragged && far) show(chart, ...dragged);
+    else if (!far && event.target.tagName === 'CANVAS') read(chart, at(event));
+  };
+  for (const kind of ['pointerup', 'pointercancel']) place.addEventListener(kind, lift);
+  place.addEventListener('pointerleave', (event) => { if (event.pointerType === 'mouse' && !begun) read(chart, null); });
+  place.addEventListener('dblclick', (event) => { if (event.target.tagName === 'CANVAS') show(chart, ...chart.whole); });
+  place.addEventListener('wheel', (event) => {
+    if (!event.ctrlKey && !event.shiftKey) return; // the page scrolls
+    event.preventDefault();
+    zoom(chart, Math.exp(0.003 * (event.deltaY || event.deltaX)), at(event));
+  }, { passive: false });
+  place.addEventListener('keydown', (event) => press(chart, event));
+}
+
+function press(chart, event) {
+  if (event.target !== chart.place || event.ctrlKey || event.metaKey || event.altKey) return;
+  const [from, to] = chart.shown, spike = chart.spike === null ? (from + to) / 2 : chart.spike;
+  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : pan(chart, 0.2 * way));
+  const acts = {
+    ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => zoom(chart, 0.5), '=': () => zoom(chart, 0.5), '-': () => zoom(chart, 2),
+    0: () => show(chart, ...chart.whole), Escape: () => read(chart, null),
+  };
+  if (!acts[event.key]) return;
+  event.preventDefault();
+  acts[event.key]();
+}
+
+// A number that links to its trace shows the stretch that it is from, and marks the moment.
+document.addEventListener('click', (event) => {
+  const link = event.target.closest('a[data-at]');
+  const chart = link && charts.find((each) => `#${each.place.dataset.chart}` === link.hash);
+  if (!chart) return;
+  event.preventDefault();
+  const at = Number(link.dataset.at);
+  show(chart, at - AROUND, at + AROUND);
+  read(chart, at);
+  chart.place.scrollIntoView({ block: 'center' });
+  chart.place.focus({ preventScroll: true });
+});
+window.addEventListener('beforeprint', () => { for (const each of document.querySelectorAll('details')) each.open = true; });
+
+// One chart after the other, so that the page answers meanwhile.
+const waiting = [...document.querySelectorAll('.figure')];
+root.dataset.drawn = 0;
+(function buildNext() {
+  const place = waiting.shift();
+  if (place === undefined) { root.dataset.ready = 'yes'; return; }
+  try {
+    const chart = build(place, JSON.parse(place.nextElementSibling.textContent));
+    place.tabIndex = 0;
+    place.setAttribute('role', 'group');
+    place.setAttribute('aria-label', `${chart.told.title}: arrow keys move, plus and minus zoom, 0 shows all`);
+    listen(chart);
+    draw(chart);
+    root.dataset.drawn = Number(root.dataset.drawn) + 1;
+  } catch (error) {
+    root.dataset.error = String(error);
+    place.textContent = `This chart could not be drawn: ${error}`;
+  }
+  setTimeout(buildNext, 0);
+}());

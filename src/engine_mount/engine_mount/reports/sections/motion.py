@@ -1,0 +1,251 @@
+"""The sections of a report that show how the mount moved."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from engine_mount.recordings.difference import quantity_text
+from engine_mount.reports.drawing.chart import Array, Chart, Curve, Dots, Panel, Span, level_lines
+from engine_mount.reports.drawing.style import DIFFERENCE_COLOUR, UNDAMPED_COLOUR
+from engine_mount.reports.sections.periodic import (
+    amplitude_density,
+    cycle_work,
+    decibels,
+    distortion,
+    evenly,
+    whole_periods,
+)
+from engine_mount.reports.sections.periodic import (
+    harmonics as harmonics_of,
+)
+from engine_mount.reports.sections.section import Cell, Link, Section, Table
+from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
+
+TIME_LABEL = 'time from the first sample (s)'
+_MM = 1e3
+_LOOPS = 4  # periods drawn
+_PERIODS = 32  # evaluated
+_WITHOUT_PERIOD = 0.5  # s, chosen: stretch of a loop where nothing is periodic
+_LISTED = 200  # switchings
+_LEAST_SAMPLES = 1000  # chosen: of a spectrum
+_LEAST_LOST = 0.0005  # share of made-up samples above which a spectrum says so
+_HIGHEST = 60.0  # Hz, of a spectrum
+
+
+def traces(subjects: Sequence[Subject]) -> Section:
+    """Return displacement with the levels of its policy above current, over time, as in Fig. 15.
+
+    Where two recordings are compared, the second less the first stands below each.
+    """
+    first, last, several = subjects[0], subjects[-1], len(subjects) > 1
+    damping = _damping(subjects)
+    levels: dict[str, float] = next((each.run.levels for each in subjects if each.run.levels), {})
+    words = [f'Shaded: damping on in {first.name}.'] if several and damping else []
+    if first.run.unknown:
+        words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
+    panels: list[Panel] = []
+    ends: list[float] = []
+    for quantity, what, unit, factor, share in (
+        ('displacement', 'displacement', 'mm', _MM, 1.5),
+        ('setpoint', 'current', 'A', 1.0, 1.0),
+    ):
+        signals = [(each, signal) for each in subjects if (signal := each[quantity]) is not None]
+        if not signals:
+            continue
+        ends += [float(signal.time[place]) for _, signal in signals for place in (0, -1)]
+        curves = [each.curve(what, signal.time, factor * signal.values) for each, signal in signals]
+        lines = level_lines(levels) if quantity == 'displacement' else []
+        if quantity == 'displacement' and not isinstance(calm := first.undamped, str):
+            grey = Curve('undamped', first.seconds(calm.stamps), _MM * calm.displacement, UNDAMPED_COLOUR)
+            curves.insert(0, grey)  # below the others
+        panels.append(Panel(f'{what} ({unit})', curves, levels=lines, share=share))
+        if last.comparison is not None and len(signals) > 1:
+            panels.append(_difference(f'{what}, B - A ({unit})', signals[0][1], signals[-1][1], factor))
+    if not panels:
+        return Section('traces', 'Displacement and current', words)
+    if not isinstance(first.undamped, str):
+        of = f' of {first.name}' if several else ''
+        words.append(f'Grey: the undamped mount on the same excitation{of}, computed with 0 A.')
+    if last.comparison is not None:
+        words.append(f'B - A: {last.name} less {first.name}.')
+    title, limits = 'Displacement and current', (min(ends), max(ends))
+    chart = Chart('time_traces', title, TIME_LABEL, panels, damping, 'damping on', limits)
+    return Section('traces', title, words, chart)
+
+
+def switching(subjects: Sequence[Subject]) -> Section:
+    """Return when damping was switched, what happened meanwhile, and the marks of the recording."""
+    said, tables = [], []
+    for subject in subjects:
+        spans = subject.damping
+        if subject.run.without_friction:
+            said.append((subject, f'damping is not applicable: {subject.run.without_friction}'))
+        elif spans is None:
+            said.append((subject, 'when damping was switched was not recorded'))
+        elif not spans:
+            said.append((subject, 'damping was never switched on'))
+        else:
+            more = f' (the first {_LISTED} of {len(spans)})' if len(spans) > _LISTED else ''
+            head = ('on (s)', 'off (s)', 'lasted', 'highest displacement', 'highest current')
+            rows: list[Sequence[Cell]] = [
+                (
+                    *(Link(f'{time:.3f}', 'traces', time) for time in (begin, end)),
+                    quantity_text(end - begin, 's'),
+                    peak_cell(subject['displacement'], 'm', begin, end),
+                    peak_cell(subject['setpoint'], 'A', begin, end),
+                )
+                for begin, end in spans[:_LISTED]
+            ]
+            tables.append(Table(head, rows, f'{subject.prefix}damping on{more}'))
+        if marks := subject.marks:
+            rows = [
+                (Link(f'{time:.3f}', 'traces', time), mark.kind, mark.text) for time, mark in marks[:_LISTED]
+            ]
+            tables.append(Table(('time (s)', 'kind', 'text'), rows, f'{subject.prefix}marks'))
+    return Section('switching', 'Switching and marks', shared_sentences(subjects, said), None, tables)
+
+
+def hysteresis(subjects: Sequence[Subject]) -> Section:
+    """Return mount force and friction force over displacement, as in Fig. 13 left."""
+    groups: dict[str, list[Curve]] = {'mount force': [], 'friction force': []}
+    said = []
+    for subject in subjects:
+        stretch, how = _loop_stretch(subject)
+        before = sum(map(len, groups.values()))
+        for what, curves in groups.items():
+            force = None if what == 'friction force' and subject.run.without_friction else subject[what]
+            x, y, _ = _together(subject['true displacement'], force, stretch)
+            if len(x) > 2:
+                curves.append(subject.curve(what, _MM * x, y))
+        drawn = sum(map(len, groups.values())) > before
+        said.append((subject, how if drawn else 'no force was recorded'))
+    panels = [Panel(f'{what} (N)', curves) for what, curves in groups.items() if curves]
+    title = 'Loss hysteresis'
+    chart = Chart('hysteresis', title, 'displacement (mm)', panels) if panels else None
+    return Section('hysteresis', title, shared_sentences(subjects, said), chart)
+
+
+def harmonics(subjects: Sequence[Subject]) -> Section:
+    """Return harmonics 1 to 8 of the mount force as in Fig. 13 right, its distortion, the work per cycle."""
+    said, dots, rows = [], [], []
+    for subject in subjects:
+        force, steady = subject['mount force'], subject.steady
+        if force is None or subject['true displacement'] is None:
+            said.append((subject, 'no mount force was recorded'))
+            continue
+        if steady is None:
+            said.append((subject, 'the displacement is not one sine for long enough: no harmonics'))
+            continue
+        stretch, sine = steady
+        x, y, time = _together(subject['true displacement'], force, stretch)
+        if len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
+            said.append((subject, 'the mount force was not recorded for long enough there: no harmonics'))
+            continue
+        inside, periods = whole_periods(time, sine.frequency, _PERIODS)
+        amplitudes = harmonics_of(time[inside], y[inside], sine.frequency)
+        numbers = np.arange(1.0, len(amplitudes) + 1.0)
+        curve = subject.curve('mount force', numbers, decibels(amplitudes))
+        dots.append(Dots(curve.name, curve.x, curve.y, curve.colour))
+        rows.append(
+            (
+                subject.name,
+                f'{sine.frequency:.3f}',
+                f'{_MM * sine.amplitude:.3f}',
+                f'{cycle_work(x[inside], y[inside], periods):.3f}',
+                f'{100.0 * distortion(amplitudes):.1f}',
+                *(f'{value:.2f}' for value in amplitudes),
+            )
+        )
+        said.append((subject, f'over the last {periods} periods until {time[inside][-1]:.2f} s'))
+    head = (
+        'recording', 'frequency (Hz)', 'amplitude (mm)', 'work per cycle (J)', 'distortion (%)',
+        *(f'h{number} (N)' for number in range(1, 9)),
+    )  # fmt: skip
+    title, words = 'Harmonics of the mount force', shared_sentences(subjects, said)
+    if not rows:
+        return Section('harmonics', title, words)
+    panels = [Panel('amplitude above 1 N (dB)', dots=dots)]
+    chart = Chart('harmonics', title, 'harmonic', panels, ticks=dots[0].x.tolist())
+    return Section('harmonics', title, words, chart, [Table(head, rows)])
+
+
+def spectra(subjects: Sequence[Subject]) -> Section:
+    """Return the amplitude spectral densities of displacement, mount force and chassis acceleration."""
+    said, panels = [], []
+    for quantity, what, unit, factor in (
+        ('displacement', 'displacement', 'mm', _MM),
+        ('mount force', 'mount force', 'N', 1.0),
+        ('acceleration', 'chassis acceleration', 'm/s²', 1.0),
+    ):
+        label, curves = f'{what}\n({unit}/√Hz)', []
+        for subject in subjects:
+            if (signal := subject[quantity]) is None:
+                continue
+            inside = signal.time >= subject.active_from
+            _, values, made_up = evenly(signal.time[inside], signal.values[inside], subject.sample_rate)
+            if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0.0:  # too short, or nothing moves
+                continue
+            if made_up > _LEAST_LOST * len(values):
+                share = f'{100.0 * made_up / len(values):.1f} % of the samples of the {what}'
+                said.append((subject, f'{share} are missing and were replaced by straight lines'))
+            frequency, density = amplitude_density(values, subject.sample_rate)
+            shown = (frequency > 0.0) & (frequency <= _HIGHEST)
+            curves.append(subject.curve(label, frequency[shown], factor * density[shown]))
+        if curves:
+            panels.append(Panel(label, curves, log=True))
+    words = ['From where control was active; Hann windows of 2.048 s that overlap by half.']
+    words += shared_sentences(subjects, said)
+    limits = (0.0, _HIGHEST)
+    chart = Chart('spectra', 'Spectra', 'frequency (Hz)', panels, limits=limits) if panels else None
+    return Section('spectra', 'Spectra', words, chart)
+
+
+def peak_cell(signal: Signal | None, unit: str, begin: float = -math.inf, end: float = math.inf) -> Cell:
+    """Return the highest absolute value between two times (s), with a link to where it is."""
+    if signal is None:
+        return 'not recorded'
+    value, time = signal.peak(begin, end)
+    return 'unknown' if math.isnan(value) else Link(quantity_text(value, unit), 'traces', time)
+
+
+def _damping(subjects: Sequence[Subject]) -> list[Span]:
+    """Return where damping was on in the first recording that tells."""
+    spans = (each.damping for each in subjects if not each.run.without_friction)
+    return [Span(begin, end) for begin, end in next(filter(None, spans), [])]
+
+
+def _difference(label: str, a: Signal, b: Signal, factor: float) -> Panel:
+    y = b.values - np.interp(b.time, a.time, a.values, np.nan, np.nan)
+    return Panel(label, [Curve('B - A', b.time, factor * y, DIFFERENCE_COLOUR)], share=0.7)
+
+
+def _loop_stretch(subject: Subject) -> tuple[tuple[float, float] | None, str]:
+    """Return the stretch (s) of which loops are drawn, and what it is."""
+    if subject.steady is not None:
+        (begin, end), sine = subject.steady
+        first = max(begin, end - _LOOPS / sine.frequency)
+        return (first, end), f'the last periods at {sine.frequency:.2f} Hz, {first:.2f} to {end:.2f} s'
+    moved = subject['displacement']
+    middle = math.nan if moved is None else moved.peak()[1]
+    if math.isnan(middle):
+        return None, ''
+    if spans := subject.damping:
+        begin, end = spans[0][0], min(spans[0][1], spans[0][0] + _WITHOUT_PERIOD)
+        return (begin, end), f'the first time with damping on, {begin:.2f} to {end:.2f} s'
+    begin, end = middle - 0.5 * _WITHOUT_PERIOD, middle + 0.5 * _WITHOUT_PERIOD
+    return (begin, end), f'around the largest displacement, {begin:.2f} to {end:.2f} s'
+
+
+def _together(
+    moved: Signal | None, force: Signal | None, stretch: tuple[float, float] | None
+) -> tuple[Array, Array, Array]:
+    """Return displacement, force and time at the samples of the force within `stretch`, both known."""
+    if moved is None or force is None or stretch is None:
+        return np.empty(0), np.empty(0), np.empty(0)
+    inside = (force.time >= stretch[0]) & (force.time <= stretch[1])
+    time, y = force.time[inside], force.values[inside]
+    known = np.isfinite(moved.values)
+    x = np.interp(time, moved.time[known], moved.values[known]) if known.any() else np.full(len(time), np.nan)
+    both = np.isfinite(x) & np.isfinite(y)
+    return x[both], y[both], time[both]

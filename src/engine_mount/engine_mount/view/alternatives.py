@@ -1,0 +1,70 @@
+"""Other mounts, simulated on the acceleration of the chassis that comes in.
+
+The acceleration is that of a chassis which carries the mount that is driven: what another mount would have
+done to the chassis itself is not in it. The engine is about an eighth of the car, so that this is little.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.settings.chosen import Parameters, control_parameters
+from mount_models.quantity import with_flattened
+from mount_models.sampling import sample_time_ns
+from mount_sim.excitation.excitation import Seat
+from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.parameters import SimParameters
+from mount_sim.plant.mounts import seated_mount
+from mount_sim.plant.plant import PlantSimulation
+
+MOUNTS = {'hydro': ('hydromount', 'hydro'), 'undamped': ('undamped', 'elastomer')}
+"""{key: (label, mount)} of what stands beside every drive."""
+_LONGEST_PAUSE = 1_000_000_000  # ns, chosen: behind a longer one all begin anew, at rest
+_QUIET = np.zeros(5)  # no noise of the sensors
+_AVERAGED = 5_000_000_000  # ns, chosen: gravity and offset of an accelerometer are averaged over 5 s
+
+
+class Alternatives:
+    """All `MOUNTS` over one stream of accelerations; begins anew after a pause."""
+
+    def __init__(self, parameters: Parameters):
+        """Take the parameters of the drive; raises a `ValueError` for those of another version."""
+        self._plant = with_flattened(SimParameters(), parameters.get('mount_sim', {})).plant
+        self._period = sample_time_ns(control_parameters(parameters).sample_rate)  # ns
+        self._steps = round(self._period * 1e-9 / STEP_TIME)
+        self._begin()
+
+    def advance(
+        self, stamps: Sequence[int], accelerations: NDArray[np.float64]
+    ) -> dict[str, NDArray[np.float64]]:
+        """Return {key: displacements (n,) in m} at n samples of acceleration, m/s^2 upwards, stamps in ns."""
+        found = {key: np.empty(len(stamps)) for key in MOUNTS}
+        for place, (stamp, acceleration) in enumerate(zip(stamps, accelerations.tolist(), strict=True)):
+            values = self._excitation(stamp, acceleration)
+            for key, plant in self._mounts.items():
+                plant.advance(values, np.zeros(len(values)), 0.0)
+                found[key][place] = plant.read(_QUIET)[0]
+        return found
+
+    def _begin(self) -> None:
+        plants = {key: self._plant._replace(mount=seated_mount(mount)) for key, (_, mount) in MOUNTS.items()}
+        self._mounts = {
+            key: PlantSimulation(plant, Seat.ACCELERATED_CHASSIS, STEP_TIME) for key, plant in plants.items()
+        }
+        self._last: tuple[int, float] | None = None
+        self._mean = 0.0
+
+    def _excitation(self, stamp: int, acceleration: float) -> NDArray[np.float64]:
+        """Return the excitation from the last sample to this one, at the plant's steps."""
+        if self._last is None or not 0 < stamp - self._last[0] <= _LONGEST_PAUSE:
+            if self._last is not None:
+                self._begin()
+            self._last, self._mean = (stamp, 0.0), acceleration
+            return np.zeros(self._steps)
+        before, last = self._last
+        self._mean += self._period / _AVERAGED * (acceleration - self._mean)
+        now = acceleration - self._mean
+        steps = self._steps * max(1, round((stamp - before) / self._period))
+        self._last = stamp, now
+        return last + (now - last) * np.arange(1, steps + 1) / steps

@@ -1,0 +1,138 @@
+"""Where messages come from: a running graph (`running_graph.py`), or a recording by the clock."""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from engine_mount.recordings.place import open_run
+from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
+
+_PERIOD = 0.01  # s, chosen
+_LOWEST_RATE, _HIGHEST_RATE = 0.01, 1000.0
+
+
+class FeedError(ValueError):
+    """There is nothing to look at; the text says why and what would help."""
+
+
+class Message(NamedTuple):
+    """A serialised message of a topic of the registry; times in ns: when it arrived, when it was sent."""
+
+    topic: Topic
+    raw: bytes
+    received: int
+    sent: int
+
+
+Receive = Callable[[Message], None]
+Fail = Callable[[str], None]
+"""Takes the sentence on the exception that has ended a feed."""
+
+
+class Feed(Protocol):
+    """The messages of the topics of one mount, {name with namespace: topic}, in the order of arrival."""
+
+    topics: Mapping[str, Topic]
+    title: str
+
+    def start(self, receive: Receive, on_failure: Fail) -> None:
+        """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
+
+    def stop(self) -> None:
+        """Return when no message comes any more; safe to call twice."""
+
+    def mark(self) -> str:
+        """Ask the recorder of the graph to mark this moment; return its answer."""
+
+
+class RecordedFeed:
+    """A recording of one mount, from `begin` (s) on, `rate` times as fast as it was recorded."""
+
+    def __init__(self, path: Path, rate: float = 1.0, begin: float = 0.0, namespace: str = ''):
+        """Raises `FeedError`, or `ReadingError` for what is no recording."""
+        if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
+            raise FeedError(f'--rate ({rate:g}) must lie within {_LOWEST_RATE:g} .. {_HIGHEST_RATE:g}')
+        recording = open_run(path)
+        self.topics: Mapping[str, Topic] = _topics_of(recording.topics, namespace, path)
+        self.title = f'{recording.short_name} at {rate:g} x'
+        recording.load(self.topics)
+        self._series = [(topic, recording[name]) for name, topic in self.topics.items()]
+        times = [series.receive_times for _, series in self._series]
+        arrivals = np.concatenate(times)
+        order = np.argsort(arrivals, kind='stable')
+        self._arrivals = arrivals[order]
+        self._owners = np.repeat(np.arange(len(times)), [*map(len, times)])[order]
+        self._places = np.concatenate([np.arange(len(each)) for each in times])[order]
+        if not len(order):
+            raise FeedError(f'{path} holds no message of the topics of a mount')
+        self._seconds = (self._arrivals - self._arrivals[0]) * 1e-9
+        if not 0.0 <= begin <= self._seconds[-1]:
+            raise FeedError(f'--from ({begin:g} s) must lie within 0 .. {self._seconds[-1]:.3f} s')
+        self._rate, self._begin = rate, begin
+        self._ending = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __len__(self) -> int:
+        return len(self._arrivals)
+
+    def message(self, number: int) -> Message:
+        """Return a message by its place in the order of arrival."""
+        topic, series = self._series[self._owners[number]]
+        place = int(self._places[number])
+        received, sent = int(self._arrivals[number]), int(series.publish_times[place])
+        return Message(topic, series.payloads[place], received, sent)
+
+    def start(self, receive: Receive, on_failure: Fail) -> None:
+        """Give out what was latched before the beginning, then play."""
+
+        def serve() -> None:
+            try:
+                self._play(receive)
+            except Exception as error:
+                # The border of the thread: without a sentence the recording would seem to be over.
+                on_failure(f'{self.title} was not played to its end: {type(error).__name__}: {error}')
+
+        self._thread = threading.Thread(target=serve, name='recorded', daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; safe to call twice."""
+        self._ending.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def mark(self) -> str:
+        """Say that a recording cannot be marked from here."""
+        return 'no mark was set: this is a recording'
+
+    def _play(self, receive: Receive) -> None:
+        due = int(np.searchsorted(self._seconds, self._begin))
+        for owner, (topic, _) in enumerate(self._series):
+            before = np.flatnonzero(self._owners[:due] == owner)
+            if topic.rate == 0.0 and before.size:
+                receive(self.message(int(before[-1])))
+        started = time.monotonic()
+        while due < len(self) and not self._ending.wait(_PERIOD):
+            position = self._begin + self._rate * (time.monotonic() - started)
+            end = int(np.searchsorted(self._seconds, position, side='right'))
+            while due < end and not self._ending.is_set():
+                receive(self.message(due))
+                due += 1
+
+
+def _topics_of(recorded: Mapping[str, object], namespace: str, path: Path) -> dict[str, Topic]:
+    """Return the topics of one mount; raises `FeedError` where several mounts were recorded."""
+    ending = f'/{DISPLACEMENT.name}'
+    spaces = sorted(name.removesuffix(ending) for name in recorded if name.endswith(ending))
+    space = f'/{namespace.strip("/")}' if namespace.strip('/') else ''
+    if not namespace and len(spaces) == 1:
+        space = spaces[0]
+    if spaces and space not in spaces:
+        named = ', '.join(name.lstrip('/') or '/' for name in spaces)
+        raise FeedError(f'{path} holds the mounts {named}: choose one with --namespace')
+    names = {topic.name if topic.name.startswith('/') else f'{space}/{topic.name}': topic for topic in TOPICS}
+    return {name: topic for name, topic in names.items() if name in recorded}

@@ -1,0 +1,254 @@
+"""The picture of a graph: takes messages from a feed, and once an interval makes of them what viewers get."""
+
+import contextlib
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_mount.recordings.layout import LayoutError
+from engine_mount.recordings.mcap_records import HEAD
+from engine_mount.recordings.series import Payloads, Series, SeriesError
+from engine_mount.reports.drawing.chart import Chart, Curve, Panel, level_lines
+from engine_mount.reports.drawing.detail import browser_chart
+from engine_mount.reports.drawing.style import COLOUR_OF
+from engine_mount.reports.drive.evaluation import levels_of
+from engine_mount.settings.chosen import policy_of
+from engine_mount.view.alternatives import MOUNTS, Alternatives
+from engine_mount.view.feed import Feed, Message
+from engine_mount.view.state import GraphState
+from mount_ros.topics import (
+    COIL_RIPPLE,
+    CONTROL_TRACE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    SIM_CHASSIS_ACCELERATION,
+    Topic,
+)
+
+WINDOW = 60.0  # s: kept for who comes later
+INTERVALS_PER_SECOND = 30
+_HIGHEST_STATE_RATE = 100.0  # Hz: above it a topic is a trace, not a state
+
+Array = NDArray[np.float64]
+Extent = tuple[float, float]
+"""The least and the highest value within an interval."""
+
+
+class Trace(NamedTuple):
+    """One line of a panel; `factor` turns the SI value of a column into the unit of the panel."""
+
+    key: str
+    label: str
+    panel: str
+    topic: Topic = DISPLACEMENT
+    column: str = ''
+    factor: float = 1.0
+
+
+class Interval(NamedTuple):
+    """One interval of the picture: number, time of its last sample (s), {key: extent in the shown unit}."""
+
+    number: int
+    time: float
+    extents: dict[str, Extent]
+
+    def as_json(self) -> list[Any]:
+        """Return it with the digits that a picture shows."""
+        extents = {key: [float(f'{value:.5g}') for value in pair] for key, pair in self.extents.items()}
+        return [self.number, round(self.time, 4), extents]
+
+
+TRACES = (
+    Trace('displacement', 'this mount', 'displacement', DISPLACEMENT, 'mount', 1e3),
+    Trace('damping', 'damping', 'damping', CONTROL_TRACE, 'damping_active'),
+    Trace('setpoint', 'setpoint', 'current', CURRENT_SETPOINT, 'coil_current'),
+    Trace('current', 'measured', 'current', COIL_RIPPLE, 'coil_current'),
+    Trace('desired_force', 'wanted', 'friction force', CONTROL_TRACE, 'desired_force'),
+)
+_LATENCY = Trace('latency', 'sample to setpoint', 'latency')
+PANELS: dict[str, tuple[str, float, tuple[float, ...]]] = {
+    'displacement': ('mm', 1.2, ()),
+    'damping': ('', 0.4, (0.0, 1.0)),
+    'current': ('A', 0.7, (0.0,)),
+    'friction force': ('N', 0.7, ()),
+    'latency': ('ms', 0.5, (0.0,)),
+}
+"""{panel: (unit, share of the height, values that are always shown)}."""
+
+
+class Model:
+    """What is known of the graph that a feed shows; `listen` gets each new interval.
+
+    An exception in its thread or in that of the feed ends the view: `failure` says which, and `on_failure` is
+    called there.
+    """
+
+    def __init__(self, feed: Feed, *, beside: bool = True, on_failure: Callable[[], None] = lambda: None):
+        self.failure = ''
+        self.zero: int | None = None
+        """The stamp (ns) at which time begins."""
+        space = next((name for name, topic in feed.topics.items() if topic is DISPLACEMENT), '/displacement')
+        self.state = GraphState(namespace=space.removesuffix(f'/{DISPLACEMENT.name}'))
+        self.intervals: deque[Interval] = deque(maxlen=round(WINDOW * INTERVALS_PER_SECOND))
+        self.alternatives: Alternatives | None = None
+        self._beside = beside
+        self._on_failure = on_failure
+        self._lock = threading.Lock()
+        self._arrived: list[Message] = []
+        self._made_with = ''
+        self._time, self._number, self._newest = 0.0, 0, 0  # s, intervals, ns of arrival
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name='view', daemon=True)
+        self._listeners: list[Callable[[Interval], None]] = []
+        if beside:
+            Alternatives({}).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
+
+    def take(self, message: Message) -> None:
+        """Take a message; cheap, from any thread."""
+        with self._lock:
+            self._arrived.append(message)
+
+    def listen(self, listener: Callable[[Interval], None]) -> None:
+        """Call `listener` with each interval from now on, from the thread of the model."""
+        self._listeners.append(listener)
+
+    def start(self) -> None:
+        """Begin to make intervals."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Return when no interval is made any more."""
+        self._ending.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def fail(self, reason: str) -> None:
+        """End the view: without a sentence the last picture would pass for the present one."""
+        self.failure = self.failure or f'the view has ended: {reason}'
+        self._on_failure()
+
+    @property
+    def traces(self) -> list[Trace]:
+        """All lines in the order of their panels."""
+        beside = [Trace(f'beside.{key}', label, 'displacement') for key, (label, _) in MOUNTS.items()]
+        return [TRACES[0], *(beside if self.alternatives is not None else []), *TRACES[1:], _LATENCY]
+
+    def chart(self) -> dict[str, Any]:
+        """Return the panels for the page's script; `keys` are those of the curves in an interval."""
+        panels, keys = [], []
+        for name, (unit, share, least) in PANELS.items():
+            traces = [trace for trace in self.traces if trace.panel == name]
+            curves = [
+                Curve(
+                    trace.label,
+                    np.empty(0),
+                    np.empty(0),
+                    COLOUR_OF[trace.key.removeprefix('beside.')],
+                    width=1.0 if trace.key.startswith('beside.') else 1.5,
+                )
+                for trace in traces
+            ]
+            levels = level_lines(self._levels()) if name == 'displacement' else ()
+            label = f'{name} ({unit})' if unit else name
+            panels.append(Panel(label, curves, levels=levels, share=share, least=least))
+            keys.append([trace.key for trace in traces])
+        chart = browser_chart(Chart('view', 'view', 'time (s)', panels))
+        panels_json = [{**panel, 'keys': names} for panel, names in zip(chart['panels'], keys, strict=True)]
+        return {**chart, 'panels': panels_json}
+
+    def state_json(self) -> dict[str, Any]:
+        """Return the state of the graph: nodes, gap, coil, losses, events."""
+        return self.state.as_json(self._newest, self.zero)
+
+    def interval(self, messages: list[Message]) -> Interval:
+        """Make an interval of what has arrived since the last one."""
+        by_topic: dict[Topic, list[Message]] = {}
+        for message in messages:
+            by_topic.setdefault(message.topic, []).append(message)
+            if message.topic.rate <= _HIGHEST_STATE_RATE:
+                with contextlib.suppress(LayoutError, RuntimeError):  # of bytes that are no such message
+                    self.state.take(message)
+            self._newest = message.received
+        series = {topic: _series(topic, found) for topic, found in by_topic.items()}
+        found = {trace.key: _column(series, trace.topic, trace.column) * trace.factor for trace in TRACES}
+        found[_LATENCY.key] = 1e3 * _latencies(series)
+        found |= {f'beside.{key}': 1e3 * moved for key, moved in self._moved_beside(series).items()}
+        if DISPLACEMENT in series and (stamps := series[DISPLACEMENT].stamps).size:
+            self.zero = int(stamps[0]) if self.zero is None else self.zero
+            self._time = (int(stamps[-1]) - self.zero) * 1e-9
+        self._number += 1
+        known = {key: values[np.isfinite(values)] for key, values in found.items()}
+        extents = {key: (float(v.min()), float(v.max())) for key, v in known.items() if v.size}
+        self.intervals.append(Interval(self._number, self._time, extents))
+        return self.intervals[-1]
+
+    def _levels(self) -> Mapping[str, float]:
+        try:
+            return levels_of(*policy_of(self.state.parameters))
+        except ValueError:
+            return {}
+
+    def _serve(self) -> None:
+        try:
+            due = time.monotonic()
+            while not self._ending.is_set():
+                due += 1.0 / INTERVALS_PER_SECOND
+                self._ending.wait(max(0.0, due - time.monotonic()))
+                with self._lock:
+                    messages, self._arrived = self._arrived, []
+                interval = self.interval(messages)
+                for listener in self._listeners:
+                    listener(interval)
+        except Exception as error:
+            self.fail(f'{type(error).__name__}: {error}')
+
+    def _moved_beside(self, series: Mapping[Topic, Series]) -> Mapping[str, Array]:
+        """Return displacements (m) of the alternatives, made anew where the parameters are others."""
+        if not self._beside or SIM_CHASSIS_ACCELERATION not in series:
+            return {}
+        if self.alternatives is None or self._made_with != repr(self.state.parameters):
+            self._made_with = repr(self.state.parameters)
+            try:
+                self.alternatives = Alternatives(self.state.parameters)
+            except ValueError:  # parameters of another version
+                self._beside, self.alternatives = False, None
+                return {}
+        accelerations = _column(series, SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
+        stamps = series[SIM_CHASSIS_ACCELERATION].stamps
+        if len(stamps) != len(accelerations):
+            return {}
+        return self.alternatives.advance(stamps.tolist(), accelerations)
+
+
+def _series(topic: Topic, messages: Iterable[Message]) -> Series:
+    raw = [message.raw for message in messages]
+    piece: NDArray[np.uint8] | list[bytes] = raw
+    if len({*map(len, raw)}) == 1:
+        piece = np.frombuffer(b''.join(raw), np.uint8).reshape(len(raw), -1)
+    heads = np.zeros(len(raw), HEAD)
+    heads['log_time'] = [message.received for message in messages]
+    heads['publish_time'] = [message.sent for message in messages]
+    return Series(topic.name, topic.type, (Payloads([piece]), heads))
+
+
+def _column(series: Mapping[Topic, Series], topic: Topic, name: str) -> Array:
+    """Return a column in SI, empty where the topic has no message or its messages lack it."""
+    try:
+        return np.asarray(series[topic][name], float)
+    except (KeyError, SeriesError, ValueError):
+        return np.empty(0)
+
+
+def _latencies(series: Mapping[Topic, Series]) -> Array:
+    """Return the times (s) from when a sample was published to when its answer was."""
+    try:
+        samples, answers = series[DISPLACEMENT], series[CURRENT_SETPOINT]
+        _, first, second = np.intersect1d(samples.stamps, answers.stamps, return_indices=True)
+    except (KeyError, SeriesError, ValueError):
+        return np.empty(0)
+    return np.asarray((answers.publish_times[second] - samples.publish_times[first]) * 1e-9)

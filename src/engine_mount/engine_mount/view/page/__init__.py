@@ -1,1 +1,0 @@
-"""The page: what serves it, and its three files."""

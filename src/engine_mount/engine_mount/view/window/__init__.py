@@ -1,1 +1,0 @@
-"""What is shown: traces cut into short intervals, and the state of the graph."""

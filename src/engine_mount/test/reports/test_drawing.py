@@ -1,0 +1,84 @@
+"""How charts become drawings: in a picture, and in the numbers that a page holds."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine_mount.reports.drawing.chart import Chart, Curve, Dots, Level, Panel, Span
+from engine_mount.reports.drawing.detail import budget_of, even_numbers
+from engine_mount.reports.drawing.page import page
+from engine_mount.reports.drawing.picture import draw_chart
+from engine_mount.reports.sections.section import Section
+
+
+def chart_of(*lengths: int) -> Chart:
+    curves = [Curve('y', np.arange(float(length)), np.arange(float(length))) for length in lengths]
+    return Chart('c', '</title>', '</script>', [Panel('y (N)', curves)])
+
+
+def read_back(even: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest values as the page's script decodes them."""
+    raw = np.frombuffer(base64.b64decode(even['values']), '<i2').astype(float)
+    values = np.where(raw == -32768, np.nan, even['low'] + even['size'] * (raw + 32767))
+    pairs = values.reshape(-1, 2) if even['pairs'] else np.stack([values, values], 1)
+    return pairs[:, 0], pairs[:, 1]
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(3001, 20_000), st.integers(3000, 30_000), st.booleans(), st.integers(0, 2**31))
+def test_a_long_curve_is_told_briefly_and_hides_no_extreme(count, budget, jitter, seed):
+    rng = np.random.default_rng(seed)
+    kept = np.flatnonzero(rng.random(count) > 0.01)
+    x, y = kept * 1e-3, rng.normal(size=len(kept))
+    if jitter:
+        x = x + rng.uniform(-3e-4, 3e-4, len(kept))
+    y[rng.random(len(kept)) < 0.02] = np.nan
+    even = even_numbers(x, y, budget)
+    low, high = read_back(even)
+    assert len(low) * (2 if even['pairs'] else 1) <= budget + 2
+    assert even['begin'] + even['step'] * len(low) >= x[-1] - 1e-9
+    assert np.nanmax(high) == pytest.approx(np.nanmax(y), abs=2 * even['size'])
+    assert np.nanmin(low) == pytest.approx(np.nanmin(y), abs=2 * even['size'])
+    if not even['pairs']:
+        places = np.round((x - x[0]) / even['step']).astype(int)
+        np.testing.assert_allclose(low[places], y, atol=even['size'])
+        assert np.isnan(np.delete(low, places)).all()
+    known = np.isfinite(y)
+    group = ((x - x[0]) / even['step'] + (1e-9 if even['pairs'] else 0.5)).astype(int)
+    assert (low[group[known]] <= y[known] + even['size']).all()
+    assert (high[group[known]] >= y[known] - even['size']).all()
+
+
+def test_the_numbers_of_a_page_are_shared_by_its_long_curves():
+    assert budget_of([chart_of(10)], 100_000) == 100_000
+    assert budget_of([chart_of(10), chart_of(200_000, 300_000)], 100_000) == 50_000
+
+
+@pytest.mark.parametrize(
+    ('views', 'width'), [(None, 1000), ({'': None, 'where it is highest': (4.0, 5.0)}, 1200)]
+)
+def test_a_picture_of_long_curves_dots_and_levels_has_its_width(views, width, tmp_path):
+    x = np.arange(20_000.0)
+    y = np.where(x == 7777.0, 50.0, np.sin(x))
+    dots = Dots('largest', x[:1], y[:1])
+    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y, steps=True)], [dots], [Level('on', 0.5)])
+    chart = Chart('c', 'c', 'x (s)', [panel, Panel('z (N)', [Curve('z', y, x)])], [Span(1.0, 2.0)], 'on')
+    draw_chart(chart, tmp_path / 'x.png', views=views)
+    raw = (tmp_path / 'x.png').read_bytes()
+    assert raw.startswith(b'\x89PNG')
+    assert int.from_bytes(raw[16:20], 'big') == width
+
+
+def test_a_curve_whose_numbers_do_not_fit_together_is_refused():
+    with pytest.raises(ValueError, match='3 x but 2 y'):
+        Curve('y', np.arange(3.0), np.arange(2.0))
+
+
+def test_no_text_in_a_chart_ends_the_script_that_holds_it():
+    text = page('t', [Section('c', 'C', chart=chart_of(10))])
+    block = text.split('<script type="application/json">')[1].split('</script>')[0]
+    assert json.loads(block)['x_label'] == '</script>'
