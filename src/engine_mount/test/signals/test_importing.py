@@ -59,7 +59,8 @@ def test_the_session_tells_where_it_came_from(tmp_path):
     mapping = tmp_path / 'rack_2.yaml'
     mapping.write_text(
         'system: rack 2\ntime: {column: t, unit: s}\n'
-        'columns: {displacement: {column: x, unit: mm, offset: 0.0}}\nothers: {valve: {column: p, unit: bar}}\n'
+        'columns: {displacement: {column: x, unit: mm, offset: 0.0}}\n'
+        'others: {valve: {column: p, unit: bar}}\n'
     )
     imported(tmp_path, file, mapping=mapping)
     recording = open_recording(tmp_path / 'out')
