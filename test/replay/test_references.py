@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_differences import differences_from_reference
 
 from engine_mount.drives.inputs.consumed_samples import Notes
 from engine_mount.drives.inputs.input import recorded_parameters
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.recording import open_recording
-from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
+from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL
 from engine_mount.recordings.session import (
     recorded_session,
     session_content,
