@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command import done, refused
+from foreign_files import MAKERS
 
 TIMES = np.arange(1000) / 200.0
 TRAVEL = 0.8 * np.sin(2.0 * np.pi * 8.0 * TIMES)  # mm
@@ -170,3 +171,26 @@ def test_a_gap_is_no_reason_to_refuse_an_import(tmp_path):
     assert 'a gap of 0.405 s at 1.995 s' in printed
     assert (tmp_path / 'made_1').is_dir()
     assert (tmp_path / 'made_2').is_dir()
+
+
+def test_a_decimal_sign_that_no_line_tells_is_said_by_option_or_mapping_file(tmp_path):
+    lines = ['gap [um];current [A];force [N]']
+    for gap in range(280, 541, 20):
+        for current in np.linspace(0.1, 2.5, 9):
+            pull = 80.0 * (current / 2.5) ** 2 * (280.0 / gap) ** 2
+            lines.append(f'{gap + 0.125 * (gap < 540):.6g};{current:.6f};{pull:.6f}'.replace('.', ','))
+    path = tmp_path / 'force.csv'
+    path.write_text('\n'.join(lines) + '\n')
+    sentence = refused('calibrate', 'actuator', path)
+    assert 'may be 280.125 or 280125; state it with --decimal' in sentence
+    told = done('calibrate', 'actuator', path, '--decimal', ',')
+    assert '126 points' in told
+    (tmp_path / 'rack.yaml').write_text('decimal: ","\n')
+    assert done('calibrate', 'actuator', path, '--map-file', tmp_path / 'rack.yaml') == told
+
+
+def test_frames_without_their_database_are_refused_by_every_command(tmp_path):
+    made = MAKERS['asc'](tmp_path, 'rack', TIMES, {'travel': ('mm', TRAVEL)})
+    for command in (('identify', 'friction', '--train'), ('calibrate', 'actuator')):
+        sentence = refused(*command, made.path)
+        assert 'rack.asc holds CAN frames; name the database that decodes them with --dbc' in sentence

@@ -169,7 +169,7 @@ def one_missing(table):
     [
         (
             {'force_n': None},
-            'has no column for force (its columns: gap [um], current_a); name it as in --column force=',
+            'has no column for force (its columns: gap [um], current_a',
         ),
         ({'force_n': in_kilonewton}, 'it could be kN, daN, kip, kgf: write --column force=force_n:kN'),
         ({'gap_um': lambda t: t['gap_um'] / 1e3}, 'it could be mm: write --column gap=gap:mm'),

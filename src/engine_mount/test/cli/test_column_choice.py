@@ -113,21 +113,6 @@ def test_a_unit_beside_it_makes_a_scale_a_calibration(rig, read, quantity, facto
         assert read(file, path) == pytest.approx(0.98 * values, rel=1e-9, abs=1e-9 * np.abs(values).max())
 
 
-def write_german_csv(file, columns):
-    lines = [';'.join(columns)]
-    lines += [
-        ';'.join(f'{value:.15g}'.replace('.', ',') for value in row)
-        for row in zip(*columns.values(), strict=True)
-    ]
-    file.write_text('\n'.join(lines) + '\n')
-
-
-def write_mat(file, columns):
-    from scipy.io import savemat
-
-    savemat(file, columns)
-
-
 def write_mdf(file, columns):
     from asammdf import MDF, Signal
 
@@ -139,7 +124,7 @@ def write_mdf(file, columns):
         written.save(file)
 
 
-FORMATS = [('csv', write_csv), ('txt', write_german_csv), ('mat', write_mat), ('mf4', write_mdf)]
+FORMATS = [('csv', write_csv), ('mf4', write_mdf)]
 MOTION = {'Zeit': 1e3 * TIME, 'way': WAY / INCH, 'cell': FORCE / POUND, 'load': LOAD / POUND / 1e3}
 MOTION_SAID = ['time=Zeit:ms', 'displacement=way:in', 'friction_force=cell:lbf', 'normal_force=load:kip']
 GAP, CURRENT = (grid.ravel() for grid in np.meshgrid(np.linspace(300, 500, 6), np.linspace(0.2, 3.0, 9)))
@@ -171,7 +156,7 @@ def test_titles_of_rigs_and_racks_tell_quantity_and_unit(tmp_path):
         'friction_force (kip)': FORCE / POUND / 1e3,
         'normal_force_n': LOAD,
     }
-    write_german_csv(tmp_path / 'rig.csv', titled)
+    write_csv(tmp_path / 'rig.csv', titled)
     found = read_recording(tmp_path / 'rig.csv')
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
@@ -195,8 +180,8 @@ def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs_and_racks(tmp_
         'time: {column: Zeit, unit: ms}\ncolumns:\n  displacement: {column: way, unit: in, offset: mean}\n'
         '  force: {column: cell, unit: lbf, scale: -1}\n  normal_force: {column: load, unit: kip}\n'
     )
-    write_mat(tmp_path / 'rig.mat', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
-    found = read_recording(tmp_path / 'rig.mat', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
+    write_csv(tmp_path / 'rig.csv', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
+    found = read_recording(tmp_path / 'rig.csv', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
     (tmp_path / 'rack.yaml').write_text(

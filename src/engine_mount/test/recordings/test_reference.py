@@ -5,6 +5,7 @@ import pytest
 import yaml
 from compared_drives import START, answers, text, write_answers
 from recorded_drive import joint_state
+from reference_differences import differences_from_reference
 
 import engine_mount
 from engine_mount.recordings import reference as reference_module
@@ -12,7 +13,6 @@ from engine_mount.recordings.reference import (
     ACCEPTED_NAME,
     AcceptError,
     accept,
-    differences_from_reference,
 )
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.force_table import table_message

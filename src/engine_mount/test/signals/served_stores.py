@@ -115,18 +115,18 @@ def know_host(home, port, key='host'):
 
 
 class HttpStore:
-    """A server of the files in `folder`: with stretches of them or only whole ones, with sizes or without.
+    """A server of the files in `folder`, with sizes or without.
 
     `asked` counts the requests by method; answers to GET wait for `gate`.
     """
 
-    def __init__(self, folder, *, stretches=True, sizes=True):
+    def __init__(self, folder, *, sizes=True):
         self.asked = collections.Counter()
         self.gate = threading.Event()
         self.gate.set()
         self.status = 0
         handler = functools.partial(_Handler, self, str(folder))
-        self.stretches, self.sizes = stretches, sizes
+        self.sizes = sizes
         self._server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), handler)
         self.port = self._server.server_address[1]
         self.uri = f'http://127.0.0.1:{self.port}'
@@ -160,23 +160,10 @@ class _Handler(http.server.SimpleHTTPRequestHandler):
     def do_GET(self):
         self._store.asked['GET'] += 1
         self._store.gate.wait()
-        wanted = self.headers.get('Range')
         if self._store.status:
             self.send_error(self._store.status)
-        elif wanted and self._store.stretches:
-            self._send_stretch(wanted)
         else:
             super().do_GET()
-
-    def _send_stretch(self, wanted):
-        data = Path(self.translate_path(self.path)).read_bytes()
-        begin, _, last = wanted.removeprefix('bytes=').partition('-')
-        part = data[int(begin) : int(last) + 1 if last else None]
-        self.send_response(206)
-        self.send_header('Content-Length', str(len(part)))
-        self.send_header('Content-Range', f'bytes {begin}-{int(begin) + len(part) - 1}/{len(data)}')
-        self.end_headers()
-        self.wfile.write(part)
 
     def send_header(self, keyword, value):
         if keyword == 'Content-Length' and not self._store.sizes:

@@ -112,8 +112,7 @@ def info(
             ('SHA-256', origin.sha256),
         ]
         tables, notes = [columns_table(columns)], measured.notes
-        columns_json = [one.as_json() for one in columns]
-        figures = {'provenance': asdict(origin), 'columns': columns_json, 'notes': notes}
+        figures = {'provenance': asdict(origin), 'columns': columns, 'notes': notes}
     else:
         opened = open_run(place)
         with console.status('reading'):

@@ -17,11 +17,6 @@ UNITS = {
     'geometry_msgs/msg/AccelStamped': {'accel.linear.': 'm/s^2', 'accel.angular.': 'rad/s^2'},
     'geometry_msgs/msg/TwistStamped': {'twist.linear.': 'm/s', 'twist.angular.': 'rad/s'},
     'geometry_msgs/msg/WrenchStamped': {'wrench.force.': 'N', 'wrench.torque.': 'N m'},
-    'geometry_msgs/msg/PointStamped': {'point.': 'm'},
-    'sensor_msgs/msg/Range': {'range': 'm'},
-    'sensor_msgs/msg/Temperature': {'temperature': 'degC'},
-    'sensor_msgs/msg/FluidPressure': {'fluid_pressure': 'Pa'},
-    'sensor_msgs/msg/MagneticField': {'magnetic_field.': 'T'},
 }
 """Units by beginnings of paths, as the definitions of common_interfaces (Jazzy) and REP 103 say."""
 

@@ -85,11 +85,12 @@ class Content:
         """Return the chosen columns in this order; raises `SignalError`."""
         with readable(self.path, self.format):
             self.prepare([heading.number for heading in chosen])
-            return [self._column(heading, self.leaves[heading.number]) for heading in chosen]
-
-    def _column(self, heading: Heading, leaf: Leaf) -> MeasuredColumn:
-        assert leaf.read is not None
-        return heading.measured(_as_numbers(leaf.read()), leaf.clock() if leaf.clock else None)
+            leaves = [(one, self.leaves[one.number]) for one in chosen]
+            return [
+                one.measured(_as_numbers(leaf.read()), leaf.clock() if leaf.clock else None)
+                for one, leaf in leaves
+                if leaf.read is not None
+            ]
 
 
 def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:

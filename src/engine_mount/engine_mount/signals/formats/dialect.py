@@ -18,7 +18,7 @@ COMMENTS = ('#', '%', '//')
 _NAMES = {
     ';': 'semicolon', '\t': 'tab', ',': 'comma', '|': 'stroke', BLANK: 'blanks', ALONE: 'one column',
 }  # fmt: skip
-_STATED = {name: sign for sign, name in _NAMES.items()} | {'\\t': '\t', ' ': BLANK}
+_STATED = {'tab': '\t', '\\t': '\t', ' ': BLANK}
 _MOST = 2000  # lines that are looked at, chosen
 _ENOUGH = 0.5  # of the lines behind the first that fits, chosen: fewer are no table
 Lines = Sequence[tuple[int, str]]

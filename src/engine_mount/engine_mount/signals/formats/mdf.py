@@ -1,7 +1,7 @@
 """MDF files of measurement systems (versions 3 and 4): each channel on the time base of its own group."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -34,23 +34,23 @@ def open_mdf(path: Path, stated: Stated) -> Content:
         leaves = _leaves(file, path, notes)
         raw = any(channel.name == FRAME for group in file.groups for channel in group.channels)
         frames = frames_in_mdf(file, path, stated.dbc, notes) if raw and stated.dbc is not None else None
-    content = Content(path, f'MDF {file.version}', 'asammdf', leaves, notes)
+    reader, own, prepare = 'asammdf', len(leaves), None
     if frames is not None:
-        _add_frames(content, *frames.leaves(_begin(file)))
+        reader = 'asammdf, cantools'
+        decoded, prepare = frames.leaves(_begin(file))
+        leaves += decoded
     elif raw and not leaves:
         raise SignalError(
             f'{path} holds raw CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
         )
     elif raw:
         notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
-    return content
 
+    def decode(numbers: Sequence[int]) -> None:
+        if prepare is not None:
+            prepare([number - own for number in numbers if number >= own])
 
-def _add_frames(content: Content, leaves: list[Leaf], prepare: Callable[[Sequence[int]], None]) -> None:
-    first = len(content.leaves)
-    content.leaves = [*content.leaves, *leaves]
-    content.prepare = lambda numbers: prepare([number - first for number in numbers if number >= first])
-    content.reader = 'asammdf, cantools'
+    return Content(path, f'MDF {file.version}', reader, leaves, notes, decode)
 
 
 def _leaves(file: Any, path: Path, notes: list[str]) -> list[Leaf]:

@@ -29,7 +29,6 @@ _LONGEST = 1 << 24  # letters, chosen: a line of samples is far shorter
 _GAPS = re.compile(r'\t+|\s{2,}')
 _NO_SAMPLES = re.compile(r'^[ \t]*(?:(?:#|%|//)[^\n]*)?$', re.MULTILINE)
 _RUNS, _ENDS = re.compile(r'[ \t]+'), re.compile(r'^\t|\t$', re.MULTILINE)
-_KINDS = {'number': 'float64', 'missing': 'float64', 'date': 'datetime64[ns]'}
 
 
 def open_text(path: Path, stated: Stated) -> Content:
@@ -57,20 +56,17 @@ def open_text(path: Path, stated: Stated) -> Content:
 
 
 def _codec(path: Path) -> str:
-    """Return UTF-8 or UTF-16 by its mark or its bytes, else Windows-1252; raises `SignalError`."""
+    """Return UTF-8 by its bytes or UTF-16 by its mark, else Windows-1252; raises `SignalError`."""
     with path.open('rb') as file:
         head = file.read(HEAD)
     if not head.strip():
         raise SignalError(f'{path} is empty; needed are lines of numbers')
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return 'utf-16'
-    zeros = [head[place::2].count(0) for place in (0, 1)]
-    for codec, place in (('utf-16-be', 0), ('utf-16-le', 1)):
-        if zeros[place] > 0.4 * len(head) / 2 and zeros[1 - place] == 0:
-            return codec
-    if any(zeros):
+    if 0 in head:
         raise SignalError(
-            f'{path} is no text: byte {head.index(0)} is 0; give a text table, or name the file by its format'
+            f'{path} is no text: byte {head.index(0)} is 0; give a text table in UTF-8, or name the file by '
+            'its format'
         )
     try:
         codecs.getincrementaldecoder('utf-8')().decode(head)
@@ -89,7 +85,7 @@ def _blocks(path: Path, codec: str, size: int) -> Iterator[str]:
 def _later(path: Path, codec: str) -> list[str]:
     """Return some lines of the middle and of the end of a long file."""
     size, lines = path.stat().st_size, list[str]()
-    if size > HEAD + 2 * _ELSEWHERE and not codec.startswith('utf-16'):
+    if size > HEAD + 2 * _ELSEWHERE and codec != 'utf-16':
         with path.open('rb') as file:
             for place in (size // 2, size - _ELSEWHERE):
                 file.seek(place)
@@ -184,15 +180,20 @@ def _read(
     """Return the columns at `places`; raises `SignalError` with line, column and cell."""
     if not places:
         return []
-    columns: list[list[NDArray[Any]]] = [[] for _ in places]
+    with path.open('rb') as file:
+        ends = sum(block.count(b'\n') + block.count(b'\r') for block in iter(partial(file.read, BLOCK), b''))
+    kinds = ['datetime64[ns]' if dialect.kinds[place] == 'date' else 'float64' for place in places]
+    columns = [np.empty(ends + 1, kind) for kind in kinds]  # what stays empty takes no memory
+    size = 0
     for number, block in _samples(path, codec, dialect, first):
         found = _in_bulk(block, dialect, places)
         found = found or _cell_by_cell(path, number, block, dialect, places, titles)
-        for parts, part in zip(columns, found, strict=True):
-            parts.append(part)
-    if not columns[0]:
+        for column, part in zip(columns, found, strict=True):
+            column[size : size + part.size] = part
+        size += found[0].size
+    if not size:
         raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [np.concatenate(columns.pop(0)) for _ in places]  # so no more than one is held twice
+    return [column[:size] for column in columns]
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:
@@ -274,10 +275,11 @@ def _cell_by_cell(
                 where = f'{path}, line {number}, column {titles[place]!r}'
                 raise SignalError(f'{where}: {_fault(cells[place], dialect, date)}') from None
         rows.append(row)
-    columns = zip(*rows, strict=True)
     return [
-        np.array(column, np.int64).view(kind) if kind.startswith('date') else np.array(column, kind)
-        for column, kind in zip(columns, (_KINDS[dialect.kinds[place]] for place in places), strict=True)
+        np.array(column, np.int64).view('datetime64[ns]')
+        if dialect.kinds[place] == 'date'
+        else np.array(column, np.float64)
+        for place, column in zip(places, zip(*rows, strict=True), strict=True)
     ]
 
 

@@ -207,6 +207,4 @@ def _node(file: Any, node: Any, notes: list[str], depth: int) -> Any:
         return ''.join(map(chr, np.asarray(node).reshape(-1)[:_MOST]))
     if node.dtype.kind == 'O' and node.dtype.metadata and 'ref' in node.dtype.metadata:
         return [_node(file, file[one], notes, depth + 1) for one in np.asarray(node).reshape(-1)[:_MOST]]
-    if node.dtype.kind == 'O' and not node.shape:
-        return node.asstr()[()]
     return _Turned(node) if kind and len(node.shape) == 2 else node

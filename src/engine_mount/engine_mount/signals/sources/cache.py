@@ -85,15 +85,11 @@ def _make_room(folder: Path, name: str, size: int) -> None:
             break
         used -= bytes_ * _remove(place)
     free = shutil.disk_usage(folder).free
-    if used + size > limit:
+    if used + size > limit or free < size + SPARE:
         raise SourceError(
             f'{name}: {_amount(size)} are needed in {folder}, which may hold {_amount(limit)} and has '
-            f'{_amount(used)} in use; {LIMIT_VARIABLE} sets the limit'
-        )
-    if free < size + SPARE:
-        raise SourceError(
-            f'{name}: {_amount(size)} are needed in {folder}, {_amount(free)} are free on its disk; make '
-            f'room, or choose another folder by {FOLDER_VARIABLE}'
+            f'{_amount(used)} in use, {_amount(free)} are free on its disk; make room, or choose another '
+            f'limit or folder by {LIMIT_VARIABLE} or {FOLDER_VARIABLE}'
         )
 
 

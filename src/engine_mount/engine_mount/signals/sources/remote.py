@@ -78,7 +78,7 @@ def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
         for file in files:
             target = folder / name / file.place
             target.parent.mkdir(parents=True, exist_ok=True)
-            _fetch(file.entry, target, partial(_add, progress, done, size))
+            _fetch(file.entry, target, done, size, progress)
             done += file.entry.size
         if _key(list_files(uri)) != key:
             raise SourceError(
@@ -88,10 +88,6 @@ def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
     key = _key(files)
     with cached_copy(key, name, size, fill) as path:
         yield path
-
-
-def _add(progress: Progress, done: int, size: int, came: int) -> None:
-    progress(done + came, size)
 
 
 def _key(files: Sequence[RemoteFile]) -> str:
@@ -127,8 +123,11 @@ def _entry(uri: str, info: dict[str, Any]) -> Entry:
     return Entry(uri, int(info['size']), nan, mark.strip('"'))
 
 
-def _fetch(entry: Entry, target: Path, progress: Callable[[int], None]) -> None:
-    """Write a file of a store to `target`; raises `SourceError`, and `OSError` of this disk."""
+def _fetch(entry: Entry, target: Path, done: int, size: int, progress: Progress) -> None:
+    """Write a file of a store to `target`, behind `done` of `size` bytes of its folder.
+
+    Raises `SourceError`, and `OSError` of this disk.
+    """
     from fsspec.callbacks import Callback
     from fsspec.spec import AbstractFileSystem
 
@@ -138,7 +137,8 @@ def _fetch(entry: Entry, target: Path, progress: Callable[[int], None]) -> None:
         get_file = (
             partial(AbstractFileSystem.get_file, files) if _kind(entry.uri) == 'ssh' else files.get_file
         )
-        get_file(path, str(target), callback=Callback(hooks={'bar': lambda size, value: progress(value)}))
+        hooks = {'bar': lambda total, value: progress(done + value, size)}
+        get_file(path, str(target), callback=Callback(hooks=hooks))
         if target.stat().st_size != entry.size:
             raise ConnectionError(f'{target.stat().st_size} bytes came instead of {entry.size}')
 

@@ -10,11 +10,8 @@ SCHEMES = ('file', 's3', 'sftp', 'ssh', 'gs', 'http', 'https', 'memory')
 """What can be fetched; `memory` holds what the same process put there, for tests."""
 _URI = re.compile(r'([a-zA-Z][a-zA-Z0-9+.-]*)://')
 _WITH_QUERY = ('http', 'https', 's3')  # elsewhere a question mark is a letter of a name
-_SECRETS = {  # names of query parameters, in small letters, that hold what permits reading
-    'access_token', 'api_key', 'apikey', 'awsaccesskeyid', 'key', 'password', 'secret', 'sig',
-    'signature', 'token', 'x-amz-credential', 'x-amz-security-token', 'x-amz-signature',
-    'x-goog-credential', 'x-goog-signature',
-}  # fmt: skip
+_SECRET = re.compile(r'(.*[-_])?((aws)?(api|access)?key(id)?|password|secret|sig|signature|token|credential)')
+"""Names of query parameters, in small letters, that hold what permits reading."""
 
 
 def is_uri(text: str) -> bool:
@@ -56,7 +53,7 @@ def checked(uri: str) -> str:
     """Return `uri`; raises `SourceError` where its scheme is unknown or it holds a secret."""
     parts = urlsplit(uri)
     query = parse_qsl(parts.query) if scheme_of(uri) in _WITH_QUERY else []
-    secrets = [f'what permits reading ({name})' for name, _ in query if name.lower() in _SECRETS]
+    secrets = [f'what permits reading ({name})' for name, _ in query if _SECRET.fullmatch(name.lower())]
     if parts.password is not None:
         secrets.append('a password')
     if secrets:

@@ -4,12 +4,14 @@ import math
 
 import pytest
 
-from engine_mount.fleet.columns import COUNT, NUMBER, TEXT, Column, schema_of, table_of, write_table
+from engine_mount.fleet.motion import BANDS
+from engine_mount.fleet.tables import COLUMNS as DECLARED
+from engine_mount.fleet.tables import Column, schema_of, table_of, write_table
 
 COLUMNS = (
-    Column('recording', TEXT, '', 'URI of the recording'),
-    Column('peak', NUMBER, 'm', 'largest displacement'),
-    Column('events', COUNT, '', 'how many there are'),
+    Column('recording', 'string', '', 'URI of the recording'),
+    Column('peak', 'double', 'm', 'largest displacement'),
+    Column('events', 'int64', '', 'how many there are'),
 )
 
 
@@ -36,3 +38,22 @@ def test_unit_and_meaning_are_read_back_and_the_bytes_are_the_same_each_time(tmp
     assert read.equals(schema_of(COLUMNS), check_metadata=True)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert sorted(tmp_path.iterdir()) == files
+
+
+def test_what_has_a_unit_in_its_name_has_the_same_in_its_metadata():
+    assert {f'rms_{low:g}_{high:g}_hz_m' for low, high in BANDS} < {
+        name for name, *_ in DECLARED['recordings']
+    }
+    units = {
+        '_m': 'm',
+        '_s': 's',
+        '_a': 'A',
+        '_j': 'J',
+        '_n': 'N',
+        '_degc': 'degC',
+        '_bytes': 'B',
+        '_ns': 'ns',
+    }
+    for name, _, unit, meaning in (column for columns in DECLARED.values() for column in columns):
+        assert unit == units.get(name[name.rfind('_') :], ''), name
+        assert meaning
