@@ -12,12 +12,11 @@ from engine_mount.identification.friction.coefficients import VARIANTS, fit_coef
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.ladder import Rung, fit_ladder, law_error
 from engine_mount.identification.friction.look import subtract_zero
-from engine_mount.identification.friction.pad_law import all_laws
+from engine_mount.identification.friction.pad_law import all_laws, pooled_error, validate
 from engine_mount.identification.friction.ramp_hold import fit_ramp_hold, mean_contact
 from engine_mount.identification.friction.recording import FrictionRecording
 from engine_mount.identification.friction.result import FrictionIdentification, Pair
 from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
-from engine_mount.identification.friction.validation import pooled_error, validate
 from engine_mount.recordings.place import recording_hash
 from engine_mount.signals.mapping import Mapping
 from mount_models.specimen import Specimen, friction_contact

@@ -52,16 +52,10 @@ class RampResponse(NamedTuple):
     ramp_start: float
     ramp_time: float
 
-    @property
-    def joint_stiffness(self) -> float:
-        """c_xi, N/m."""
-        return self.machine_stiffness * (self.desired - self.asymptote) / self.asymptote
-
     def contact(self) -> FrictionContact:
         """Return the contact with this response."""
-        return contact_of_response(
-            self.joint_stiffness, self.machine_stiffness, self.kappa, self.time_constant
-        )
+        joint_stiffness = self.machine_stiffness * (self.desired - self.asymptote) / self.asymptote
+        return contact_of_response(joint_stiffness, self.machine_stiffness, self.kappa, self.time_constant)
 
     def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return (x, F, x_d) at `time` (s)."""

@@ -12,10 +12,10 @@ from engine_mount.identification.friction.cases import Case, explained, ladder_c
 from engine_mount.identification.friction.coefficients import CoefficientFit
 from engine_mount.identification.friction.ladder import Rung
 from engine_mount.identification.friction.look import FirstLook
+from engine_mount.identification.friction.pad_law import ModelValidation
 from engine_mount.identification.friction.ramp_hold import RampHoldFit, mean_contact
 from engine_mount.identification.friction.recording import FrictionRecording
 from engine_mount.identification.friction.sawtooth import StrokeLine
-from engine_mount.identification.friction.validation import ModelValidation
 from engine_mount.identification.specimen import rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
 from mount_models.friction.coefficient import FrictionCoefficients
