@@ -9,6 +9,7 @@ setup(
     package_data={
         'engine_mount.experiments': ['*.csv', '*.yaml', 'check/*.yaml'],
         'engine_mount.faults': ['faults.yaml'],
+        'engine_mount.fleet': ['*.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],
         'engine_mount.view': ['page/*'],
     },

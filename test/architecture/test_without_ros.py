@@ -11,7 +11,7 @@ import importlib.util, json, sys, time
 
 class Hidden:
     packages = {'rclpy', 'rpyutils', 'launch', 'ament_index_python', 'rcl_interfaces', 'lifecycle_msgs'}
-    packages |= {f'{kind}_msgs' for kind in ('std', 'sensor', 'geometry', 'diagnostic', 'builtin')} | {'std_srvs'}
+    packages |= {'std_msgs', 'sensor_msgs', 'geometry_msgs', 'diagnostic_msgs', 'std_srvs'}
 
     def find_spec(self, name, path=None, target=None):
         if name.partition('.')[0] in self.packages:

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 
 from generated import PAGES, table, written_by
 
-from engine_mount.fleet.catalogue.columns import EVENTS, RECORDINGS
-from engine_mount.fleet.columns import COUNT, FLAG, NUMBER, TEXT, TIME, Column
-from engine_mount.fleet.what_if.columns import REPLAY_COLUMNS
+from engine_mount.fleet.tables import COLUMNS, Column
 
 PAGE = PAGES / 'fleet_columns.md'
 
@@ -21,23 +19,23 @@ a replay, each a Parquet file of that name. {written_by(__file__)}
 How they are made and asked: [fleet](../how-to/fleet.md). What is unknown is null.
 """
 TYPES = {
-    TEXT: 'text',
-    NUMBER: 'number',
-    COUNT: 'whole number',
-    FLAG: 'true or false',
-    TIME: 'time, UTC',
+    'string': 'text',
+    'double': 'number',
+    'int64': 'whole number',
+    'bool': 'true or false',
+    'timestamp[us]': 'time, UTC',
 }
 
 
 def page() -> str:
     """Return the text of the page."""
     parts = [HEAD]
-    for name, of, columns in (
-        ('recordings', '`engine-mount fleet index`, a row for each mount of each recording', RECORDINGS),
-        ('events', '`engine-mount fleet index`, a row for each event', EVENTS),
-        ('result', '`engine-mount fleet replay`, a row for each mount of each recording', REPLAY_COLUMNS),
+    for name, of in (
+        ('recordings', '`engine-mount fleet index`, a row for each mount of each recording'),
+        ('events', '`engine-mount fleet index`, a row for each event'),
+        ('result', '`engine-mount fleet replay`, a row for each mount of each recording'),
     ):
-        parts += [f'## {name}', f'Made by {of}.', columns_table(columns)]
+        parts += [f'## {name}', f'Made by {of}.', columns_table(COLUMNS[name])]
     return '\n\n'.join(part.rstrip() for part in parts) + '\n'
 
 

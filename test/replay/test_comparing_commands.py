@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from reference_differences import differences_from_reference
 from typer.testing import CliRunner, Result
 
 import engine_mount
 from engine_mount.cli.command import app
-from engine_mount.recordings.reference import differences_from_reference
 
 DRIVE = (
     'drive',

@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from engine_mount import fleet
 from engine_mount.cli.command import app
-from engine_mount.fleet.example.fleet import make_example
+from engine_mount.fleet import Fleet
+from engine_mount.fleet.example import make_example
 
 # The stores are those that the tests of engine_mount.signals fetch from.
 sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
@@ -52,9 +52,8 @@ def home(tmp_path, monkeypatch):
 
 def asked(place, folder, workers):
     """Index and replay what lies at `place` into `folder`, which is returned."""
-    recordings = fleet.index([place], folder / 'catalogue', workers=workers)
-    result = fleet.replay([folder / 'catalogue'], SETTINGS, folder / 'result', workers=workers)
-    assert recordings.num_rows == result.num_rows
+    fleet = Fleet([place], folder / 'catalogue', workers=workers)
+    assert fleet.index().num_rows == fleet.replay(SETTINGS, folder / 'result').num_rows
     return folder
 
 
@@ -75,7 +74,7 @@ def run(*arguments):
 
 
 def test_every_recording_has_a_row_and_the_damaged_ones_a_reason(local):
-    rows = fleet.query(local / 'result', 'select * from result').to_pylist()
+    rows = pq.read_table(local / 'result' / 'result.parquet').to_pylist()
     assert len({row['recording'] for row in rows}) == RECORDINGS
     reasons = {row['recording'].partition('/')[2]: row['reason'] for row in rows}
     assert 'is no MCAP file' in reasons['19_garbage']

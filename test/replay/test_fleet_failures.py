@@ -15,11 +15,10 @@ import pytest
 
 from engine_mount.drives.replay import parsed_changes
 from engine_mount.fleet import job
-from engine_mount.fleet.catalogue.index import indexed
-from engine_mount.fleet.columns import WritingError
 from engine_mount.fleet.job import OUTAGES
+from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
+from engine_mount.fleet.tables import WritingError
 from engine_mount.signals.sources import remote
 from engine_mount.signals.sources.source import StoreAwayError
 
@@ -46,15 +45,16 @@ COMMAND = """
 import os, sys
 from engine_mount.fleet import job
 
-keep, kept = job.TableJob._keep, []
+line, lines = job._line, []
 
-def interrupted(self, *given):
-    if len(kept) == {done}:
+def interrupted(*given):
+    if len(lines) == {done}:
         os.kill({process}, {blow})
-    kept.append(keep(self, *given))
+    lines.append(given)
+    return line(*given)
 
 if __name__ == '__main__':
-    job.TableJob._keep = interrupted
+    job._line = interrupted
     from engine_mount.cli.command import main
     main(sys.argv[1:])
 """
@@ -73,7 +73,8 @@ def whole(drives):
     """Return the bytes of the table of a run that nothing ended."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(job, 'run_tasks', in_this_process)
-        return replayed(drives, drives.parent / 'whole').result.read_bytes()
+        replayed(drives, drives.parent / 'whole')
+        return table_in(drives.parent / 'whole')
 
 
 @pytest.fixture
@@ -121,7 +122,11 @@ def in_this_process(work, items, **_):
 
 
 def replayed(place, out, **options):
-    return replay_fleet(FleetOrder([str(place)], CHANGES), out, **options)
+    return replay_fleet([str(place)], CHANGES, out, **options)
+
+
+def table_in(folder):
+    return (folder / 'result.parquet').read_bytes()
 
 
 def at(count, action):
@@ -180,7 +185,7 @@ def test_a_store_that_is_away_for_a_while_is_waited_for(away, whole, tmp_path):
     outcome = replayed('s3://drives/2026', tmp_path / 'result', workers=1, progress=at(DONE, goes))
     assert away.refused >= 3
     assert outcome.not_fetched == []
-    assert outcome.result.read_bytes() == whole
+    assert table_in(tmp_path / 'result') == whole
 
 
 def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_path, inside, monkeypatch):
@@ -194,24 +199,8 @@ def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_pat
         replayed('s3://drives/2026', tmp_path / 'result', progress=at(DONE, goes))
     away.away = False
     outcome = replayed('s3://drives/2026', tmp_path / 'result')
-    assert outcome.before == DONE
-    assert outcome.result.read_bytes() == whole
-
-
-def test_an_index_whose_store_stays_away_goes_on_where_it_was(away, tmp_path, inside, monkeypatch):
-    monkeypatch.setattr(remote, 'ATTEMPTS', 2)
-    monkeypatch.setattr(remote, 'FIRST_PAUSE', 1e-3)
-    expected = indexed(['s3://drives/2026'], tmp_path / 'whole').recordings
-
-    def stop(progress):
-        away.away = progress.done >= DONE
-
-    with pytest.raises(StoreAwayError, match=GIVEN_UP):
-        indexed(['s3://drives/2026'], tmp_path / 'catalogue', progress=stop)
-    away.away = False
-    again = indexed(['s3://drives/2026'], tmp_path / 'catalogue')
-    assert again.read == len(NAMES) - DONE
-    assert again.recordings.equals(expected)
+    assert outcome.figures['done_before'] == DONE
+    assert table_in(tmp_path / 'result') == whole
 
 
 def test_a_scratch_disk_without_room_is_told_and_tried_again(away, whole, tmp_path, inside, limited):
@@ -222,8 +211,8 @@ def test_a_scratch_disk_without_room_is_told_and_tried_again(away, whole, tmp_pa
     assert reason.endswith('cannot be written: File too large; ENGINE_MOUNT_CACHE chooses another folder')
     limited(None)
     again = replayed('s3://drives/2026', tmp_path / 'result')
-    assert (again.before, again.not_fetched) == (0, [])
-    assert again.result.read_bytes() == whole
+    assert (again.figures['done_before'], again.not_fetched) == (0, [])
+    assert table_in(tmp_path / 'result') == whole
 
 
 def test_a_result_without_room_is_told_and_gone_on_with(drives, whole, tmp_path, inside, limited):
@@ -236,25 +225,8 @@ def test_a_result_without_room_is_told_and_gone_on_with(drives, whole, tmp_path,
         )
     limited(None)
     again = replayed(drives, tmp_path / 'result')
-    assert again.before == DONE
-    assert again.result.read_bytes() == whole
-
-
-def test_a_catalogue_without_room_is_told_and_gone_on_with(drives, tmp_path, inside, limited):
-    expected = indexed([drives], tmp_path / 'whole').recordings
-    journal = tmp_path / 'catalogue' / 'journal.jsonl'
-
-    def stop(progress):
-        if progress.done == DONE:
-            limited(journal.stat().st_size + 100)
-
-    sentence = rf'journal\.jsonl cannot be written: File too large; .*{GOES_ON}$'
-    with pytest.raises(WritingError, match=sentence):
-        indexed([drives], tmp_path / 'catalogue', progress=stop)
-    limited(None)
-    again = indexed([drives], tmp_path / 'catalogue')
-    assert again.read == len(NAMES) - DONE
-    assert again.recordings.equals(expected)
+    assert again.figures['done_before'] == DONE
+    assert table_in(tmp_path / 'result') == whole
 
 
 def command(folder, drives, process, blow, *options):

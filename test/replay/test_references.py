@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_differences import differences_from_reference
 
 from engine_mount.drives.inputs.consumed_samples import Notes
-from engine_mount.drives.inputs.input import recorded_parameters
+from engine_mount.drives.inputs.input import parameters_of, session_of
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.recording import open_recording
-from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL, differences_from_reference
+from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL
 from engine_mount.recordings.session import (
     recorded_session,
     session_content,
@@ -46,7 +47,7 @@ def test_those_from_before_there_were_policies_are_of_the_first(reference):
     named = session_parameters(session_content(recorded_session(recording)))['mount_control'].get('policy')
     told = {'opening': 'continuous_viscous', 'fault': 'switched_viscous'}  # since then
     assert named == told.get(reference.name)
-    chosen = recorded_parameters(recording, Notes())['mount_control']['policy']
+    chosen = parameters_of(session_of(recording, Notes()), Notes())['mount_control']['policy']
     assert chosen == (named or 'switched_viscous')
 
 

@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from engine_mount.recordings.reference import differences_from_reference
+from reference_differences import differences_from_reference
 
 pytestmark = pytest.mark.slow
 

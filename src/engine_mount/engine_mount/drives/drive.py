@@ -159,12 +159,12 @@ def drive(
     else:
         from engine_mount.drives.graph_drive import drive_graph  # loads the middleware
 
-        apart_in_time = Grouping.COMPOSED if composed else Grouping.APART
+        separate = Grouping.COMPOSED if composed else Grouping.APART
         settings = GraphSettings(
             namespace=namespace,
             domain=domain,
             parameters=values,
-            grouping=Grouping.TOGETHER if lockstep and not apart else apart_in_time,
+            grouping=Grouping.TOGETHER if lockstep and not apart else separate,
             priority=0 if lockstep else priority,
             restart_limit=restarts,
         )
@@ -186,8 +186,19 @@ def check_drive(parameters: Parameters, *, core: bool = False) -> Excitation:
     """Return the excitation of a drive; raises the `ValueError` with which a node would refuse its part."""
     values = parameters.get(SIM.name, {})
     excitation = build_excitation(mount_parameters(values))
-    for settings in settings_of_mounts(parameters).values():
-        _check_mount(settings, excitation, core=core)
+    for own in settings_of_mounts(parameters).values():
+        sim = with_flattened(SimParameters(), own.get(SIM.name, {}))
+        told_faults(sim.faults)
+        if core:
+            check_without_bus(sim.faults)
+        check_sample_rate(own)
+        steps_of_sample(sim.sample_rate, excitation.step_time)
+        check_control_of_mount(own)
+        check_effect(own.get('mount_control', {}))
+        checked_closing(sim.mechanics, sim.actuator)
+        checked_plant(sim.plant, excitation.seat, excitation.step_time)
+        with_flattened(DriverParameters(), own.get('mount_driver', {}))
+        CoreChain(own)
     if mounts_of(parameters):
         SimulatedCar(values, excitation)
     checked_recorder(parameters.get('mount_recorder', {}))
@@ -222,22 +233,6 @@ def _with_file(
     if excitation is not None:
         completed[SIM.name] |= excitation.parameters(folder)
     return completed
-
-
-def _check_mount(parameters: Parameters, excitation: Excitation, *, core: bool) -> None:
-    """Refuse parameters with which one mount cannot work."""
-    sim = with_flattened(SimParameters(), parameters.get(SIM.name, {}))
-    told_faults(sim.faults)
-    if core:
-        check_without_bus(sim.faults)
-    check_sample_rate(parameters)
-    steps_of_sample(sim.sample_rate, excitation.step_time)
-    check_control_of_mount(parameters)
-    check_effect(parameters.get('mount_control', {}))
-    checked_closing(sim.mechanics, sim.actuator)
-    checked_plant(sim.plant, excitation.seat, excitation.step_time)
-    with_flattened(DriverParameters(), parameters.get('mount_driver', {}))
-    CoreChain(parameters)
 
 
 def _drive_core(

@@ -9,8 +9,9 @@ in the iron. Imposed is the mean flux density in the middle of the plate, the sa
 imposed instead, the air beside the plate would take its share, which depends on the winding chosen here.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.sparse import bmat, csc_matrix
@@ -19,23 +20,31 @@ from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad
 from skfem.helpers import dot
 
 from engine_mount.reports.drive.signals import FloatArray
-from mount_models.quantity import Quantity
 from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_flux_density
 from mount_sim.plant.ripple import RippleCoil, duty
+
+_MOST_STEPS = 60
+_SAME_FIELD = 1e-9
+_LEAST_SHARE = 1e-3
+_STEPS = 16  # in each part of the period
+_GAMMA = 1.0 - 0.5**0.5
+_GAUSS = (0.5 - 12.0**-0.5, 0.5 + 12.0**-0.5)
+_GROWTH = 1.25  # of the elements, away from a surface
 
 
 class FieldError(ValueError):
     """The finite-element computation did not come to an end; the text says where and the remedy."""
 
 
-class PlateSurroundings(NamedTuple):
-    """Air and winding beside the plate, and the mesh."""
+@dataclass(frozen=True)
+class PlateSurroundings:
+    """Air and winding beside the plate, and the mesh; m, chosen."""
 
-    air_width: Annotated[float, Quantity('m', 'width of the air beside the plate', 5e-3, 0.1)] = 10e-3
-    winding_distance: Annotated[float, Quantity('m', 'from the plate to the winding', 0.0, 5e-3)] = 0.5e-3
-    winding_thickness: Annotated[float, Quantity('m', 'thickness of the winding', 1e-4, 5e-3)] = 3e-3
-    winding_start: Annotated[float, Quantity('m', 'from the gap to the winding', 0.0, 2e-2)] = 8e-3
-    finest: Annotated[float, Quantity('m', 'width of the elements at the surface', 1e-6, 1e-4)] = 4e-6
+    air_width: float = 10e-3
+    winding_distance: float = 0.5e-3  # from the plate
+    winding_thickness: float = 3e-3
+    winding_start: float = 8e-3  # from the gap
+    finest: float = 4e-6  # width of the elements at the surface
 
 
 @dataclass(frozen=True)
@@ -68,7 +77,7 @@ def plate_field(
     actuator: ReluctanceActuator,
     current: float,
     gap: float,
-    surroundings: PlateSurroundings | None = None,
+    surroundings: PlateSurroundings = PlateSurroundings(),
     periods: int = 4,
 ) -> PlateField:
     """Return the field at mean `current` (A) and `gap` (m); raises `FieldError` if the iteration fails.
@@ -76,9 +85,45 @@ def plate_field(
     The winding drives the plate to the same mean flux density in its middle as the magnetic circuit of
     `actuator` has at this current, so both computations speak of the same state of the iron.
     """
-    plate = _Plate(coil, actuator, gap, surroundings or PlateSurroundings())
+    plate = _Plate(coil, actuator, gap, surroundings)
     steady = plate.steady_field(float(core_flux_density(actuator, current, gap)))
-    return plate.alternating_field(steady, current, periods)
+    go = plate.march(plate.stiffness(steady))
+    plus, period, delay = duty(coil, current), coil.pwm_period, coil.sample_delay
+    on, off = plus * period, (1.0 - plus) * period
+    # the bridge imposes the rate of the mean flux density
+    rate = 2.0 * coil.link_voltage / (actuator.turns * actuator.gap_area)
+    rise, fall = rate * (1.0 - plus), -rate * plus
+    # starting in the middle of a rise, the density has no mean from the first period on
+    go(rise, 0.5 * on)
+    surface = []
+    for _ in range(periods):
+        before = go(fall, off)
+        change = go(rise, delay) - before
+        go(rise, on - delay)
+        depth, profile = plate.profile(change, plate.middle)
+        surface.append(profile[0])
+    mean = float(change[plate.surface_node] / plate.half)
+    slope = float(plate.curve(float(steady[plate.surface_node]) / plate.half)[1])
+    # the alternating field strength along the surface, A/m
+    field = [
+        plate.profile(change, row)[1][0]
+        * plate.curve(abs(float(plate.profile(steady, row)[1][1:3].mean())))[1]
+        for row in plate.rows_of_iron.tolist()
+    ]
+    tension = float(np.average(field, weights=plate.heights[plate.rows_of_iron]))
+    return PlateField(
+        depth=depth,
+        change=profile,
+        mean_change=mean,
+        equivalent_depth=plate.half * mean / float(profile[0]),
+        path_depth=plate.half * mean * slope / tension,
+        permeability=1.0 / slope,
+        x=plate.x,
+        y=plate.y,
+        steady=plate.density(steady),
+        alternating=plate.density(change),
+        drift=float(abs(surface[-1] / surface[-2] - 1.0)) if periods > 1 else float('nan'),
+    )
 
 
 class _Plate:
@@ -88,7 +133,11 @@ class _Plate:
         self.coil, self.actuator = coil, actuator
         self.half = half = coil.plate_half_thickness
         edge, length = 0.5 * (gap + actuator.residual_gap), 0.25 * actuator.core_length
-        x, y = _grid(half, edge, length, around)
+        # fine at the surface of the plate and at its end
+        outwards = half + _graded(around.air_width, 4.0 * around.finest)[1:]
+        x = np.concatenate([(half - _graded(half, around.finest))[::-1], outwards])
+        upwards = edge + _graded(length, 8.0 * around.finest)[1:]
+        y = np.concatenate([np.linspace(0.0, edge, 9), upwards])
         mesh = MeshQuad.init_tensor(x, y)
         self.basis = Basis(mesh, ElementQuad2())
         # two Gauss points across each element, where the gradient is most exact, and its centre
@@ -113,26 +162,29 @@ class _Plate:
 
     def steady_field(self, flux_density: float) -> FloatArray:
         """Return A with this mean flux density (T) in the middle of the plate, by damped Newton steps."""
-        potential = np.zeros(self.basis.N)
         if flux_density == 0.0:
-            return potential
+            return np.zeros(self.basis.N)
         nothing = np.zeros(self.free.size)
-        found = self.with_imposed_flux(self.stiffness(potential)).solve(np.append(nothing, flux_density))
+        found = self._factors(self.stiffness(self._whole(nothing))).solve(np.append(nothing, flux_density))
         for _ in range(_MOST_STEPS):
-            potential[self.free] = found[:-1]
-            residual = self._residual(found)
-            if np.linalg.norm(residual) < _SAME_FIELD * abs(found[-1]) * np.linalg.norm(self.winding):
+            potential, residual = self._whole(found[:-1]), self._residual(found)
+            size = np.linalg.norm(residual)
+            if size < _SAME_FIELD * abs(found[-1]) * np.linalg.norm(self.winding):
                 return potential
-            step = self.with_imposed_flux(self.stiffness(potential)).solve(np.append(-residual, 0.0))
+            step = self._factors(self.stiffness(potential)).solve(np.append(-residual, 0.0))
             share = 1.0
-            while share > _LEAST_SHARE and np.linalg.norm(
-                self._residual(found + share * step)
-            ) >= np.linalg.norm(residual):
+            while share > _LEAST_SHARE and np.linalg.norm(self._residual(found + share * step)) >= size:
                 share *= 0.5
             found = found + share * step
         raise FieldError(f'the steady field did not settle in {_MOST_STEPS} steps; use a smaller current')
 
-    def with_imposed_flux(self, matrix: Any) -> Any:
+    def _whole(self, free: FloatArray) -> FloatArray:
+        """Return A at all nodes."""
+        potential = np.zeros(self.basis.N)
+        potential[self.free] = free
+        return potential
+
+    def _factors(self, matrix: Any) -> Any:
         """Return the factors of a system whose last unknown is the tension (A), its last row the mean (T)."""
         place = np.flatnonzero(self.free == self.surface_node)
         sensed = csc_matrix(([1.0 / self.half], ([0], place)), shape=(1, self.free.size))
@@ -140,9 +192,7 @@ class _Plate:
         return splu(bmat([[within, -csc_matrix(self.winding[:, np.newaxis])], [sensed, None]], format='csc'))
 
     def _residual(self, found: FloatArray) -> FloatArray:
-        potential = np.zeros(self.basis.N)
-        potential[self.free] = found[:-1]
-        gradient = self.basis.interpolate(potential).grad
+        gradient = self.basis.interpolate(self._whole(found[:-1])).grad
         flow = _flow.assemble(self.basis, flow=self._reluctivities(gradient)[0] * gradient)
         return np.asarray(flow[self.free] - found[-1] * self.winding, np.float64)
 
@@ -153,13 +203,12 @@ class _Plate:
         square = np.maximum((gradient**2).sum(axis=0), 1e-30)
         return _tensor.assemble(self.basis, across=secant, along=(slope - secant) / square, g=gradient)
 
-    def _reluctivities(self, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _reluctivities(self, gradient: FloatArray) -> list[FloatArray]:
         """Return H/B and dH/dB (m/H) at each point, of the core's magnetisation curve or of air."""
-        curve = self._curve(np.sqrt((gradient**2).sum(axis=0)))
-        secant, slope = (np.where(self.iron, each, 1.0 / MU_0) for each in curve)
-        return secant, slope
+        curve = self.curve(np.sqrt((gradient**2).sum(axis=0)))
+        return [np.where(self.iron, each, 1.0 / MU_0) for each in curve]
 
-    def _curve(self, density: Any) -> tuple[Any, Any]:
+    def curve(self, density: Any) -> tuple[Any, Any]:
         """Return H/B and dH/dB (m/H) of the core at a flux density (T)."""
         a = self.actuator
         linear = MU_0 * a.knee_field + a.saturation_polarisation - density
@@ -168,40 +217,36 @@ class _Plate:
         slope = 1.0 / (MU_0 + a.saturation_polarisation * a.knee_field / knee**2)
         return 1.0 / (MU_0 + a.saturation_polarisation / knee), slope
 
-    def alternating_field(self, steady: FloatArray, current: float, periods: int) -> PlateField:
-        """Return the field with the ripple on top of the steady one, in the periodic state."""
-        march = _March(self, self.stiffness(steady))
-        plus, period = duty(self.coil, current), self.coil.pwm_period
-        on, off, delay = plus * period, (1.0 - plus) * period, self.coil.sample_delay
-        # the bridge imposes the rate of the mean flux density
-        rate = 2.0 * self.coil.link_voltage / (self.actuator.turns * self.actuator.gap_area)
-        rise, fall = rate * (1.0 - plus), -rate * plus
-        # starting in the middle of a rise, the density has no mean from the first period on
-        march.go(rise, 0.5 * on)
-        surface = []
-        for _ in range(periods):
-            before = march.go(fall, off)
-            change = march.go(rise, delay) - before
-            march.go(rise, on - delay)
-            depth, profile = self._profile(change, self.middle)
-            surface.append(profile[0])
-        mean = float(change[self.surface_node] / self.half)
-        slope = float(self._curve(float(steady[self.surface_node]) / self.half)[1])
-        return PlateField(
-            depth=depth,
-            change=profile,
-            mean_change=mean,
-            equivalent_depth=self.half * mean / float(profile[0]),
-            path_depth=self.half * mean * slope / self._mean_surface_field(change, steady),
-            permeability=1.0 / slope,
-            x=self.x,
-            y=self.y,
-            steady=self._density(steady),
-            alternating=self._density(change),
-            drift=float(abs(surface[-1] / surface[-2] - 1.0)) if periods > 1 else float('nan'),
-        )
+    def march(self, stiffness: Any) -> Callable[[float, float], FloatArray]:
+        """Return what takes rate (T/s) of the mean flux density and duration (s), and returns A behind it.
 
-    def _profile(self, potential: FloatArray, row: int) -> tuple[FloatArray, FloatArray]:
+        Steps of the linear alternating field from 0 on, by a stiffly accurate method of second order. The
+        mean flux density is imposed; the tension of the winding is whatever that takes.
+        """
+        mass = _mass.assemble(self.basis, sigma=self.coil.conductivity * self.iron)
+        free_mass = mass[self.free][:, self.free]
+        factors: dict[float, Any] = {}
+        inner, density = np.zeros(self.free.size), 0.0
+
+        def stage(dt: float, start: FloatArray, imposed: float) -> FloatArray:
+            right = np.append(free_mass @ start / (_GAMMA * dt), imposed)
+            return np.asarray(factors[dt].solve(right)[:-1], np.float64)
+
+        def go(rate: float, duration: float) -> FloatArray:
+            nonlocal inner, density
+            dt = duration / _STEPS
+            if dt not in factors:
+                factors[dt] = self._factors(mass / (_GAMMA * dt) + stiffness)
+            for step in range(_STEPS):
+                half_way = stage(dt, inner, density + rate * (step + _GAMMA) * dt)
+                start = inner + (1.0 - _GAMMA) / _GAMMA * (half_way - inner)
+                inner = stage(dt, start, density + rate * (step + 1) * dt)
+            density += rate * duration
+            return self._whole(inner)
+
+        return go
+
+    def profile(self, potential: FloatArray, row: int) -> tuple[FloatArray, FloatArray]:
         """Return depths (m) and dA/dx (T) across the plate in a row of elements, surface first.
 
         Within the elements at Gauss points; at the surface by a straight line through the two nearest.
@@ -214,16 +259,7 @@ class _Plate:
         slope = (density[1] - density[0]) / (depth[1] - depth[0])
         return np.append(0.0, depth), np.append(density[0] - slope * depth[0], density)
 
-    def _mean_surface_field(self, change: FloatArray, steady: FloatArray) -> float:
-        """Return the alternating field strength (A/m) along the surface, averaged over the plate's length."""
-        field = [
-            self._profile(change, row)[1][0]
-            * self._curve(abs(float(self._profile(steady, row)[1][1:3].mean())))[1]
-            for row in self.rows_of_iron.tolist()
-        ]
-        return float(np.average(field, weights=self.heights[self.rows_of_iron]))
-
-    def _density(self, potential: FloatArray) -> FloatArray:
+    def density(self, potential: FloatArray) -> FloatArray:
         """Return |B| (T) at the centres of the elements, shape (y, x)."""
         gradient = self.centre.interpolate(potential).grad[:, :, 0]
         return np.asarray(np.hypot(*gradient)[self.rows], np.float64)
@@ -231,58 +267,6 @@ class _Plate:
     def _per_point(self, values: Any) -> Any:
         """Return one value of each element at all its points."""
         return np.repeat(values[:, np.newaxis], self.basis.X.shape[-1], axis=1)
-
-
-class _March:
-    """Steps of the linear alternating field, by a stiffly accurate method of second order.
-
-    The mean flux density is imposed; the tension of the winding is whatever that takes.
-    """
-
-    def __init__(self, plate: _Plate, stiffness: Any):
-        self._plate, self._stiffness = plate, stiffness
-        self._mass = _mass.assemble(plate.basis, sigma=plate.coil.conductivity * plate.iron)
-        self._free_mass = self._mass[plate.free][:, plate.free]
-        self._factors: dict[float, Any] = {}
-        self._inner, self._density = np.zeros(plate.free.size), 0.0
-
-    def go(self, rate: float, duration: float) -> FloatArray:
-        """Return A after `duration` (s), in which the mean flux density grows at `rate` (T/s)."""
-        dt = duration / _STEPS
-        if dt not in self._factors:
-            self._factors[dt] = self._plate.with_imposed_flux(self._mass / (_GAMMA * dt) + self._stiffness)
-        for step in range(_STEPS):
-            half_way = self._stage(dt, self._inner, self._density + rate * (step + _GAMMA) * dt)
-            start = self._inner + (1.0 - _GAMMA) / _GAMMA * (half_way - self._inner)
-            self._inner = self._stage(dt, start, self._density + rate * (step + 1) * dt)
-        self._density += rate * duration
-        potential = np.zeros(self._plate.basis.N)
-        potential[self._plate.free] = self._inner
-        return potential
-
-    def _stage(self, dt: float, start: FloatArray, imposed: float) -> FloatArray:
-        right = np.append(self._free_mass @ start / (_GAMMA * dt), imposed)
-        return np.asarray(self._factors[dt].solve(right)[:-1], np.float64)
-
-
-_MOST_STEPS = 60
-_SAME_FIELD = 1e-9
-_LEAST_SHARE = 1e-3
-_STEPS = 16  # in each part of the period
-_GAMMA = 1.0 - 0.5**0.5
-_GAUSS = (0.5 - 12.0**-0.5, 0.5 + 12.0**-0.5)
-_GROWTH = 1.25  # of the elements, away from a surface
-
-
-def _grid(
-    half: float, edge: float, length: float, around: PlateSurroundings
-) -> tuple[FloatArray, FloatArray]:
-    """Return the lines of the mesh: fine at the surface of the plate and at its end."""
-    inwards = _graded(half, around.finest)
-    outwards = _graded(around.air_width, 4.0 * around.finest)
-    upwards = _graded(length, 8.0 * around.finest)
-    x = np.concatenate([(half - inwards)[::-1], half + outwards[1:]])
-    return x, np.concatenate([np.linspace(0.0, edge, 9), edge + upwards[1:]])
 
 
 def _graded(length: float, first: float) -> FloatArray:
@@ -299,16 +283,6 @@ def _tensor(u: Any, v: Any, w: Any) -> Any:
     return w['across'] * dot(u.grad, v.grad) + w['along'] * dot(w['g'], u.grad) * dot(w['g'], v.grad)
 
 
-@BilinearForm
-def _mass(u: Any, v: Any, w: Any) -> Any:
-    return w['sigma'] * u * v
-
-
-@LinearForm
-def _flow(v: Any, w: Any) -> Any:
-    return dot(w['flow'], v.grad)
-
-
-@LinearForm
-def _load(v: Any, w: Any) -> Any:
-    return w['inside'] * v
+_mass = BilinearForm(lambda u, v, w: w['sigma'] * u * v)
+_flow = LinearForm(lambda v, w: dot(w['flow'], v.grad))
+_load = LinearForm(lambda v, w: w['inside'] * v)

@@ -1,273 +1,478 @@
 """Policies side by side: sweep, gap, rack, roads, other engines, idle, wear; and what no policy can beat."""
 
 import math
-from pathlib import Path
+from collections.abc import Iterable
+from itertools import product
+from typing import Any
 
 import numpy as np
 
-from engine_mount.experiments.harness.contract import (
+from engine_mount.drives.bands import BELOW_ISOLATION
+from engine_mount.experiments.harness.closed_loop import PAPER, run_cases
+from engine_mount.experiments.harness.drawing import BLUE, GREY, HYDRO_LINE, OFF_LINE, new_panels
+from engine_mount.experiments.harness.experiment import (
+    NOT_COMPARABLE,
+    PARTLY,
     Experiment,
-    Holds,
+    Findings,
     Order,
-    Outcome,
-    Progress,
-    Statement,
     Values,
+    claim,
     numbers_of,
-    parameters_of,
 )
-from engine_mount.experiments.harness.drawing import BLUE, GREY, finish, new_figure
-from engine_mount.experiments.harness.many_runs import Found, run_all
-from engine_mount.experiments.harness.measures import FIRST_FREQUENCY, RATE
+from engine_mount.experiments.harness.measures import (
+    FIRST_FREQUENCY,
+    RATE,
+    first_extremum,
+    highest_per_band,
+    peak_in,
+    swept_frequency,
+)
 from engine_mount.experiments.policy_cases import (
+    ABLATIONS,
     COMPARED,
     CONTINUOUS,
+    DISTURBANCES,
+    FRONT,
+    GAP_TIME,
     HYDRO,
-    NAME,
+    LEARNT_ROADS,
+    LEARNT_SCALES,
+    NAMED,
     OFF,
-    PAPER,
+    POLICIES,
+    ROADS,
+    SPEED,
     Axes,
+    Key,
     PolicyParameters,
-    jobs_of,
+    cases_of,
 )
-from engine_mount.experiments.policy_figures import figures_of
-from engine_mount.experiments.policy_page import write_policy
-from engine_mount.experiments.policy_runs import run_policy_job
+from engine_mount.experiments.policy_page import page_of
 from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.signals import FloatArray
 from mount_control import band_pass
 from mount_control.policy import continuous_viscous, switched_viscous
+from mount_models.arithmetic.compiled import compiled
 from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
+from mount_sim.excitation.scenario import STEP_TIME, SweepScenario
+from mount_sim.plant.vehicle import Vehicle, resting_vehicle, vehicle_step
 
-
-def run(order: Order, progress: Progress) -> Outcome:
-    """Run all combinations, and write pictures and a page from the numbers."""
-
-    parameters = parameters_of(order, NAME, PolicyParameters())
-    axes = axes_of(parameters)
-    jobs = jobs_of(order, parameters, axes)
-    found = run_all(
-        jobs,
-        parameters.workers,
-        lambda done: progress(0.95 * done / len(jobs), f'{done} of {len(jobs)} runs'),
-        run_policy_job,
-    )
-    progress(0.95, 'bounds and pictures')
-    figures = figures_of(found, parameters, axes)
-    pictures = draw_all(found, figures, axes, order.out / 'figures')
-    page = write_policy(figures, pictures, order.out / 'policy.md')
-    return Outcome(figures, pictures, [], statements(figures), [page])
-
-
-def axes_of(parameters: PolicyParameters) -> Axes:
-    """Return the values of all lists; raises `ParameterError` for a text that is no list of such numbers."""
-
-    def numbers(name: str, low: float, high: float) -> list[float]:
-        return numbers_of(f'{NAME}.{name}', getattr(parameters, name), low, high)
-
-    return Axes(
-        numbers('road_levels', 1e-3, 1.0),
-        numbers('gap_depths', 1e-3, 0.1),
-        numbers('rack_frequencies', 1.0, 50.0),
-        numbers('engines', 5.0, 12.0),
-        numbers('engine_levels', 1e-3, 1.0),
-        numbers('idle_frequencies', 10.0, 60.0),
-        numbers('idle_forces', 1.0, 2000.0),
-    )
-
-
-def statements(figures: Values) -> list[Statement]:
-    """Return what the paper says that depends on the policy, with what these figures say to it."""
-    sweep, gap = figures['sweep_ratio'], figures['gap_peak_ratio']
-
-    def told(policy: str) -> str:
-        ratios = ', '.join(f'{value:.2f} ({level} m/s)' for level, value in sweep[policy].items())
-        peaks = max(value for values in gap[policy].values() for value in values)
-        return f'{policy}: {ratios}; over a gap at most {peaks:.2f}'
-
-    ours = [*sweep[CONTINUOUS].values(), *(value for values in gap[CONTINUOUS].values() for value in values)]
-    return [
-        Statement(
-            'Sec. 7',
-            'Lower displacements when damping is on.',
-            f'Largest displacement over that of the hydromount, sweep from 3 to 14 Hz by road level, '
-            f'{told(PAPER)}. {told(CONTINUOUS)}. Holds if the continuous law is below the hydromount '
-            f'everywhere.',
-            Holds.YES if max(ours) < 1.0 else Holds.PARTLY,
-        ),
-        Statement(
-            'Fig. 14; Sec. 6',
-            'At higher frequencies, where damping is off, the acceleration of the chassis is lower.',
-            'Of the continuous law over the mount without current, 14 to 50 Hz, road levels as above: '
-            + ', '.join(f'{value:.3f}' for value in figures['high_frequency_ratio'][CONTINUOUS].values())
-            + '.',
-            Holds.NOT_COMPARABLE,
-        ),
-    ]
-
-
-_COLOURS = {
-    CONTINUOUS: COLOUR_OF['continuous_viscous'],
-    PAPER: COLOUR_OF['switched_viscous'],
-    HYDRO: COLOUR_OF['hydro'],
-    OFF: COLOUR_OF['undamped'],
+NAME = 'policy'
+Found = dict[Key, Values]
+_SUPPORTED = (*POLICIES, OFF)
+_LIMIT_DAMPINGS = (910.0, 1100.0, 2000.0, 2600.0, 3000.0)  # N s/m
+_LIMIT_DELAYS = (0.0, 0.04, 0.065, 0.1, 0.15)  # s
+_LIMIT_DEPTH, _LIMIT_DAMPING = 0.02, 2000.0
+_STEPS = round(SAMPLE_TIME / STEP_TIME)
+_BEFORE, _AFTER = 0.05, 0.8  # s, drawn round the gap
+_LINES: dict[str, Values] = {
+    CONTINUOUS: {'color': COLOUR_OF[CONTINUOUS]},
+    PAPER: {'color': COLOUR_OF[PAPER]},
+    HYDRO: HYDRO_LINE,
+    OFF: OFF_LINE,
 }
-_GAP_TIME, _BEFORE, _AFTER = 2.0, 0.05, 0.8  # s
 
 
-def draw_all(found: Found, figures: Values, axes: Axes, folder: Path) -> list[Path]:
-    """Draw what there is to draw and return the pictures."""
-    pictures = [draw_velocity(folder / 'policy_velocity.png')]
-    swept = sorted({key[2] for key, each in found.items() if key[0] == 'sweep' and 'displacement' in each})
-    if swept:
-        pictures.append(draw_sweeps(found, swept, folder / 'policy_sweep.png'))
-    crossed = sorted({key[2:] for key, each in found.items() if key[0] == 'gap' and 'displacement' in each})
-    if crossed:
-        pictures.append(draw_gap(found, crossed[0], folder / 'policy_gap.png'))
-    if ('road', OFF, 'recorded', 0.0) in found:
-        pictures.append(draw_spectra(found, figures['idle_amplitude_n'], folder / 'policy_recorded.png'))
+def run(order: Order) -> Findings:
+    """Run all combinations, and make pictures and a page from the numbers."""
+    axes = Axes(
+        numbers_of(order, 'road_levels', 1e-3, 1.0),
+        numbers_of(order, 'gap_depths', 1e-3, 0.1),
+        numbers_of(order, 'rack_frequencies', 1.0, 50.0),
+        numbers_of(order, 'engines', 5.0, 12.0),
+        numbers_of(order, 'engine_levels', 1e-3, 1.0),
+        numbers_of(order, 'idle_frequencies', 10.0, 60.0),
+        numbers_of(order, 'idle_forces', 1.0, 2000.0),
+    )
+    found = run_cases(order, cases_of(order, axes))
+    order.progress(0.95, 'bounds and pictures')
+    figures = figures_of(found, order.parameters, axes)
+    pictures = {'policy_velocity': draw_velocity()}
+    shown = {
+        kind: sorted({key[2:] for key, each in found.items() if key[0] == kind and 'displacement' in each})
+        for kind in ('sweep', 'gap')
+    }
+    if shown['sweep']:
+        pictures['policy_sweep'] = draw_sweeps(found, [level for level, _ in shown['sweep']])
+    if shown['gap']:
+        pictures['policy_gap'] = draw_gap(found, *shown['gap'][0])
+    if 'recorded' in figures['roads']:
+        pictures['policy_recorded'] = draw_spectra(found, figures['idle_amplitude_n'])
     if 'front' in figures:
-        pictures.append(draw_front(figures['front'], folder / 'policy_front.png'))
-    return pictures
+        pictures['policy_front'] = draw_front(figures['front'])
+    return Findings(figures, pictures, pages={f'{NAME}.md': page_of(figures, pictures.keys())})
 
 
-def draw_sweeps(found: Found, levels: list[float], file: Path) -> Path:
+def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
+    """Return all figures: plain numbers, texts, lists and mappings."""
+    idle, seeds = own.idle_amplitude, range(1, own.gap_seeds + 1)
+
+    def over(what: str, kind: str, who: str, *rest: Any, other: str = HYDRO) -> float:
+        """Return a figure of one mount over that of the `other` one in the same run."""
+        return float(found[kind, who, *rest][what] / found[kind, other, *rest][what])
+
+    def of_gaps(what: str) -> Values:
+        def by_depth(who: str) -> Values:
+            return {number(1e3 * d): [over(what, 'gap', who, d, seed) for seed in seeds] for d in axes.depths}
+
+        return {who: by_depth(who) for who in _SUPPORTED}
+
+    def of_rack(what: str, mounts: Iterable[str]) -> Values:
+        return {who: {number(f): found['rack', who, f][what] for f in axes.frequencies} for who in mounts}
+
+    def high(who: str, level: float, force: float) -> float:
+        """Return the rms of the acceleration in the bands above 14 Hz together."""
+        bands = [each for each in found['sweep', who, level, force]['rms'] if each is not None]
+        return float(np.sqrt(np.sum(np.square(bands)))) if bands else math.nan
+
+    def high_ratio(force: float) -> Values:
+        levels = [level for level in axes.levels if not np.isnan(high(OFF, level, force))]
+        return {
+            who: {number(level): high(who, level, force) / high(OFF, level, force) for level in levels}
+            for who in (*POLICIES, HYDRO)
+        }
+
+    def of_road(road: str, speed: float, who: str) -> Values:
+        quiet = found['road', who, road, 0.0]
+        return {
+            'acceleration': over('acceleration', 'road', who, road, 0.0, other=OFF),
+            'acceleration_idling': over('acceleration', 'road', who, road, idle, other=OFF),
+            'displacement': over('peak_m', 'road', who, road, 0.0),
+            'j_per_km': 1e3 * quiet['power_w'] / speed,
+            'heat_w': quiet['heat_w'],
+        }
+
+    speeds = dict.fromkeys(ROADS, SPEED)
+    if own.recording:
+        speeds['recorded'] = own.recorded_speed
+    energy_road = 'recorded' if own.recording else 'random'
+    roads = {road: {who: of_road(road, speed, who) for who in COMPARED} for road, speed in speeds.items()}
+    figures: Values = {
+        'sweep_ratio': {
+            who: {number(level): over('peak_m', 'sweep', who, level, 0.0) for level in axes.levels}
+            for who in _SUPPORTED
+        },
+        'gap_peak_ratio': of_gaps('peak_m'),
+        'gap_first_extremum_ratio': of_gaps('first_m'),
+        'thd': of_rack('thd', (*POLICIES, HYDRO)),
+        'tracking': of_rack('tracking', POLICIES),
+        'high_frequency_ratio': high_ratio(0.0),
+        'high_frequency_ratio_idling': high_ratio(idle),
+        'roads': roads,
+        'tip_in': {
+            who: {
+                'peak': over('peak_m', 'tip-in', who),
+                'acceleration': over('acceleration', 'tip-in', who, other=OFF),
+            }
+            for who in _SUPPORTED
+        },
+        'limits': limits_of(found, axes),
+        'idle_amplitude_n': idle,
+        'energy_road': energy_road,
+        'energy_j_per_km': {who: roads[energy_road][who]['j_per_km'] for who in POLICIES},
+    }
+    if not own.thorough:
+        return figures
+    engines = {f'{frequency:g} Hz by {how}': (how, frequency) for how, frequency in axes.plants}
+
+    def worst(who: str, plant: tuple[str, float], name: str) -> float:
+        """Return the highest ratio over the levels."""
+        return max(
+            found['robust', who, *plant, name, level]['peak_m']
+            / found['robust', HYDRO, *plant, 'nominal', level]['peak_m']
+            for level in axes.engine_levels
+        )
+
+    def of_idling(who: str, roughness: float) -> Values:
+        cases = list(product(axes.idle_frequencies, axes.idle_forces))
+        return {
+            f'{frequency:g} Hz, {force:g} N': [
+                over('acceleration', 'idle', who, roughness, frequency, force, other=OFF),
+                over('rms_m', 'idle', who, roughness, frequency, force),
+            ]
+            for frequency, force in cases
+        }
+
+    def learnt(what: str, *known: Any) -> Any:
+        return found['learn', CONTINUOUS, *known][what]
+
+    points = [
+        {
+            'name': NAMED.get(point, ''),
+            **dict(
+                zip(('lowest_amplitude_m', 'full_amplitude_m', 'damping_coefficient'), point, strict=True)
+            ),
+            **variant(found, ('front', *point), axes, idle),
+        }
+        for point in FRONT
+    ]
+    costs = ('light_road', 'acceleration', 'acceleration_idling', 'j_per_km')
+    for point in points:
+        # none is better in ratio, wear and both accelerations
+        point['on_front'] = not any(
+            other is not point and all(other[cost] <= point[cost] for cost in costs) for other in points
+        )
+    return figures | {
+        'robustness': {
+            engine: {
+                **{name: worst(CONTINUOUS, plant, name) for name in DISTURBANCES},
+                PAPER: worst(PAPER, plant, 'nominal'),
+            }
+            for engine, plant in engines.items()
+        },
+        'idling': {
+            number(1e6 * road): {who: of_idling(who, road) for who in COMPARED} for road in LEARNT_ROADS
+        },
+        # what estimators from displacement alone say of engines and pads that are known here
+        'learnt': {
+            'frequency_hz': {
+                engine: {number(1e6 * road): learnt('frequency_hz', *plant, road) for road in LEARNT_ROADS}
+                for engine, plant in engines.items()
+            },
+            'friction_scale': {
+                number(scale): {
+                    number(1e6 * road): [learnt('friction_scale', scale, road, seed) for seed in seeds]
+                    for road in LEARNT_ROADS
+                }
+                for scale in LEARNT_SCALES
+            },
+        },
+        'ablation': {name: variant(found, ('ablation', name), axes, idle) for name in ABLATIONS},
+        'front': points,
+    }
+
+
+def number(value: float) -> str:
+    """Return a number as the key of a mapping."""
+    return f'{value:g}'
+
+
+def variant(found: Found, key: Key, axes: Axes, idle: float) -> dict[str, Any]:
+    """Return the figures of the continuous law with some of its parameters changed."""
+    ours = {rest: found[*key, CONTINUOUS, *rest] for rest in (('road', 0.0), ('road', idle))}
+    peaks = {
+        level: found[*key, CONTINUOUS, level]['peak_m'] / found['sweep', HYDRO, level, 0.0]['peak_m']
+        for level in (axes.levels[0], axes.levels[-1])
+    }
+    quiet, idling = (
+        each['acceleration'] / found['road', OFF, 'random', force]['acceleration']
+        for (_, force), each in ours.items()
+    )
+    return {
+        'light_road': peaks[axes.levels[0]],
+        'strong_road': peaks[axes.levels[-1]],
+        'acceleration': quiet,
+        'acceleration_idling': idling,
+        'j_per_km': 1e3 * ours['road', 0.0]['power_w'] / SPEED,
+    }
+
+
+def limits_of(found: Found, axes: Axes) -> Values:
+    """Return what an ideal damper leaves: always on in the sweep, on after some delay over a gap."""
+    always, free = (gap_limit(_LIMIT_DEPTH, damping, 0.0) for damping in (_LIMIT_DAMPING, 0.0))
+    return {
+        'sweep_always_on': {
+            number(damping): {
+                number(level): sweep_limit(level, damping) / found['sweep', HYDRO, level, 0.0]['peak_m']
+                for level in axes.levels
+            }
+            for damping in _LIMIT_DAMPINGS
+        },
+        'gap_after_delay': {
+            number(1e3 * delay): gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, delay)[0] / free[0]
+            for delay in _LIMIT_DELAYS
+        },
+        'gap_first_extremum_always_on': always[1] / free[1],
+        'gap_damping': _LIMIT_DAMPING,
+        'gap_depth_m': _LIMIT_DEPTH,
+    }
+
+
+def sweep_limit(level: float, damping: float) -> float:
+    """Return the largest displacement (m) from 3 to 14 Hz with an ideal damper always on."""
+    seconds = (BELOW_ISOLATION[1] - FIRST_FREQUENCY) / RATE
+    time = STEP_TIME * np.arange(round(seconds / STEP_TIME))
+    displacement = damped(sweep_road(time, SweepScenario(velocity_amplitude=level)), damping)
+    return peak_in(swept_frequency(displacement.size), displacement, BELOW_ISOLATION) or math.nan
+
+
+def gap_limit(depth: float, damping: float, delay: float) -> tuple[float, float]:
+    """Return largest displacement and first extremum (m) over a gap of 1 m in a smooth road.
+
+    The damper is on `delay` s after the wheel meets the gap.
+    """
+    time = STEP_TIME * np.arange(round(1.0 / STEP_TIME))
+    road = gap_in_road(time, Gap(depth=depth, position=0.0, speed=SPEED))
+    displacement = damped(road, damping, round(delay / STEP_TIME))
+    return float(np.abs(displacement).max()), first_extremum(displacement)
+
+
+def damped(road: FloatArray, damping: float, first: int = 0) -> FloatArray:
+    """Return the displacement (m) at 1 kHz over a road (m) at the plant's step."""
+    displacement = np.zeros(-(-road.size // _STEPS))
+    _damped(Vehicle(), resting_vehicle(), road, damping, first, STEP_TIME, displacement, _STEPS)
+    return displacement
+
+
+@compiled
+def _damped(vehicle, state, road, damping, first, dt, displacement, every):
+    """Fill `displacement` (m) at each `every`-th step; the damper (N s/m) is on from step `first` on."""
+    velocity = 0.0
+    for k in range(road.size):
+        force = damping * velocity if k >= first else 0.0
+        motion = vehicle_step(vehicle, state[0], road[k], 0.0, force, dt)
+        velocity = motion.velocity
+        if k % every == 0:
+            displacement[k // every] = motion.displacement
+
+
+@claim('Sec. 7', paper='Lower displacements when damping is on.')
+def _on_displacement(figures):
+    sweeps, texts = figures['sweep_ratio'], {}
+    for who in POLICIES:
+        ratios = ', '.join(f'{value:.2f} ({level} m/s)' for level, value in sweeps[who].items())
+        worst = max(max(values) for values in figures['gap_peak_ratio'][who].values())
+        texts[who] = f'{who}: {ratios}; over a gap at most {worst:.2f}'
+    told = f"""Largest displacement over that of the hydromount, sweep from 3 to 14 Hz by road level,
+        {texts[PAPER]}. {texts[CONTINUOUS]}. Holds if the continuous law is below the hydromount
+        everywhere."""
+    return max(worst, *sweeps[CONTINUOUS].values()) < 1.0 or PARTLY, told
+
+
+@claim(
+    'Fig. 14; Sec. 6',
+    paper='At higher frequencies, where damping is off, the acceleration of the chassis is lower.',
+)
+def _on_acceleration(figures):
+    ratios = ', '.join(f'{value:.3f}' for value in figures['high_frequency_ratio'][CONTINUOUS].values())
+    told = f"""Of the continuous law over the mount without current, 14 to 50 Hz, road levels as above:
+        {ratios}."""
+    return NOT_COMPARABLE, told
+
+
+def draw_sweeps(found: Found, levels: list[float]) -> Any:
     """Draw the largest displacement in each half hertz, for all policies and mounts."""
-    figure = new_figure('Front wheels on a sweep: largest displacement by policy', 3.2 * len(levels))
-    panels = np.atleast_1d(figure.subplots(len(levels), 1, sharex=True))
+    figure, panels = new_panels(
+        'Front wheels on a sweep: largest displacement by policy',
+        len(levels),
+        1,
+        3.2 * len(levels),
+        sharex=True,
+    )
+    panels = np.atleast_1d(panels)
     for panel, level in zip(panels, levels, strict=True):
         for who in COMPARED:
             displacement = found['sweep', who, level, 0.0]['displacement']
-            frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
+            frequency = swept_frequency(displacement.size)
             shown = frequency < 20.0
-            bins = np.floor(2.0 * frequency[shown]).astype(int)
-            starts = np.flatnonzero(np.diff(bins, prepend=bins[0] - 1))
-            highest = np.maximum.reduceat(np.abs(displacement[shown]), starts)
-            middle = 0.5 * bins[starts] + 0.25
-            panel.plot(middle, 1e3 * highest, color=_COLOURS[who], linestyle=_dash(who), label=who)
+            middle, highest = highest_per_band(frequency[shown], displacement[shown], 0.5)
+            panel.plot(middle, 1e3 * highest, label=who, **_LINES[who])
         panel.set_ylabel('largest displacement (mm)')
         panel.set_title(f'V0 = {level:g} m/s', fontsize='medium')
     panels[0].legend()
     panels[-1].set_xlabel('frequency of the road (Hz)')
-    return finish(figure, file)
+    return figure
 
 
-def draw_gap(found: Found, place: tuple[float, int], file: Path) -> Path:
+def draw_gap(found: Found, depth: float, seed: int) -> Any:
     """Draw the displacement over one gap, undamped in grey."""
-    depth, seed = place
-    figure = new_figure(f'Over a gap of {1e3 * depth:g} mm in the motorway')
-    panel = figure.subplots()
+    figure, panel = new_panels(f'Over a gap of {1e3 * depth:g} mm in the motorway')
     for who in (OFF, HYDRO, PAPER, CONTINUOUS):
         displacement = found['gap', who, depth, seed]['displacement']
-        time = SAMPLE_TIME * np.arange(displacement.size) - _GAP_TIME
+        time = SAMPLE_TIME * np.arange(displacement.size) - GAP_TIME
         shown = (time >= -_BEFORE) & (time <= _AFTER)
-        panel.plot(
-            time[shown], 1e3 * displacement[shown], color=_COLOURS[who], linestyle=_dash(who),
-            linewidth=1.8 if who == CONTINUOUS else 1.1, label=who,
-        )  # fmt: skip
-    panel.set_xlabel('time from the gap on (s)')
-    panel.set_ylabel('displacement (mm)')
+        width = 1.8 if who == CONTINUOUS else 1.1
+        panel.plot(time[shown], 1e3 * displacement[shown], linewidth=width, label=who, **_LINES[who])
+    panel.set(xlabel='time from the gap on (s)', ylabel='displacement (mm)')
     panel.legend()
-    return finish(figure, file)
+    return figure
 
 
-def draw_velocity(file: Path) -> Path:
+def draw_velocity() -> Any:
     """Draw what both policies take for the velocity over the true one, with the delay of the loop."""
     frequency = np.geomspace(2.0, 60.0, 300)
-    figure = new_figure('Velocity that the policy takes, over the true one when its force acts', 6.0)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    for who, response in (
-        (PAPER, _response_of_paper(frequency)),
-        (CONTINUOUS, _response_of_continuous(frequency)),
+    figure, (upper, lower) = new_panels(
+        'Velocity that the policy takes, over the true one when its force acts', 2, height=6.0, sharex=True
+    )
+    z = np.exp(2j * np.pi * frequency * SAMPLE_TIME)
+    for policy, velocity in (
+        (switched_viscous, _velocity_of_paper),
+        (continuous_viscous, _velocity_of_continuous),
     ):
-        upper.plot(frequency, np.abs(response), color=_COLOURS[who], label=who)
-        lower.plot(frequency, np.degrees(np.unwrap(np.angle(response))), color=_COLOURS[who], label=who)
+        own = policy.Parameters()
+        true = 2j * np.pi * frequency * np.exp(2j * math.pi * frequency * own.lead_time)
+        response = velocity(policy.design(own, SAMPLE_TIME).law, z) / true
+        who = PAPER if policy is switched_viscous else CONTINUOUS
+        upper.plot(frequency, np.abs(response), label=who, **_LINES[who])
+        lower.plot(frequency, np.degrees(np.unwrap(np.angle(response))), label=who, **_LINES[who])
     upper.set_ylabel('gain')
-    lower.set_ylabel('phase (degrees)')
-    lower.set_xlabel('frequency (Hz)')
-    lower.set_xscale('log')
-    lower.set_xticks([2, 4, 6, 8, 11, 20, 36, 60], ['2', '4', '6', '8', '11', '20', '36', '60'])
+    lower.set(ylabel='phase (degrees)', xlabel='frequency (Hz)', xscale='log')
+    ticks = [2, 4, 6, 8, 11, 20, 36, 60]
+    lower.set_xticks(ticks, map(str, ticks))
     lower.set_xticks([], minor=True)
     upper.legend()
-    return finish(figure, file)
+    return figure
 
 
-def _response_of_paper(frequency: FloatArray) -> FloatArray:
-    law = switched_viscous.design(switched_viscous.Parameters(), SAMPLE_TIME).law.band
-    z = np.exp(2j * np.pi * frequency * SAMPLE_TIME)
-    band = _band_response(law, z)
-    velocity = law.from_velocity * band * (1.0 - 1.0 / z) / SAMPLE_TIME + law.from_displacement * band
-    return velocity / _true(frequency, switched_viscous.Parameters().lead_time)
+def _velocity_of_paper(law: Any, z: FloatArray) -> FloatArray:
+    band = _band_response(law.band, z)
+    return law.band.from_velocity * band * (1.0 - 1.0 / z) / SAMPLE_TIME + law.band.from_displacement * band
 
 
-def _response_of_continuous(frequency: FloatArray) -> FloatArray:
+def _velocity_of_continuous(law: Any, z: FloatArray) -> FloatArray:
     """Without an idle line."""
-    law = continuous_viscous.design(continuous_viscous.Parameters(), SAMPLE_TIME).law
-    z = np.exp(2j * np.pi * frequency * SAMPLE_TIME)
     beta = law.beta_rate * SAMPLE_TIME
     tracked = law.beta_rate * z * (z - 1.0) / (z * z + (law.alpha + beta - 2.0) * z + 1.0 - law.alpha)
-    velocity = tracked - law.band_share * _band_response(law.band, z)
-    return velocity / _true(frequency, continuous_viscous.Parameters().lead_time)
+    return tracked - law.band_share * _band_response(law.band, z)
 
 
 def _band_response(law: band_pass.BandPass, z: FloatArray) -> FloatArray:
     return law.gain * (1.0 - z**-2) / (1.0 + law.a1 / z + law.a2 / z**2)
 
 
-def _true(frequency: FloatArray, lead: float) -> FloatArray:
-    return 2j * np.pi * frequency * np.exp(2j * math.pi * frequency * lead)
-
-
-def draw_spectra(found: Found, idle: float, file: Path) -> Path:
+def draw_spectra(found: Found, idle: float) -> Any:
     """Draw the chassis acceleration on the recorded road in bands of 1 Hz, without and with idle force."""
-    figure = new_figure('The recorded drive as a road: acceleration of the chassis', 6.5)
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, panels = new_panels(
+        'The recorded drive as a road: acceleration of the chassis', 2, height=6.5, sharex=True
+    )
     for panel, force in zip(panels, (0.0, idle), strict=True):
         for who in COMPARED:
             spectrum = np.array(found['road', who, 'recorded', force]['spectrum'])
-            middle = np.arange(spectrum.size) + 0.5
-            panel.semilogy(middle, spectrum, color=_COLOURS[who], linestyle=_dash(who), label=who)
+            panel.semilogy(np.arange(spectrum.size) + 0.5, spectrum, label=who, **_LINES[who])
         panel.set_title(f'idle force {force:g} N', fontsize='medium')
         panel.set_ylabel('rms in 1 Hz (m/s$^2$)')
     panels[0].legend()
     panels[1].set_xlabel('frequency (Hz)')
-    return finish(figure, file)
+    return figure
 
 
-def draw_front(points: list[Values], file: Path) -> Path:
+def draw_front(points: list[Values]) -> Any:
     """Draw the ratio on a light road over wear and over the acceleration with an idling engine."""
-    figure = new_figure('What damping on light roads costs: lowest amplitude and damping varied')
-    panels = figure.subplots(1, 2, sharey=True)
-    labels = (
-        ('j_per_km', 'energy in the pads (J/km)'),
-        ('acceleration_idling', 'acceleration, engine idling, over no current'),
+    figure, panels = new_panels(
+        'What damping on light roads costs: lowest amplitude and damping varied', 1, 2, sharey=True
     )
-    for panel, (what, label) in zip(panels, labels, strict=True):
+    for panel, what, label in (
+        (panels[0], 'j_per_km', 'energy in the pads (J/km)'),
+        (panels[1], 'acceleration_idling', 'acceleration, engine idling, over no current'),
+    ):
         for point in points:
-            colour = BLUE if point['on_front'] else GREY
-            panel.plot(point[what], point['light_road'], 'o', color=colour, markersize=5)
+            place = point[what], point['light_road']
+            panel.plot(*place, 'o', color=BLUE if point['on_front'] else GREY, markersize=5)
             if point['name']:
-                panel.annotate(
-                    point['name'], (point[what], point['light_road']), xytext=(5, 5),
-                    textcoords='offset points',
-                )  # fmt: skip
+                panel.annotate(point['name'], place, xytext=(5, 5), textcoords='offset points')
         panel.set_xlabel(label)
     panels[0].set_ylabel('largest displacement, V0 = 0.04 m/s, over hydromount')
-    return finish(figure, file)
-
-
-def _dash(who: str) -> str:
-    return {OFF: ':', HYDRO: '--'}.get(who, '-')
+    return figure
 
 
 EXPERIMENT = Experiment(
     NAME,
     *NAMES[NAME],
-    (
-        "The paper's switched policy and the continuous law on the same roads, racks and engines, beside the "
-        'hydromount and the mount without current: what each gives, and what it costs.'
-    ),
+    """The paper's switched policy and the continuous law on the same roads, racks and engines, beside the
+    hydromount and the mount without current: what each gives, and what it costs.""",
     PolicyParameters(),
     run,
 )

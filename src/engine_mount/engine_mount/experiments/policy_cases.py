@@ -1,46 +1,70 @@
-"""The runs that are compared: which policy or mount, on what, and with which plant."""
+"""The runs that are compared: which policy or mount, on what, with which plant; and the figures of each."""
 
+import functools
 import importlib.resources
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import product
 from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
-from engine_mount.experiments.harness.closed_loop import settings_of_run
-from engine_mount.experiments.harness.contract import Order, Values
-from engine_mount.experiments.harness.measures import sweep_parameters
-from engine_mount.experiments.policy_runs import PolicyJob
+import numpy as np
+
+from engine_mount.drives.bands import BELOW_ISOLATION
+from engine_mount.experiments.harness.closed_loop import PAPER, Case, settings_of_run
+from engine_mount.experiments.harness.experiment import Order, Values, Workers
+from engine_mount.experiments.harness.measures import (
+    first_extremum,
+    peak_and_rms,
+    rms,
+    rms_in_bands,
+    sweep_parameters,
+)
+from engine_mount.reports.drive.signals import FloatArray, Truth
+from engine_mount.reports.sections.periodic import distortion, harmonics, whole_periods
+from engine_mount.signals.excitation import acceleration_at, recorded_signal
+from engine_mount.signals.roads.inversion import road_of
 from mount_control.policy import continuous_viscous
+from mount_models.arithmetic.series import series_of
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
-from mount_sim.excitation.scenario import AccelerationScale, RecordedScenario
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.excitation import Excitation, Seat, idle_force
+from mount_sim.excitation.scenario import STEP_TIME, AccelerationScale, RecordedScenario
+from mount_sim.parameters import SimParameters
 from mount_sim.plant.vehicle import Elastomer, Vehicle
 
-NAME = 'policy'
-PAPER, CONTINUOUS = 'switched_viscous', 'continuous_viscous'
+CONTINUOUS = 'continuous_viscous'
 POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
 NOMINAL = 8.0  # Hz
 _CASES = plain_yaml(importlib.resources.files(__package__).joinpath('policy_cases.yaml').read_text('utf-8'))
-DISTURBANCES, ABLATIONS, DAMPINGS = _CASES['disturbances'], _CASES['ablations'], _CASES['dampings']
-AMPLITUDES = tuple(map(tuple, _CASES['amplitudes']))
+DISTURBANCES, ABLATIONS = _CASES['disturbances'], _CASES['ablations']
+FRONT = [(*amplitudes, damping) for amplitudes, damping in product(_CASES['amplitudes'], _CASES['dampings'])]
+"""Lowest and full amplitude (m), and damping coefficient (N s/m), that are run."""
 NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
-"""{lowest and full amplitude (m), damping coefficient (N s/m): name}: points of the front worth one."""
+"""{point of the front: the name it is worth}."""
 LEARNT_ROADS, LEARNT_SCALES = (2e-6, 16e-6), (0.85, 1.0, 1.15)
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 """Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
-_GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
-_RACK_AMPLITUDE, _RACK_SECONDS = 1e-3, 3.5  # m, s
+GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
+_RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
 _TIP_IN = 400.0  # N, chosen
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
+ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
+_ONE_HERTZ = [(float(low), low + 1.0) for low in range(100)]  # Hz: bands of the shown spectrum
+_SETTLING = 1.0  # s, chosen: a road fades in for so long
+_PERIODS = 8  # evaluated on the rack
+BAND = (4.0, 14.0)  # Hz: where the engine may shake
+_SMOOTH = 30.0  # Hz, chosen: above it no derivative is taken
+_RINGING = slice(60, 450)  # ms behind the gap: the first extremum is past, the ringing not
+_MASS = 80.0  # kg: the share of the engine that the estimate believes in
 
-
-Make = Callable[..., PolicyJob]
-"""Makes a run from its key, the parameters of the simulator and the kind of its figures."""
+Key = tuple[Any, ...]
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class PolicyParameters(NamedTuple):
@@ -63,14 +87,7 @@ class PolicyParameters(NamedTuple):
     recorded_speed: Annotated[
         float, Quantity('m/s', 'mean speed of the recorded drive', 0.1, 90.0, 'its own')
     ] = 16.7
-    workers: Annotated[int, Quantity('1', 'processes; 0: one for each core', 0, 256)] = 0
-
-    @property
-    def recorded(self) -> RecordedScenario | None:
-        """The recorded drive, None without one."""
-        if not self.recording:
-            return None
-        return RecordedScenario(file=self.recording, column=self.column, scale=self.scale)
+    workers: Workers = 0
 
 
 class Axes(NamedTuple):
@@ -90,114 +107,78 @@ class Axes(NamedTuple):
         return [('mass', NOMINAL), *product(('mass', 'stiffness'), self.engines)]
 
 
-def jobs_of(order: Order, parameters: PolicyParameters, axes: Axes) -> list[PolicyJob]:
-    """Return all runs."""
-    make = partial(_job, order)
-    jobs = [*_roads_and_rack(make, parameters, axes)]
-    if parameters.thorough:
-        jobs += [*_robustness(make, axes), *_idling(make, axes), *_learning(make, parameters, axes)]
-        for name, changes in ABLATIONS.items():
-            jobs += _variant(make, parameters, axes, ('ablation', name), changes)
-        for (lowest, full), damping in product(AMPLITUDES, DAMPINGS):
-            changes = {'lowest_amplitude': lowest, 'full_amplitude': full, 'damping_coefficient': damping}
-            jobs += _variant(make, parameters, axes, ('front', lowest, full, damping), changes)
-    return jobs
+def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
+    """Return all runs by a key that names policy or mount; `Findings` of the experiment are made of them."""
+    own: PolicyParameters = order.parameters
+    cases: dict[Key, Case] = {}
 
+    def add(
+        key: Key, sim: Values, figures: Any, changes: Mapping[str, Any] = NOTHING, excitation: Any = None
+    ) -> None:
+        who = next(part for part in key if part in COMPARED)
+        policy = who if who in POLICIES else PAPER
+        control = {'policy': policy, **{f'{policy}.{name}': value for name, value in changes.items()}}
+        mount = {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')
+        cases[key] = Case(settings_of_run(order, {**sim, 'mount': mount}, control), figures, excitation)
 
-def _roads_and_rack(make: Make, parameters: PolicyParameters, axes: Axes) -> Iterator[PolicyJob]:
-    """Yield sweeps, gaps of all depths on several roads, sines of the rack, roads and a tip-in."""
-    idles = (0.0, parameters.idle_amplitude)
+    idles, seeds = (0.0, own.idle_amplitude), range(1, own.gap_seeds + 1)
     for level, idle, who in product(axes.levels, idles, COMPARED):
-        kept = idle == 0.0 and level in _SHOWN_LEVELS
-        sim = sweep_parameters(level, parameters.last_frequency, idle)
-        yield make(('sweep', who, level, idle), sim, 'sweep', kept=kept)
-    for depth, seed, who in product(axes.depths, range(1, parameters.gap_seeds + 1), COMPARED):
-        kept = seed == 1 and depth == _SHOWN_DEPTH
-        yield make(('gap', who, depth, seed), _gap(depth, 2e-6, seed), 'gap', kept=kept)
-    own = continuous_viscous.Parameters()
-    dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (own.damping_coefficient, own.rounding_velocity)}
+        shown = idle == 0.0 and level in _SHOWN_LEVELS
+        figures = partial(with_displacement, peak_and_rms) if shown else peak_and_rms
+        add(('sweep', who, level, idle), sweep_parameters(level, own.last_frequency, idle), figures)
+    for depth, seed, who in product(axes.depths, seeds, COMPARED):
+        shown = seed == 1 and depth == _SHOWN_DEPTH
+        figures = partial(with_displacement, of_gap) if shown else of_gap
+        add(('gap', who, depth, seed), _gap(depth, 2e-6, seed), figures)
+    law = continuous_viscous.Parameters()
+    dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (law.damping_coefficient, law.rounding_velocity)}
     for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
-        sim = {
-            'scenario': 'bench',
-            'bench.frequency': frequency,
-            'bench.amplitude': _RACK_AMPLITUDE,
-            'timeline.duration': _RACK_SECONDS,
-        }
-        yield make(('rack', who, frequency), sim, 'rack', damper=dampers.get(who, (0.0, 0.0)))
+        figures = partial(of_rack, *dampers.get(who, (0.0, 0.0)))
+        add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, figures)
     for idle, who in product(idles, COMPARED):
         for road, roughness in ROADS.items():
-            sim = _motorway(roughness, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
-            yield make(('road', who, road, idle), sim, 'road')
-        if parameters.recorded is not None:
-            sim = {'scenario': 'motorway', 'idle.amplitude': idle}
-            key = ('road', who, 'recorded', idle)
-            yield make(key, sim, 'road', recorded=parameters.recorded, kept=True)
+            add(('road', who, road, idle), _road(roughness, _ROAD_SECONDS, idle), of_road)
+        if own.recording:
+            recorded = RecordedScenario(file=own.recording, column=own.column, scale=own.scale)
+            sim, excitation = (
+                {'scenario': 'motorway', 'idle.amplitude': idle},
+                partial(over_recorded, recorded),
+            )
+            add(('road', who, 'recorded', idle), sim, partial(of_road, spectrum=True), excitation=excitation)
     for who in COMPARED:
-        sim = _motorway(2e-6, _HELD_OUT_SEED, 4.0) | {'tip_in.force': _TIP_IN}
-        yield make(('tip-in', who), sim, 'road')
-
-
-def _robustness(make: Make, axes: Axes) -> Iterator[PolicyJob]:
-    """Yield sweeps with other engines, pads, sensors and temperatures."""
-    for plant, (name, changes), level in product(axes.plants, DISTURBANCES.items(), axes.engine_levels):
+        add(('tip-in', who), _road(2e-6, 4.0) | {'tip_in.force': _TIP_IN}, of_road)
+    if not own.thorough:
+        return cases
+    for plant, level in product(axes.plants, axes.engine_levels):
         sim = sweep_parameters(level, 14.0) | _engine(*plant)
-        yield make(('robust', CONTINUOUS, *plant, name, level), sim | changes, 'sweep')
-        if name == 'nominal':
-            yield make(('robust', HYDRO, *plant, level), sim, 'sweep')
-            yield make(('robust', PAPER, *plant, name, level), sim, 'sweep')
-
-
-def _idling(make: Make, axes: Axes) -> Iterator[PolicyJob]:
-    """Yield roads with an idling engine."""
+        for name, changes in DISTURBANCES.items():
+            add(('robust', CONTINUOUS, *plant, name, level), sim | changes, peak_and_rms)
+        for who in (PAPER, HYDRO):
+            add(('robust', who, *plant, 'nominal', level), sim, peak_and_rms)
     for roughness, frequency, force, who in product(
-        (2e-6, _ROUGH), axes.idle_frequencies, axes.idle_forces, COMPARED
+        LEARNT_ROADS, axes.idle_frequencies, axes.idle_forces, COMPARED
     ):
-        idle = {'idle.amplitude': force, 'idle.frequency': frequency}
-        sim = _motorway(roughness, _HELD_OUT_SEED, 6.0) | idle
-        yield make(('idle', who, roughness, frequency, force), sim, 'road')
-
-
-def _learning(make: Make, parameters: PolicyParameters, axes: Axes) -> Iterator[PolicyJob]:
-    """Yield roads with other engines and gaps with other pads, to see what could be learnt of them."""
+        sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
+        add(('idle', who, roughness, frequency, force), sim, of_road)
+    # what could be learnt of engines and pads
     for plant, roughness in product(axes.plants, LEARNT_ROADS):
-        sim = _motorway(roughness, _HELD_OUT_SEED, 10.0) | _engine(*plant)
-        yield make(('learn', CONTINUOUS, *plant, roughness), sim, 'road')
-    seeds = range(1, parameters.gap_seeds + 1)
+        add(('learn', CONTINUOUS, *plant, roughness), _road(roughness, 10.0) | _engine(*plant), of_road)
     for scale, roughness, seed in product(LEARNT_SCALES, LEARNT_ROADS, seeds):
         sim = _gap(_SHOWN_DEPTH, roughness, seed) | {'friction.scale': scale}
-        yield make(('learn', CONTINUOUS, scale, roughness, seed), sim, 'gap')
+        add(('learn', CONTINUOUS, scale, roughness, seed), sim, of_gap)
+    variants: dict[Key, Values] = {('ablation', name): changes for name, changes in ABLATIONS.items()}
+    for point in FRONT:
+        names = ('lowest_amplitude', 'full_amplitude', 'damping_coefficient')
+        variants['front', *point] = dict(zip(names, point, strict=True))
+    for key, changes in variants.items():
+        for level in (axes.levels[0], axes.levels[-1]):
+            add((*key, CONTINUOUS, level), sweep_parameters(level, 14.0), peak_and_rms, changes)
+        for idle in idles:
+            add((*key, CONTINUOUS, 'road', idle), _road(_ROUGH, _ROAD_SECONDS, idle), of_road, changes)
+    return cases
 
 
-def _variant(
-    make: Make, parameters: PolicyParameters, axes: Axes, key: tuple[Any, ...], changes: dict[str, float]
-) -> Iterator[PolicyJob]:
-    """Yield the runs of the continuous law with some of its parameters changed."""
-    for level in (axes.levels[0], axes.levels[-1]):
-        yield make((*key, CONTINUOUS, level), sweep_parameters(level, 14.0), 'sweep', changes)
-    for idle in (0.0, parameters.idle_amplitude):
-        sim = _motorway(_ROUGH, _HELD_OUT_SEED, _ROAD_SECONDS) | {'idle.amplitude': idle}
-        yield make((*key, CONTINUOUS, 'road', idle), sim, 'road', changes)
-
-
-def _job(
-    order: Order,
-    key: tuple[Any, ...],
-    sim: Values,
-    kind: str,
-    changes: Mapping[str, float] = MappingProxyType({}),
-    **more: Any,
-) -> PolicyJob:
-    who = next(part for part in key if part in COMPARED)
-    policy = who if who in POLICIES else PAPER
-    changed = {f'{policy}.{name}': value for name, value in changes.items()}
-    own = {
-        'mount_sim': sim | {'mount': {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')},
-        'mount_control': {'policy': policy, **changed},
-    }
-    return PolicyJob(key, settings_of_run(order, own, NAME), kind, **more)
-
-
-def _motorway(roughness: float, seed: int, duration: float) -> Values:
+def _road(roughness: float, duration: float, idle: float = 0.0, seed: int = _HELD_OUT_SEED) -> Values:
     return {
         'scenario': 'motorway',
         'seed': seed,
@@ -205,15 +186,13 @@ def _motorway(roughness: float, seed: int, duration: float) -> Values:
         'motorway.roughness': roughness,
         'motorway.speed': SPEED,
         'motorway.gap_depth': 0.0,
+        'idle.amplitude': idle,
     }
 
 
 def _gap(depth: float, roughness: float, seed: int) -> Values:
-    return {
-        **_motorway(roughness, seed, _GAP_SECONDS),
-        'motorway.gap_depth': depth,
-        'motorway.gap_time': _GAP_TIME,
-    }
+    gap = {'motorway.gap_depth': depth, 'motorway.gap_time': GAP_TIME}
+    return _road(roughness, _GAP_SECONDS, seed=seed) | gap
 
 
 def _engine(how: str, frequency: float) -> dict[str, float]:
@@ -226,3 +205,87 @@ def _engine(how: str, frequency: float) -> dict[str, float]:
         for name, value in Elastomer()._asdict().items()
         if name.endswith('stiffness')
     }
+
+
+def over_recorded(recorded: RecordedScenario, sim: SimParameters) -> Excitation:
+    """Return the drive over the road behind a recorded acceleration, with an idling engine."""
+    road, idle = recorded_road(recorded), sim.idle
+    forces = idle_force(idle.amplitude, idle.frequency, idle.second_share, road.size, STEP_TIME)
+    return Excitation(Seat.VEHICLE, series_of(road), STEP_TIME, sim.timeline.start, forces)
+
+
+@functools.cache
+def recorded_road(recorded: RecordedScenario) -> FloatArray:
+    """Return the road (m) behind a recorded acceleration, at the step of the plant; raises `SignalError`."""
+    acceleration = acceleration_at(recorded_signal(recorded), STEP_TIME)
+    return road_of(acceleration[:], STEP_TIME, Vehicle())
+
+
+def with_displacement(figures: Callable[..., Values], truth: Truth, sim: SimParameters) -> Values:
+    """Return figures and the displacement (m) too, for a picture."""
+    return {**figures(truth, sim), 'displacement': truth.displacement}
+
+
+def of_gap(truth: Truth, sim: SimParameters) -> Values:
+    """Return largest displacement and first extremum (m) over a gap, and the pads that the ringing shows."""
+    part = slice(round(sim.motorway.gap_time / SAMPLE_TIME), None)
+    behind = truth.displacement[part]
+    return {
+        'peak_m': float(np.max(np.abs(behind))),
+        'first_m': first_extremum(behind),
+        'friction_scale': friction_scale(behind, truth.friction_force[part] / sim.friction.scale),
+    }
+
+
+def of_rack(damping: float, dead: float, truth: Truth, sim: SimParameters) -> Values:
+    """Return distortion (%), and how far friction lies from a damper (N s/m) with a dead zone (m/s)."""
+    frequency = sim.bench.frequency
+    part, _ = whole_periods(truth.time, frequency, _PERIODS)
+    velocity, force = truth.velocity[part], truth.mount_force[part]
+    wanted = np.sign(velocity) * damping * np.maximum(np.abs(velocity) - dead, 0.0)
+    error = rms(truth.friction_force[part] - wanted)
+    return {
+        'thd': 100.0 * distortion(harmonics(truth.time[part], force, frequency)),
+        'tracking': 100.0 * float(error / np.abs(wanted).max()) if damping else None,
+    }
+
+
+def of_road(truth: Truth, sim: SimParameters, spectrum: bool = False) -> Values:
+    """Return displacement (m), chassis acceleration (m/s^2), power of pads and coil (W), engine frequency."""
+    part = slice(round(_SETTLING / SAMPLE_TIME), None)
+    displacement, acceleration = truth.displacement[part], truth.chassis_acceleration[part]
+    acceleration = acceleration - acceleration.mean()
+    return {
+        'acceleration': rms_in_bands(acceleration, [ACOUSTIC])[0],
+        'peak_m': float(np.abs(displacement).max()),
+        'rms_m': rms_in_bands(displacement, [BELOW_ISOLATION])[0],
+        'power_w': float(np.mean(np.abs(truth.friction_force[part] * truth.velocity[part]))),
+        'frequency_hz': frequency_in_band(displacement),
+        'heat_w': sim.coil.resistance * float(np.mean(truth.coil_current[part] ** 2)),
+        'spectrum': rms_in_bands(acceleration, _ONE_HERTZ) if spectrum else None,
+    }
+
+
+def frequency_in_band(displacement: FloatArray) -> float:
+    """Return the rms velocity over the rms displacement (Hz) within `BAND`: how fast the phasor turns."""
+    frequency = np.fft.rfftfreq(displacement.size, SAMPLE_TIME)
+    within = (frequency >= BAND[0]) & (frequency <= BAND[1])
+    power = np.abs(np.fft.rfft(displacement)[within]) ** 2
+    return float(np.sqrt(np.sum(power * frequency[within] ** 2) / np.sum(power)))
+
+
+def friction_scale(displacement: FloatArray, assumed_force: FloatArray) -> float:
+    """Return the pads' friction over the `assumed_force` (N), from the ringing behind a gap at sample 0.
+
+    Least squares of acceleration over displacement, velocity, assumed force and a constant.
+    """
+    frequency = np.fft.rfftfreq(displacement.size, SAMPLE_TIME)
+
+    def derivative(values: FloatArray, order: int) -> FloatArray:
+        spectrum = np.where(frequency > _SMOOTH, 0.0, np.fft.rfft(values))
+        return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, values.size)[_RINGING]
+
+    columns = [derivative(displacement, 0), derivative(displacement, 1), derivative(assumed_force, 0)]
+    base = np.stack([*columns, np.ones(columns[0].size)], 1)
+    solution = np.linalg.lstsq(base, derivative(displacement, 2), rcond=None)[0]
+    return float(-_MASS * solution[2])

@@ -1,8 +1,21 @@
 """All experiments by name, in the order of the paper's figures; each is loaded when it is wanted."""
 
+from collections.abc import Sequence
 from importlib import import_module
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
-from engine_mount.experiments.harness.contract import Experiment, ExperimentError
+from engine_mount.experiments.harness.experiment import (
+    Experiment,
+    ExperimentError,
+    Order,
+    Outcome,
+    Settings,
+    Values,
+)
+from engine_mount.settings.run_folder import RunFolderError, new_place
+from mount_bringup.settings import checked_settings, defaults_of_nodes
 
 ALL = 'all'
 
@@ -36,7 +49,7 @@ def experiment_named(name: str) -> Experiment:
     return experiment
 
 
-def experiments_named(names: list[str]) -> list[Experiment]:
+def experiments_named(names: Sequence[str]) -> list[Experiment]:
     """Return the experiments of these names; raises `ExperimentError` for an unknown one.
 
     `all` stands for every one that needs nothing of the user's own.
@@ -45,3 +58,43 @@ def experiments_named(names: list[str]) -> list[Experiment]:
     if ALL not in names:
         return named
     return [each for each in map(experiment_named, NAMES) if not each.needs or each in named]
+
+
+def known_settings(experiments: Sequence[Experiment]) -> dict[str, Values]:
+    """Return {owner: {parameter: default}} of what can be set where these experiments run."""
+    nodes = defaults_of_nodes() if any(each.closed_loop for each in experiments) else {}
+    return {owner: values for each in experiments for owner, values in each.known_settings().items()} | nodes
+
+
+def orders(
+    experiments: Sequence[Experiment], settings: Settings, out: Path | None = None, *, graph: bool = False
+) -> list[tuple[Experiment, Order]]:
+    """Return each experiment with its order; raises a `ValueError` that says what is wrong with it."""
+    for each in experiments if graph else ():
+        if not each.closed_loop:
+            raise ExperimentError(
+                f'{each.name} has no graph to run through: neither controller nor CAN bus take part in it; '
+                'leave out --graph'
+            )
+    checked = checked_settings(settings, known_settings(experiments), 'owner of parameters here')
+    alone = len(experiments) == 1
+    place = out or new_place(experiments[0].name if alone else 'experiments')
+    if place.exists() and (not place.is_dir() or any(place.iterdir())):
+        raise RunFolderError(f'{place} exists and is not empty; choose another folder with --out')
+    return [
+        (each, each.order(place if alone else place / each.name, checked, graph=graph))
+        for each in experiments
+    ]
+
+
+def experiment(name: str, *, out: str | PathLike[str] | None = None, **settings: Any) -> Outcome:
+    """Repeat one experiment of the paper and return figures (SI), claims with their verdicts, and files.
+
+    `out` is the folder of what is made, by default a new one in bags. `settings` are parameters of the
+    experiment, and below the name of a node a mapping of that node's. Raises a `ValueError` that says what
+    is wrong with the order.
+    """
+    chosen = experiment_named(name)
+    nodes = {node: settings.pop(node) for node in defaults_of_nodes().keys() & settings.keys()}
+    ((_, order),) = orders([chosen], {name: settings, **nodes}, None if out is None else Path(out))
+    return chosen.run(order)

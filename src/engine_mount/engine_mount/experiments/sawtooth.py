@@ -7,19 +7,27 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from engine_mount.experiments.harness.contract import (
+from engine_mount.experiments.harness.drawing import (
+    BLUE,
+    GREY,
+    RED,
+    family,
+    legend_below,
+    new_mosaic,
+    new_panels,
+)
+from engine_mount.experiments.harness.experiment import (
+    NOT_COMPARABLE,
+    PARTLY,
     Experiment,
     ExperimentError,
-    Holds,
+    Findings,
     Order,
-    Outcome,
-    Progress,
     Seed,
-    Statement,
     Values,
-    parameters_of,
+    claim,
 )
-from engine_mount.experiments.harness.drawing import BLUE, GREY, RED, family, finish, new_figure
+from engine_mount.experiments.harness.measures import rms
 from engine_mount.experiments.harness.rack_recording import (
     SUBSTEPS,
     DisplacementNoise,
@@ -29,62 +37,18 @@ from engine_mount.experiments.harness.rack_recording import (
 from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.recording import FloatArray, FrictionRecording
-from engine_mount.identification.friction.steps.sawtooth import (
+from engine_mount.identification.friction.sawtooth import (
     StrokeLine,
     deflection_from_force,
+    slip_regions,
     stroke_lines,
 )
-from engine_mount.identification.friction.steps.slip_regions import slip_regions
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW, simplified_response
 from mount_models.quantity import Quantity, flattened
 from mount_sim.plant.friction import full_response
 from mount_sim.rack.friction import move, sawtooth_corners, with_noise
-
-
-@dataclass(frozen=True)
-class Run:
-    """One recording at one normal force, its strokes, and both models driven by its displacement.
-
-    The first stroke, which no turning point precedes, is not among `strokes`.
-    """
-
-    recording: FrictionRecording
-    deflection: FloatArray
-    strokes: list[StrokeLine]
-    full_force: FloatArray
-    simplified_force: FloatArray
-
-
-def evaluate(path: Path, contact: FrictionContact, coefs: FrictionCoefficients) -> Run:
-    """Return what steps 1 and 2 of the identification make of the recording at `path`, and the models."""
-    recording = read_recording(path)
-    xi = deflection_from_force(
-        recording.force, recording.dt, contact.tangential_stiffness, contact.tangential_damping
-    )
-    x, load = recording.displacement, recording.normal_force[:, 0]
-    velocity = np.diff(x, prepend=x[0]) / recording.dt
-    simplified, _ = simplified_response(contact, coefs, velocity, load, recording.dt)
-    return Run(
-        recording,
-        xi,
-        [line for line in stroke_lines(recording, contact) if line.stroke.start > 0],
-        _full_model_force(contact, coefs, recording),
-        simplified,
-    )
-
-
-def _full_model_force(
-    contact: FrictionContact, coefs: FrictionCoefficients, recording: FrictionRecording
-) -> FloatArray:
-    """Return the force (N) of the full model on the recorded displacement, straight between samples."""
-    samples = np.arange(recording.displacement.size)
-    fine = np.arange((samples.size - 1) * SUBSTEPS + 1) / SUBSTEPS
-    x = np.interp(fine, samples, recording.displacement)
-    load = np.interp(fine, samples, recording.normal_force[:, 0])
-    return np.asarray(full_response(contact, coefs, x, load, recording.dt / SUBSTEPS)[0][::SUBSTEPS])
-
 
 NAME = 'sawtooth'
 
@@ -109,93 +73,102 @@ class SawtoothParameters(NamedTuple):
     contact: FrictionContact = FrictionContact()
 
 
-def run(order: Order, progress: Progress) -> Outcome:
+@dataclass(frozen=True)
+class Rack:
+    """One recording at one normal force, its strokes, and both models driven by its displacement.
+
+    The first stroke, which no turning point precedes, is not among `strokes`.
+    """
+
+    recording: FrictionRecording
+    deflection: FloatArray
+    strokes: list[StrokeLine]
+    full_force: FloatArray
+    simplified_force: FloatArray
+
+    def by_speed(self, direction: float) -> list[StrokeLine]:
+        """Return the strokes in one direction (1 or -1), slowest first."""
+        return sorted(
+            (s for s in self.strokes if s.velocity * direction > 0.0), key=lambda s: abs(s.velocity)
+        )
+
+
+def run(order: Order) -> Findings:
     """Move the rack at every normal force, record it, and evaluate the recordings."""
-
-    parameters = parameters_of(order, NAME, SawtoothParameters())
-    _check_order(parameters)
-    loads = _normal_forces(parameters)
-    recordings, runs = [], []
-    for number, load in enumerate(loads):
-        progress(number / len(loads), f'saw tooth at {load:g} N')
-        recordings.append(_record(order, parameters, load, number))
-        runs.append(evaluate(recordings[-1], parameters.contact, parameters.friction))
-    progress(0.95, 'pictures')
-    shown = runs[int(np.argmin(np.abs(np.array(loads) - parameters.shown_normal_force)))]
-    pictures = [
-        draw_time(shown, order.out / 'sawtooth_force.png'),
-        draw_lines(shown, order.out / 'sawtooth_mu_over_u.png'),
-        draw_parameters(runs, parameters.friction, order.out / 'sawtooth_a_b.png'),
-        draw_models(shown, order.out / 'sawtooth_models.png'),
-    ]
-    results = _figures(runs, shown, parameters)
-    return Outcome(results, pictures, recordings, _statements(results))
-
-
-def _check_order(parameters: SawtoothParameters) -> None:
-    for what, unit in (('speed', 'm/s'), ('normal_force', 'N')):
-        low, high = (getattr(parameters, f'{end}_{what}') for end in ('lowest', 'highest'))
-        if low > high:
-            raise ExperimentError(
-                f'lowest_{what} ({low:g} {unit}) must not lie above highest_{what} ({high:g} {unit})'
-            )
-
-
-def _normal_forces(parameters: SawtoothParameters) -> list[float]:
-    step = parameters.normal_force_step
-    loads = np.arange(parameters.lowest_normal_force, parameters.highest_normal_force + 0.5 * step, step)
-    return [float(load) for load in loads]
-
-
-def _record(order: Order, parameters: SawtoothParameters, load: float, number: int) -> Path:
-    step = parameters.speed_step
-    speeds = np.arange(parameters.lowest_speed, parameters.highest_speed + 0.5 * step, step)
-    corners = sawtooth_corners(-parameters.amplitude, speeds)
-    rack = move(parameters.contact, parameters.friction, *corners, load, substeps=SUBSTEPS)
-    measured = with_noise(
-        rack, parameters.force_noise, parameters.displacement_noise, parameters.seed + number
-    )
-    session = {
-        'scenario': NAME,
-        'mode': 'rack',
-        'normal_force': load,
-        'parameters': {NAME: flattened(parameters)},
+    own = order.parameters
+    loads = _steps('normal_force', own, 'N')
+    corners = sawtooth_corners(-own.amplitude, _steps('speed', own, 'm/s'))
+    session = {'scenario': NAME, 'mode': 'rack', 'parameters': {NAME: flattened(own)}}
+    recordings, racks = [], []
+    for number, load in enumerate(loads.tolist()):
+        order.progress(number / len(loads), f'saw tooth at {load:g} N')
+        rack = move(own.contact, own.friction, *corners, load, substeps=SUBSTEPS)
+        measured = with_noise(rack, own.force_noise, own.displacement_noise, own.seed + number)
+        folder = order.out / f'sawtooth_{load:.0f}N'
+        recordings.append(record_friction_rack(folder, measured, {**session, 'normal_force': load}))
+        racks.append(evaluate(recordings[-1], own.contact, own.friction))
+    order.progress(0.95, 'pictures')
+    shown = racks[int(np.argmin(np.abs(loads - own.shown_normal_force)))]
+    pictures = {
+        'sawtooth_force': draw_time(shown),
+        'sawtooth_mu_over_u': draw_lines(shown),
+        'sawtooth_a_b': draw_parameters(racks, own.friction),
+        'sawtooth_models': draw_models(shown),
     }
-    return record_friction_rack(order.out / f'sawtooth_{load:.0f}N', measured, session)
+    return Findings(figures_of(racks, shown, own), pictures, recordings)
 
 
-def _figures(runs: list[Run], shown: Run, parameters: SawtoothParameters) -> Values:
-    every = [stroke for each in runs for stroke in each.strokes]
-    coefs = parameters.friction
-    a_error = [s.a - offset_coefficient(coefs, s.velocity, s.normal_force) for s in every]
-    b_error = [s.b - slope_coefficient(coefs, s.velocity, s.normal_force) for s in every]
-    noise = [parameters.force_noise / s.normal_force for s in every]
-    level = [_level(shown, direction) for direction in (1.0, -1.0)]
-    micro, macro, faded = slip_regions(shown.recording, parameters.contact)
+def _steps(what: str, own: SawtoothParameters, unit: str) -> FloatArray:
+    low, high, step = (getattr(own, name) for name in (f'lowest_{what}', f'highest_{what}', f'{what}_step'))
+    if low > high:
+        raise ExperimentError(
+            f'lowest_{what} ({low:g} {unit}) must not lie above highest_{what} ({high:g} {unit})'
+        )
+    return np.arange(low, high + 0.5 * step, step)
+
+
+def evaluate(path: Path, contact: FrictionContact, coefs: FrictionCoefficients) -> Rack:
+    """Return what steps 1 and 2 of the identification make of the recording at `path`, and the models."""
+    recording = read_recording(path)
+    dt, x, load = recording.dt, recording.displacement, recording.normal_force[:, 0]
+    xi = deflection_from_force(recording.force, dt, contact.tangential_stiffness, contact.tangential_damping)
+    simplified, _ = simplified_response(contact, coefs, np.diff(x, prepend=x[0]) / dt, load, dt)
+    samples = np.arange(x.size)
+    fine = np.arange((x.size - 1) * SUBSTEPS + 1) / SUBSTEPS  # straight between samples
+    between = (np.interp(fine, samples, values) for values in (x, load))
+    full, *_ = full_response(contact, coefs, *between, dt / SUBSTEPS)
+    strokes = [line for line in stroke_lines(recording, contact) if line.stroke.start > 0]
+    return Rack(recording, xi, strokes, np.asarray(full[::SUBSTEPS]), simplified)
+
+
+def figures_of(racks: list[Rack], shown: Rack, own: SawtoothParameters) -> Values:
+    """Return what the strokes show of mu, and how far both models lie from the shown recording."""
+    strokes = [stroke for each in racks for stroke in each.strokes]
+    curves = [(s, own.friction, s.velocity, s.normal_force) for s in strokes]
+    noise = [(s.residual, own.force_noise / s.normal_force) for s in strokes]
+    directions = {'p': shown.by_speed(1.0), 'n': shown.by_speed(-1.0)}
+    level = {way: [float(np.mean(s.mu[-20:])) for s in chosen] for way, chosen in directions.items()}
+    micro, macro, faded = slip_regions(shown.recording, own.contact)
     measured = shown.recording.force
 
     def share(model: FloatArray, where: Any) -> float | None:
         """Return the rms difference to the measured force as a share of its rms, None for no samples."""
-        return _rms(model[where] - measured[where]) / _rms(measured) if where.any() else None
+        return rms(model[where] - measured[where]) / rms(measured) if where.any() else None
 
     return {
-        'normal_forces_n': sorted({round(s.normal_force, 6) for s in every}),
-        'speeds_m_per_s': sorted({round(abs(s.displacement_velocity), 5) for s in every}),
-        'strokes': len(every),
-        'strokes_with_falling_coefficient': sum(s.b < 0.0 for s in every),
-        'rising_up_to_n': max((s.normal_force for s in every if s.b >= 0.0), default=None),
-        'jump_p': _jump(shown, 1.0),
-        'jump_n': _jump(shown, -1.0),
-        'largest_residual_of_line': max(s.residual for s in every),
-        'largest_residual_over_noise': max(
-            (s.residual / n for s, n in zip(every, noise, strict=True) if n > 0.0), default=None
-        ),
-        'a_rms_error': _rms(np.array(a_error)),
-        'b_rms_error_per_mm': _rms(np.array(b_error)) * 1e-3,
-        'level_p': level[0],
-        'level_n': level[1],
-        'level_rises_with_speed': bool(all((np.diff(values) > 0.0).all() for values in level)),
-        'force_noise_share': parameters.force_noise / _rms(measured),
+        'normal_forces_n': sorted({round(s.normal_force, 6) for s in strokes}),
+        'speeds_m_per_s': sorted({round(_speed(s), 5) for s in strokes}),
+        'strokes': len(strokes),
+        'strokes_with_falling_coefficient': sum(s.b < 0.0 for s in strokes),
+        'rising_up_to_n': max((s.normal_force for s in strokes if s.b >= 0.0), default=None),
+        **{f'jump_{way}': [s.fall for s in chosen] for way, chosen in directions.items()},
+        'largest_residual_of_line': max(residual for residual, _ in noise),
+        'largest_residual_over_noise': max((r / n for r, n in noise if n > 0.0), default=None),
+        'a_rms_error': rms([s.a - offset_coefficient(*curve) for s, *curve in curves]),
+        'b_rms_error_per_mm': rms([s.b - slope_coefficient(*curve) for s, *curve in curves]) * 1e-3,
+        **{f'level_{way}': values for way, values in level.items()},
+        'level_rises_with_speed': bool(all((np.diff(values) > 0.0).all() for values in level.values())),
+        'force_noise_share': own.force_noise / rms(measured),
         'full_error_macroslip': share(shown.full_force, macro | faded),
         'full_error_microslip': share(shown.full_force, micro),
         'simplified_error_macroslip': share(shown.simplified_force, macro),
@@ -204,219 +177,191 @@ def _figures(runs: list[Run], shown: Run, parameters: SawtoothParameters) -> Val
     }
 
 
-def _level(run: Run, direction: float) -> list[float]:
-    """Return mu at the end of the strokes in one direction, slowest first, from their lines."""
-    chosen = sorted((s for s in run.strokes if s.velocity * direction > 0.0), key=lambda s: abs(s.velocity))
-    return [float(np.mean(s.mu[-20:])) for s in chosen]
+def _speed(stroke: StrokeLine) -> float:
+    return abs(stroke.displacement_velocity)
 
 
-def _jump(run: Run, direction: float) -> list[float]:
-    """Return by how much mu falls along the strokes in one direction, slowest first."""
-    chosen = sorted((s for s in run.strokes if s.velocity * direction > 0.0), key=lambda s: abs(s.velocity))
-    return [s.fall for s in chosen]
+@claim(
+    'Sec. 4, Fig. 8',
+    paper="""Behind a turning point the coefficient is higher and then decays while the pads are moved on
+    at constant speed.""",
+)
+def _on_decay(figures):
+    first, *_, last = figures['jump_p']
+    told = f"""At the drawn normal force mu falls along each stroke, by {first:.3f} at the lowest and
+        {last:.3f} at the highest speed (positive direction)."""
+    return min(figures['jump_p'] + figures['jump_n']) > 0.0 or PARTLY, told
 
 
-def _statements(results: Values) -> list[Statement]:
-    falling, count = results['strokes_with_falling_coefficient'], results['strokes']
-    jumps, least = results['jump_p'], min(results['jump_p'] + results['jump_n'])
-    straight = results['largest_residual_over_noise']
-    rising = results['rising_up_to_n']
-    levels = [f'{first:.2f} to {last:.2f}' for first, *_, last in (results['level_p'], results['level_n'])]
-    return [
-        Statement(
-            'Sec. 4, Fig. 8',
-            'Behind a turning point the coefficient is higher and then decays while the pads are moved on '
-            'at constant speed.',
-            f'At the drawn normal force mu falls along each stroke, by {jumps[0]:.3f} at the lowest and '
-            f'{jumps[-1]:.3f} at the highest speed (positive direction).',
-            Holds.YES if least > 0.0 else Holds.PARTLY,
-        ),
-        Statement(
-            'Sec. 4, Eq (12)',
-            'The larger the strain in the direction of sliding, the lower the friction force.',
-            f'b is negative on {falling} of {count} strokes'
-            + (
-                f'; on the others (normal force up to {rising:g} N) it is positive. That is b_offset = +14 '
-                '1/mm as Table 2 prints it, with a unit that cannot be right; with -14 b is negative '
-                'everywhere.'
-                if rising is not None
-                else '.'
-            ),
-            Holds.YES if falling == count else Holds.PARTLY,
-        ),
-        Statement(
-            'Fig. 9',
-            'Over the deflection u the coefficient is a straight line at each constant speed.',
-            'The lines leave '
-            + (
-                f'at most {results["largest_residual_of_line"]:.4f} rms of mu'
-                + (f', {straight:.2f} times the noise of the load cell' if straight is not None else '')
-                + f', on all {count} strokes. The simulated pads obey Eq (12), so this tests the evaluation, '
-                'not the pads.'
-            ),
-            Holds.YES if straight is None or straight < 1.2 else Holds.NO,
-        ),
-        Statement(
-            'Fig. 10, Eqs (13), (14)',
-            'a and b of each stroke lie on the analytic curves over speed and normal force, a with '
-            'a logarithm, both directions apart.',
-            f'a comes back with {results["a_rms_error"]:.4f} rms, b with '
-            f'{results["b_rms_error_per_mm"]:.2f} 1/mm rms of the curves the simulated pads have, taken at '
-            'the mean speed of the slider, a little slower than the pads because the creeping element '
-            'takes its part.',
-            Holds.YES if results['a_rms_error'] < 5e-3 and results['b_rms_error_per_mm'] < 1.0 else Holds.NO,
-        ),
-        Statement(
-            'Sec. 4',
-            'Brake material without metal has no Stribeck effect: friction does not fall with speed.',
-            f'At the end of the strokes mu rises with speed from {levels[0]} (positive) and {levels[1]} '
-            '(negative direction).',
-            Holds.YES if results['level_rises_with_speed'] else Holds.NO,
-        ),
-        _statement_on_models(results),
-    ]
+@claim(
+    'Sec. 4, Eq (12)',
+    paper='The larger the strain in the direction of sliding, the lower the friction force.',
+)
+def _on_strain(figures):
+    falling, count = figures['strokes_with_falling_coefficient'], figures['strokes']
+    told = f'b is negative on {falling} of {count} strokes'
+    if falling == count:
+        return True, f'{told}.'
+    told += f"""; on the others (normal force up to {figures['rising_up_to_n']:g} N) it is positive. That is
+        b_offset = +14 1/mm as Table 2 prints it, with a unit that cannot be right; with -14 b is negative
+        everywhere."""
+    return PARTLY, told
 
 
-def _statement_on_models(results: Values) -> Statement:
-    macro, slow, micro = (
-        results[f'simplified_error_{where}'] for where in ('macroslip', 'slow_macroslip', 'microslip')
-    )
-
-    def told(share: float | None) -> str:
-        return 'nothing' if share is None else f'{100 * share:.1f} %'
-
-    holds = Holds.NOT_COMPARABLE
-    if macro is not None:
-        holds = Holds.YES if macro < 0.03 and micro > 5.0 * macro else Holds.PARTLY
-    return Statement(
-        'Fig. 11',
-        'Both models meet the measurement in macroslip; in microslip the full one is precise and the '
-        'simplified one far off.',
-        f'Difference to the recorded force, as a share of its rms (the noise alone is '
-        f'{told(results["force_noise_share"])}): simplified {told(macro)} in macroslip and {told(micro)} in '
-        f'microslip, full {told(results["full_error_macroslip"])} and '
-        f'{told(results["full_error_microslip"])}. Below {1e3 * FADED_BELOW:g} mm/s the simplified model is '
-        f'off by {told(slow)} in macroslip too: there it fades friction out, as the paper asks for. The rack '
-        'is the full model, so its own agreement proves nothing about pads; that of the simplified model '
-        'shows what leaving out c_Re costs.',
-        holds,
-    )
+@claim('Fig. 9', paper='Over the deflection u the coefficient is a straight line at each constant speed.')
+def _on_line(figures):
+    straight = figures['largest_residual_over_noise']
+    noise = '' if straight is None else f', {straight:.2f} times the noise of the load cell'
+    told = f"""The lines leave at most {figures['largest_residual_of_line']:.4f} rms of mu{noise}, on all
+        {figures['strokes']} strokes. The simulated pads obey Eq (12), so this tests the evaluation, not the
+        pads."""
+    return straight is None or straight < 1.2, told
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float('nan')
+@claim(
+    'Fig. 10, Eqs (13), (14)',
+    paper="""a and b of each stroke lie on the analytic curves over speed and normal force, a with
+    a logarithm, both directions apart.""",
+)
+def _on_curves(figures):
+    a, b = figures['a_rms_error'], figures['b_rms_error_per_mm']
+    told = f"""a comes back with {a:.4f} rms, b with {b:.2f} 1/mm rms of the curves the simulated pads have,
+        taken at the mean speed of the slider, a little slower than the pads because the creeping element
+        takes its part."""
+    return a < 5e-3 and b < 1.0, told
 
 
-def draw_time(run: Run, file: Path) -> Path:
+@claim(
+    'Sec. 4',
+    paper='Brake material without metal has no Stribeck effect: friction does not fall with speed.',
+)
+def _on_speed(figures):
+    levels = [f'{figures[key][0]:.2f} to {figures[key][-1]:.2f}' for key in ('level_p', 'level_n')]
+    told = f"""At the end of the strokes mu rises with speed from {levels[0]} (positive) and {levels[1]}
+        (negative direction)."""
+    return figures['level_rises_with_speed'], told
+
+
+@claim(
+    'Fig. 11',
+    paper="""Both models meet the measurement in macroslip; in microslip the full one is precise and the
+    simplified one far off.""",
+)
+def _on_models(figures):
+    macro, micro = figures['simplified_error_macroslip'], figures['simplified_error_microslip']
+    shares = {
+        name: 'nothing' if share is None else f'{100 * share:.1f} %'
+        for name, share in figures.items()
+        if 'error_' in name or name == 'force_noise_share'
+    }
+    told = f"""Difference to the recorded force, as a share of its rms (the noise alone is
+        {shares['force_noise_share']}): simplified {shares['simplified_error_macroslip']} in macroslip and
+        {shares['simplified_error_microslip']} in microslip, full {shares['full_error_macroslip']} and
+        {shares['full_error_microslip']}. Below {1e3 * FADED_BELOW:g} mm/s the simplified model is off by
+        {shares['simplified_error_slow_macroslip']} in macroslip too: there it fades friction out, as the
+        paper asks for. The rack is the full model, so its own agreement proves nothing about pads; that of
+        the simplified model shows what leaving out c_Re costs."""
+    return NOT_COMPARABLE if macro is None else (macro < 0.03 and micro > 5.0 * macro) or PARTLY, told
+
+
+def draw_time(rack: Rack) -> Any:
     """Draw force and deflection u over time, Fig. 8."""
-    figure = new_figure(f'Saw tooth at {run.strokes[0].normal_force:g} N: force and deflection (Fig. 8)')
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    force = run.recording.force
-    upper.plot(run.recording.time, force, color=BLUE, linewidth=0.6)
+    figure, (upper, lower) = new_panels(
+        f'Saw tooth at {rack.strokes[0].normal_force:g} N: force and deflection (Fig. 8)', 2, sharex=True
+    )
+    force, time = rack.recording.force, rack.recording.time
+    upper.plot(time, force, color=BLUE, linewidth=0.6)
     upper.set_ylabel('friction force (N)')
-    lower.plot(run.recording.time, 1e6 * np.sign(force) * run.deflection, color=RED, linewidth=0.8)
-    lower.set_ylabel('deflection u (µm)')
-    lower.set_xlabel('time (s)')
-    return finish(figure, file)
+    lower.plot(time, 1e6 * np.sign(force) * rack.deflection, color=RED, linewidth=0.8)
+    lower.set(ylabel='deflection u (µm)', xlabel='time (s)')
+    return figure
 
 
-def draw_lines(run: Run, file: Path) -> Path:
+def draw_lines(rack: Rack) -> Any:
     """Draw mu over u for each stroke with its line, Fig. 9; one panel for each direction."""
-    load = run.strokes[0].normal_force
-    figure = new_figure(f'Coefficient over deflection at {load:g} N, one colour for each speed (Fig. 9)')
-    for axes, direction in zip(figure.subplots(1, 2), (1.0, -1.0), strict=True):
-        chosen = [stroke for stroke in run.strokes if stroke.velocity * direction > 0.0]
+    load = rack.strokes[0].normal_force
+    figure, panels = new_panels(
+        f'Coefficient over deflection at {load:g} N, one colour for each speed (Fig. 9)', 1, 2
+    )
+    for axes, name, direction in zip(panels, ('positive', 'negative'), (1.0, -1.0), strict=True):
+        chosen = [stroke for stroke in rack.strokes if stroke.velocity * direction > 0.0]
         for stroke, colour in zip(chosen, family(len(chosen)), strict=True):
             step = max(stroke.u.size // 150, 1)
             axes.plot(1e6 * stroke.u[::step], stroke.mu[::step], '.', color=colour, markersize=2, alpha=0.6)
             ends = np.array([stroke.u.min(), stroke.u.max()])
             label = f'{1e3 * _speed(stroke):.3g} mm/s'
             axes.plot(1e6 * ends, stroke.a + stroke.b * ends, color=colour, linewidth=1.5, label=label)
-        axes.set_title('positive direction' if direction > 0.0 else 'negative direction', fontsize='medium')
-        axes.set_xlabel('deflection u (µm)')
-        axes.set_ylabel('coefficient of both pads, mu_dyn (1)')
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='outside lower center', ncols=5, fontsize='small')
-    return finish(figure, file)
+        axes.set_title(f'{name} direction', fontsize='medium')
+        axes.set(xlabel='deflection u (µm)', ylabel='coefficient of both pads, mu_dyn (1)')
+    legend_below(figure, panels[0], 5, fontsize='small')
+    return figure
 
 
-def draw_parameters(runs: list[Run], coefs: FrictionCoefficients, file: Path) -> Path:
+def draw_parameters(racks: list[Rack], coefs: FrictionCoefficients) -> Any:
     """Draw a and b of each stroke as dots, Eqs (13), (14) as lines, Fig. 10."""
-    figure = new_figure(
-        'Parameters of Eq (12): found on each stroke (dots), Eqs (13), (14) (lines) (Fig. 10)'
+    figure, (left, right) = new_panels(
+        'Parameters of Eq (12): found on each stroke (dots), Eqs (13), (14) (lines) (Fig. 10)', 1, 2
     )
-    left, right = figure.subplots(1, 2)
-    largest = max(abs(stroke.velocity) for run in runs for stroke in run.strokes)
-    velocity = np.concatenate([np.linspace(-largest, -2e-4, 100), [np.nan], np.linspace(2e-4, largest, 100)])
-    for run, colour in zip(runs, family(len(runs)), strict=True):
-        load = run.strokes[0].normal_force
-        found = 1e3 * np.array([stroke.velocity for stroke in run.strokes])
-        left.plot(found, [1e-3 * s.b for s in run.strokes], 'o', color=colour, markersize=4)
-        right.plot(found, [s.a for s in run.strokes], 'o', color=colour, markersize=4)
-        b = [1e-3 * slope_coefficient(coefs, v, load) for v in velocity]
-        a = [offset_coefficient(coefs, v, load) for v in velocity]
-        gap = np.isnan(velocity)
-        left.plot(1e3 * velocity, np.where(gap, np.nan, b), color=colour, linewidth=1.0, label=f'{load:g} N')
-        right.plot(1e3 * velocity, np.where(gap, np.nan, a), color=colour, linewidth=1.0)
+    largest = max(abs(stroke.velocity) for rack in racks for stroke in rack.strokes)
+    half = np.linspace(2e-4, largest, 100)
+    velocity = np.concatenate([-half[::-1], [np.nan], half])
+    for rack, colour in zip(racks, family(len(racks)), strict=True):
+        load = rack.strokes[0].normal_force
+        found = 1e3 * np.array([stroke.velocity for stroke in rack.strokes])
+        for axes, name, law, scale in (
+            (left, 'b', slope_coefficient, 1e-3),
+            (right, 'a', offset_coefficient, 1.0),
+        ):
+            axes.plot(
+                found, [scale * getattr(s, name) for s in rack.strokes], 'o', color=colour, markersize=4
+            )
+            curve = [scale * law(coefs, v, load) if v == v else v for v in velocity]
+            axes.plot(1e3 * velocity, curve, color=colour, linewidth=1.0, label=f'{load:g} N')
+            axes.set(xlabel='velocity (mm/s)')
+            axes.xaxis.set_major_locator(MaxNLocator(5))
     left.set_ylabel('b (1/mm)')
     right.set_ylabel('a (1)')
-    for axes in (left, right):
-        axes.set_xlabel('velocity (mm/s)')
-        axes.xaxis.set_major_locator(MaxNLocator(5))
     left.axhline(0.0, color=GREY, linewidth=0.8)
-    figure.legend(*left.get_legend_handles_labels(), loc='outside lower center', ncols=6, fontsize='small')
-    return finish(figure, file)
+    legend_below(figure, left, 6, fontsize='small')
+    return figure
 
 
-def draw_models(run: Run, file: Path) -> Path:
+def draw_models(rack: Rack) -> Any:
     """Draw the recorded force with both models: all of it, and two turning points in detail, Fig. 11."""
-    figure = new_figure(
-        f'Both friction models on the recorded displacement, {run.strokes[0].normal_force:g} N (Fig. 11)', 6.5
+    load = rack.strokes[0].normal_force
+    figure, rows = new_mosaic(
+        f'Both friction models on the recorded displacement, {load:g} N (Fig. 11)',
+        [['whole', 'whole'], ['slow', 'fast']],
+        6.5,
     )
-    rows = figure.subplot_mosaic([['whole', 'whole'], ['slow', 'fast']])
-    time = run.recording.time
-    slow, fast = run.strokes[1], run.strokes[-1]
-    windows = {
-        'whole': (time[0], time[-1]),
-        'slow': _around(time[slow.stroke.start], _speed(slow)),
-        'fast': _around(time[fast.stroke.start], _speed(fast)),
-    }
+    time = rack.recording.time
+    windows = {'whole': (time[0], time[-1])}
+    for name, stroke in (('slow', rack.strokes[1]), ('fast', rack.strokes[-1])):
+        turn, speed = time[stroke.stroke.start], _speed(stroke)
+        windows[name] = turn - 0.1e-3 / speed, turn + 0.4e-3 / speed  # 0.1 mm before, 0.4 mm behind
+        rows[name].set_title(f'turning point at {1e3 * speed:.3g} mm/s', fontsize='medium')
     for name, axes in rows.items():
-        shown = (time >= windows[name][0]) & (time <= windows[name][1])
-        axes.plot(time[shown], run.recording.force[shown], color=GREY, linewidth=1.6, label='recorded')
-        axes.plot(
-            time[shown], run.simplified_force[shown], color=RED, linewidth=0.9, label='simplified model'
-        )
-        axes.plot(
-            time[shown], run.full_force[shown], color=BLUE, linewidth=0.9, linestyle='--', label='full model'
-        )
-        axes.set_ylabel('friction force (N)')
-        axes.set_xlabel('time (s)')
-    rows['slow'].set_title(f'turning point at {1e3 * _speed(slow):.3g} mm/s', fontsize='medium')
-    rows['fast'].set_title(f'turning point at {1e3 * _speed(fast):.3g} mm/s', fontsize='medium')
-    figure.legend(*rows['whole'].get_legend_handles_labels(), loc='outside lower center', ncols=3)
-    return finish(figure, file)
-
-
-def _speed(stroke: StrokeLine) -> float:
-    return abs(stroke.displacement_velocity)
-
-
-def _around(turn: float, speed: float) -> tuple[float, float]:
-    """Return the times within which the pads go 0.1 mm before and 0.4 mm behind a turning point."""
-    return turn - 0.1e-3 / speed, turn + 0.4e-3 / speed
+        begin, end = windows[name]
+        shown = (time >= begin) & (time <= end)
+        for force, label, style in (
+            (rack.recording.force, 'recorded', {'color': GREY, 'linewidth': 1.6}),
+            (rack.simplified_force, 'simplified model', {'color': RED, 'linewidth': 0.9}),
+            (rack.full_force, 'full model', {'color': BLUE, 'linewidth': 0.9, 'linestyle': '--'}),
+        ):
+            axes.plot(time[shown], force[shown], label=label, **style)
+        axes.set(ylabel='friction force (N)', xlabel='time (s)')
+    legend_below(figure, rows['whole'], 3)
+    return figure
 
 
 EXPERIMENT = Experiment(
     NAME,
     *NAMES[NAME],
-    (
-        'The simulated pads (full model) are moved between two turning points at constant speed and constant '
-        'normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction '
-        'force and normal force are recorded at 1 kHz with noisy instruments; everything below is computed '
-        'from the recordings: u from the force through the linear part of the contact, a line of mu over u '
-        'for each stroke, and both friction models driven by the recorded displacement.'
-    ),
+    """The simulated pads (full model) are moved between two turning points at constant speed and constant
+    normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction
+    force and normal force are recorded at 1 kHz with noisy instruments; everything below is computed
+    from the recordings: u from the force through the linear part of the contact, a line of mu over u
+    for each stroke, and both friction models driven by the recorded displacement.""",
     SawtoothParameters(),
     run,
 )

@@ -63,21 +63,20 @@ class FaultCase:
 
 
 def _case(name: str, row: Mapping[str, Any]) -> FaultCase:
-    rest = {field: value for field, value in row.items() if field not in ('reaction', 'meaning', 'inject')}
-    ((kind, argument),) = row.get('inject', {'simulated': name}).items()
-    options = tuple(row.get('options', ()))
+    fields = dict(row)
+    ((kind, argument),) = fields.pop('inject', {'simulated': name}).items()
+    options = tuple(fields.pop('options', ()))
     if kind == _FROM_START:
         options += ('--set', f'mount_sim.faults={json.dumps(argument)}')
-    simulated = name.removesuffix('_at_start')
-    meaning = row.get('meaning') or FAULTS[simulated].meaning + ', from the start' * (simulated != name)
-    reaction = Reaction[row['reaction'].upper()]
-    return FaultCase(name, meaning, reaction, kind, argument, **{**rest, 'options': options})
+    if 'meaning' not in fields:
+        simulated = name.removesuffix('_at_start')
+        fields['meaning'] = FAULTS[simulated].meaning + ', from the start' * (simulated != name)
+    reaction = Reaction[fields.pop('reaction').upper()]
+    return FaultCase(name, reaction=reaction, kind=kind, argument=argument, options=options, **fields)
 
 
-def _matrix() -> dict[str, FaultCase]:
-    text = (Path(__file__).parent / 'faults.yaml').read_text(encoding='utf-8')
-    return {name: _case(name, row) for name, row in yaml.safe_load(text).items()}
-
-
-MATRIX = _matrix()
+MATRIX = {
+    name: _case(name, row)
+    for name, row in yaml.safe_load(Path(__file__).with_name('faults.yaml').read_text('utf-8')).items()
+}
 """{name: fault}."""

@@ -27,27 +27,24 @@ from engine_mount.faults.case import FaultCase
 from engine_mount.faults.graph import PATIENCE, GraphUnderTest, GraphUnderTestError
 
 Injection = Iterator[Callable[[], object]]
+Steps = Sequence[tuple[str, str]]
+"""(node, transition) one after the other."""
 
-_INJECT = 'mount_sim/inject_fault'
-_SHIM = Path(__file__).parent / 'shim'
 SHIM_FILE = 'ENGINE_MOUNT_SHIM'
 """Environment variable: file of two int64, what the `shim` changes in the processes under test."""
 
-
-class NonsenseTakenError(RuntimeError):
-    """A node took a parameter that it must refuse."""
+_INJECT = 'mount_sim/inject_fault'
 
 
 @contextlib.contextmanager
-def injection(case: FaultCase, graph: GraphUnderTest) -> Iterator[Callable[[], object]]:
+def injection(case: FaultCase, graph: GraphUnderTest) -> Injection:
     """Prepare a fault and give the function that injects it; it is taken away at the end of the block."""
     yield from _KINDS[case.kind](graph, case.argument)
 
 
 def _simulated(graph: GraphUnderTest, fault: str) -> Injection:
     """A fault of the simulated electronics, by its name there."""
-    refusal = _refusal(graph, 'mount_sim', {'inject': fault})
-    if refusal:
+    if refusal := _refusal(graph, 'mount_sim', 'inject', fault):
         raise GraphUnderTestError(f'mount_sim does not know the fault {fault!r}: {refusal}')
     graph.client(SetBool, _INJECT).wait_for_service(PATIENCE)
 
@@ -120,22 +117,21 @@ def _parameters(graph: GraphUnderTest, values: Sequence[tuple[str, str, Any]]) -
 
     def begin() -> None:
         for node, name, value in values:
-            refusal = _refusal(graph, node, {name: value})
-            if not refusal:
-                raise NonsenseTakenError(f'{node} took {name} = {value!r}')
+            if not (refusal := _refusal(graph, node, name, value)):
+                raise GraphUnderTestError(f'{node} took {name} = {value!r}')
             graph.refusals.append(refusal)
 
     yield begin
 
 
-def _transitions(graph: GraphUnderTest, steps: Mapping[str, Sequence[tuple[str, str]]]) -> Injection:
-    """Nodes go through transitions (node, transition) `there`, and through others `back` to end the fault."""
+def _transitions(graph: GraphUnderTest, steps: Mapping[str, Steps]) -> Injection:
+    """Nodes go through transitions `there`, and through others `back` to end the fault."""
     for node, _ in (*steps['there'], *steps['back']):
         graph.client(ChangeState, f'{node}/change_state').wait_for_service(PATIENCE)
     try:
-        yield partial(_take_all, graph, steps['there'])
+        yield partial(change_states, graph, steps['there'])
     finally:
-        _take_all(graph, steps['back'])
+        change_states(graph, steps['back'])
 
 
 _KINDS: Mapping[str, Callable[[GraphUnderTest, Any], Injection]] = {
@@ -152,21 +148,17 @@ _KINDS: Mapping[str, Callable[[GraphUnderTest, Any], Injection]] = {
 }
 
 
-def take_through(graph: GraphUnderTest, node: str, transition: str) -> None:
-    """Take a node through a transition, `activate` or another one of `lifecycle_msgs`."""
-    number = getattr(Transition, f'TRANSITION_{transition.upper()}')
-    graph.call(ChangeState, f'{node}/change_state', ChangeState.Request(transition=Transition(id=number)))
+def change_states(graph: GraphUnderTest, steps: Steps) -> None:
+    """Take nodes through transitions, `activate` and others of `lifecycle_msgs`."""
+    for node, name in steps:
+        transition = Transition(id=getattr(Transition, f'TRANSITION_{name.upper()}'))
+        graph.call(ChangeState, f'{node}/change_state', ChangeState.Request(transition=transition))
 
 
-def _take_all(graph: GraphUnderTest, steps: Sequence[tuple[str, str]]) -> None:
-    for node, transition in steps:
-        take_through(graph, node, transition)
-
-
-def _refusal(graph: GraphUnderTest, node: str, values: Mapping[str, Any]) -> str:
-    """Set parameters of a node and return its refusal, empty if it took them."""
-    wanted = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
-    answer = graph.call(SetParameters, f'{node}/set_parameters', SetParameters.Request(parameters=wanted))
+def _refusal(graph: GraphUnderTest, node: str, name: str, value: Any) -> str:
+    """Set a parameter of a node and return its refusal, empty if it took it."""
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    answer = graph.call(SetParameters, f'{node}/set_parameters', request)
     if answer is None:
         return 'no answer'
     return '; '.join(each.reason for each in answer.results if not each.successful)
@@ -175,7 +167,7 @@ def _refusal(graph: GraphUnderTest, node: str, values: Mapping[str, Any]) -> str
 def shim_environment(folder: Path) -> dict[str, str]:
     """Return what a graph in `folder` needs in its environment for steps of clocks and hanging controls."""
     _write_shim(folder)
-    paths = [str(_SHIM), *filter(None, [os.environ.get('PYTHONPATH')])]
+    paths = [str(Path(__file__).parent / 'shim'), *filter(None, [os.environ.get('PYTHONPATH')])]
     return {SHIM_FILE: str(folder / 'shim'), 'PYTHONPATH': os.pathsep.join(paths)}
 
 

@@ -29,14 +29,14 @@ _REPEATED = 3.0  # s, chosen: each node repeats its verdict once a second
 _LOOK_PERIOD = 0.1  # s: how often a listener looks whether it shall end
 
 
-class Heard(NamedTuple):
+class Setpoint(NamedTuple):
     """A setpoint frame on the bus; its current (A) is 0 where it switches off."""
 
     time: float
     current: float
 
 
-class Seen(NamedTuple):
+class Truth(NamedTuple):
     """The simulated truth: the coil's current, and what the electronics made it follow, A."""
 
     time: float
@@ -44,7 +44,7 @@ class Seen(NamedTuple):
     followed: float
 
 
-class Told(NamedTuple):
+class Report(NamedTuple):
     """A verdict on `/diagnostics`; `level` as in `mount_ros.nodes.diagnostics.Level`."""
 
     time: float
@@ -53,7 +53,7 @@ class Told(NamedTuple):
     sentence: str
 
 
-Timed = TypeVar('Timed', Heard, Seen, Told)
+Timed = TypeVar('Timed', Setpoint, Truth, Report)
 
 
 def since(entries: Sequence[Timed], begin: float, end: float = float('inf')) -> list[Timed]:
@@ -64,56 +64,59 @@ def since(entries: Sequence[Timed], begin: float, end: float = float('inf')) -> 
 
 
 class Observers:
-    """What was heard, seen and told of one graph since the observers began."""
+    """What was seen of one graph since the observers began, each in the order of time."""
 
     def __init__(self, namespace: str):
-        self.heard: list[Heard] = []
-        self.seen: list[Seen] = []
-        self.told: list[Told] = []
-        self.initialised: list[float] = []
+        self.setpoints: list[Setpoint] = []
+        self.truths: list[Truth] = []
+        self.reports: list[Report] = []
+        self.initialisations: list[float] = []
         """When gaps came: the ends of initialisations."""
         self.active: set[str] = set()
         """The nodes that said last that they are active."""
         self._namespace = namespace
         self._codec = MountCodec()
         self._truth = ScalarsLayout(SIM_TRUTH)
-        names = self._truth.names
-        self._places = names.index('coil_current'), names.index('current_setpoint')
+        self._places = [self._truth.names.index(name) for name in ('coil_current', 'current_setpoint')]
         # The kernel stamps frames by the system clock, which is not stepped while this runs.
         self._epoch = time.time() - time.monotonic()
 
-    def take_frame(self, timestamp: float, data: bytes | bytearray) -> None:
-        """Note a setpoint frame; one that no electronics would take is none."""
-        try:
-            _, setpoint = self._codec.decode_setpoint(data)
-        except FrameError:
-            return
-        if setpoint is not None:
-            current = setpoint.current if setpoint.enable else 0.0
-            self.heard.append(Heard(timestamp - self._epoch, current))
-
     def take_truth(self, raw: bytes) -> None:
         """Note a message of `sim/truth`."""
-        _, numbers, _ = self._truth.unpack(raw)
-        coil, followed = self._places
-        self.seen.append(Seen(time.monotonic(), numbers[coil], numbers[followed]))
+        numbers = self._truth.unpack(raw)[1]
+        self.truths.append(Truth(time.monotonic(), *(numbers[place] for place in self._places)))
 
     def take_diagnostics(self, raw: bytes) -> None:
         """Note the verdicts of this graph; `/diagnostics` belongs to all."""
         now = time.monotonic()
-        for told in verdicts_of(raw):
-            space, _, node = told.node.rpartition('/')
+        for verdict in verdicts_of(raw):
+            space, _, node = verdict.node.rpartition('/')
             if space == self._namespace:
-                self.told.append(Told(now, node, told.level, told.sentence))
-                active = told.figures.get('state') == 'active'
+                self.reports.append(Report(now, node, verdict.level, verdict.sentence))
+                active = verdict.figures.get('state') == 'active'
                 (self.active.add if active else self.active.discard)(node)
 
-    def quiet(self, tells: Callable[[Told], bool]) -> bool:
-        """Whether the driver says that nothing is wrong, and no node tells any more what `tells` picks."""
-        latest = {each.node: each for each in since(self.told, time.monotonic() - _REPEATED)}
+    def is_quiet(self, reports_fault: Callable[[Report], bool]) -> bool:
+        """Whether the driver reports that nothing is wrong, and no node what `reports_fault` picks."""
+        latest = {each.node: each for each in since(self.reports, time.monotonic() - _REPEATED)}
         driver = latest.get(DRIVER.name)
         well = driver is not None and driver.level == Level.OK
-        return well and not any(tells(each) for each in latest.values())
+        return well and not any(map(reports_fault, latest.values()))
+
+    def listen(self, port: int, ending: threading.Event) -> None:
+        """Note the setpoint frames on the bus at a UDP port; one that no electronics would take is none."""
+        bus = open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=[self._codec.setpoint.frame_id])
+        reception = Reception()  # frames that cannot be read are one of the faults
+        while not ending.is_set():
+            frame = reception.frame(bus, _LOOK_PERIOD)
+            try:
+                setpoint = self._codec.decode_setpoint(frame.data)[1] if frame else None
+            except FrameError:
+                continue
+            if frame and setpoint:
+                current = setpoint.current if setpoint.enable else 0.0
+                self.setpoints.append(Setpoint(frame.timestamp - self._epoch, current))
+        bus.shutdown()
 
 
 @contextmanager
@@ -124,10 +127,10 @@ def observers(context: Context, namespace: str, port: int) -> Iterator[Observers
     path = DataPath(node)
     path.subscribe(SIM_TRUTH, observed.take_truth)
     path.subscribe(DIAGNOSTICS, observed.take_diagnostics)
-    path.subscribe(AIR_GAP, lambda raw: observed.initialised.append(time.monotonic()))
+    path.subscribe(AIR_GAP, lambda raw: observed.initialisations.append(time.monotonic()))
     path.start()
     ending = threading.Event()
-    listener = threading.Thread(target=_listen, args=(observed, port, ending), name='bus', daemon=True)
+    listener = threading.Thread(target=observed.listen, args=(port, ending), name='bus', daemon=True)
     listener.start()
     try:
         yield observed
@@ -136,16 +139,3 @@ def observers(context: Context, namespace: str, port: int) -> Iterator[Observers
         listener.join()
         path.stop()
         node.destroy_node()
-
-
-def _listen(observed: Observers, port: int, ending: threading.Event) -> None:
-    identifier = MountCodec().setpoint.frame_id
-    bus = open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=[identifier])
-    reception = Reception()  # frames that cannot be read are one of the faults
-    try:
-        while not ending.is_set():
-            frame = reception.frame(bus, _LOOK_PERIOD)
-            if frame is not None:
-                observed.take_frame(frame.timestamp, frame.data)
-    finally:
-        bus.shutdown()

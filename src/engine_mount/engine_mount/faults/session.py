@@ -4,28 +4,28 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 from rclpy.context import Context
-from rclpy.node import Node
 
+import engine_mount
 from engine_mount.faults.case import FaultCase, Reaction
-from engine_mount.faults.graph import Ending, GraphUnderTest, GraphUnderTestError, Place
-from engine_mount.faults.injection import NonsenseTakenError, shim_environment
-from engine_mount.faults.judge import Outcome, tells
-from engine_mount.faults.observers import observers
-from engine_mount.faults.recording_loss import lost_while
-from engine_mount.faults.trial import tried
-from mount_bringup.graph.domain import can_port
+from engine_mount.faults.graph import START_PATIENCE, GraphUnderTest, GraphUnderTestError, Place
+from engine_mount.faults.injection import shim_environment
+from engine_mount.faults.judge import Outcome, reports_fault
+from engine_mount.faults.trial import try_fault
+from engine_mount.recordings import ReadingError
 from mount_bringup.graph.shutdown import ending_signals
+from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros.nodes.diagnostics import WINDOW
 from mount_ros.nodes.process import ros_context
 
 _TRIALS = 2  # chosen: a machine with other work is late now and then
 _PATIENCE = WINDOW + 4.0  # s, chosen: for damping without complaint in a graph that has seen faults
-_CODES = (0, 1, 130)  # of `drive`: nothing wrong, something wrong, interrupted
+_SLACK = 1.0  # s: from the stamp of a sample to the log time of its neighbour
 
 Progress = Callable[[float, str], None]
 Tell = Callable[[FaultCase, Outcome], None]
@@ -42,10 +42,18 @@ def run_faults(
     first SIGINT, SIGTERM or SIGHUP raises `KeyboardInterrupt`; the graph that runs is ended first.
     """
     outcomes: dict[str, Outcome] = {}
-    with ending_signals(_interrupt_once()), ros_context(place.domain) as context:
+    signals = itertools.count()
+
+    def interrupt() -> None:
+        if next(signals) == 0:  # a second signal cuts no end short
+            raise KeyboardInterrupt
+
+    with ending_signals(interrupt), ros_context(place.domain) as context:
         session = _Session(place, context)
         try:
-            for number, case in enumerate(_in_order(cases)):
+            # those of one graph follow each other, and first those that it outlives
+            ordered = sorted(cases, key=lambda case: (_kind(case), case.ends_drive or case.for_good))
+            for number, case in enumerate(ordered):
                 progress(number / len(cases), case.name)
                 outcomes[case.name] = session.outcome(case)
                 tell(case, outcomes[case.name])
@@ -54,45 +62,28 @@ def run_faults(
     return {case.name: outcomes[case.name] for case in cases}
 
 
-def _interrupt_once() -> Callable[[], None]:
-    """Return a function whose first call raises `KeyboardInterrupt`: a second signal cuts no end short."""
-    came: list[bool] = []
-
-    def interrupt() -> None:
-        came.append(True)
-        if len(came) == 1:
-            raise KeyboardInterrupt
-
-    return interrupt
-
-
-def _in_order(cases: Sequence[FaultCase]) -> list[FaultCase]:
-    """Return the faults so that those of one graph follow each other, and first those that it outlives."""
-    return sorted(cases, key=lambda case: (_kind(case), case.ends_drive or case.for_good))
-
-
 def _kind(case: FaultCase) -> Kind:
     return case.shim, case.options
 
 
-@dataclass
-class _Running:
-    """A graph, its observers, and the faults that it has seen with their times on the system clock, s."""
+class _Tried(NamedTuple):
+    """A fault that a graph has seen, from when to when on the system clock (s)."""
 
-    kind: Kind
-    graph: GraphUnderTest
-    observing: ExitStack
-    tried: list[tuple[FaultCase, Outcome, float, float]] = field(default_factory=list)
+    case: FaultCase
+    outcome: Outcome
+    begin: float
+    end: float
 
 
 class _Session:
-    """The graph that runs at present, if one does."""
+    """The graph that runs at present, if one does, and the faults that it has seen."""
 
     def __init__(self, place: Place, context: Context):
-        self._place = place
-        self._context = context
+        self._place, self._context = place, context
         self._numbers = itertools.count(1)
-        self._running: _Running | None = None
+        self._graph: GraphUnderTest | None = None
+        self._kind: Kind = (False, ())
+        self._tried: list[_Tried] = []
 
     def outcome(self, case: FaultCase) -> Outcome:
         """Try a fault; once more, if it was not as required."""
@@ -108,69 +99,74 @@ class _Session:
                 outcome = later
         return outcome
 
+    def end_graph(self) -> None:
+        """End the graph that runs, and add to the faults that it has seen what its end has shown."""
+        graph, tried = self._graph, self._tried
+        self._graph, self._tried = None, []
+        if graph is None:
+            return
+        wrong = graph.end()
+        if tried:
+            tried[-1].outcome.complaints += wrong
+        for case, outcome, begin, end in tried:
+            if not case.loses_samples:
+                outcome.complaints += _losses(graph.folder, begin, end)
+
     def _trial(self, case: FaultCase) -> Outcome:
         begin = time.time()
         try:
-            running = self._prepared(case)
+            graph = self._prepared(case)
             begin = time.time()
-            outcome = tried(case, running.graph)
-        except (GraphUnderTestError, NonsenseTakenError) as error:
+            outcome = try_fault(case, graph)
+        except GraphUnderTestError as error:
             outcome = Outcome(complaints=[str(error)])
-            if self._running is None:
-                return outcome
-            running = self._running
-        running.tried.append((case, outcome, begin, time.time()))
-        if running.graph.ended:
-            self.end_graph()
+        if self._graph is not None:
+            self._tried.append(_Tried(case, outcome, begin, time.time()))
+            if self._graph.ended:
+                self.end_graph()
         return outcome
 
-    def _prepared(self, case: FaultCase) -> _Running:
+    def _prepared(self, case: FaultCase) -> GraphUnderTest:
         """Return a graph that damps without complaint, or that starts where the fault is one of the start."""
-        running = self._running
-        if running is not None:
+        if self._graph is not None and self._kind == _kind(case):
             try:
-                if running.kind == _kind(case):
-                    running.graph.wait_for_damping(partial(tells, case), _PATIENCE)
-                    return running
+                self._graph.wait_for_damping(partial(reports_fault, case), _PATIENCE)
+                return self._graph
             except GraphUnderTestError:
                 pass  # what came before has spoiled it
-            self.end_graph()
-        running = self._running = self._started(case)
-        if case.reaction is not Reaction.NOT_STARTED:
-            running.graph.wait_for_damping(partial(tells, case))
-        return running
-
-    def _started(self, case: FaultCase) -> _Running:
+        self.end_graph()
         namespace = f'faults_{os.getpid()}_{next(self._numbers)}'
-        stack = ExitStack()
-        port = can_port(self._place.domain, namespace)
-        observed = stack.enter_context(observers(self._context, namespace, port))
-        operator = Node(
-            'operator', namespace=namespace, context=self._context, start_parameter_services=False
-        )
-        stack.callback(operator.destroy_node)
         environment = shim_environment(self._place.folder) if case.shim else {}
-        graph = GraphUnderTest(self._place, namespace, case.options, environment, observed, operator)
-        return _Running(_kind(case), graph, stack)
-
-    def end_graph(self) -> None:
-        """End the graph that runs, and tell the faults that it has seen what its end has shown."""
-        running, self._running = self._running, None
-        if running is None:
-            return
-        with running.observing:
-            ending = running.graph.end()
-        if running.tried:
-            _, last, _, _ = running.tried[-1]
-            last.complaints += _complaints(ending)
-        for case, outcome, begin, end in running.tried:
-            if not case.loses_samples:
-                outcome.complaints += lost_while(running.graph.folder, begin, end)
+        self._kind = _kind(case)
+        graph = GraphUnderTest(self._place, self._context, namespace, case.options, environment)
+        self._graph = graph
+        if case.reaction is not Reaction.NOT_STARTED:
+            graph.wait_for_damping(partial(reports_fault, case), START_PATIENCE)
+        return graph
 
 
-def _complaints(ending: Ending) -> list[str]:
-    said = [f'left behind: {thing}' for thing in ending.left_behind]
-    said += [f'traceback in {file}' for file in ending.tracebacks]
-    if ending.code not in (*_CODES, -9):
-        said.append(f'the command ended with code {ending.code}')
-    return said
+def _losses(folder: Path, begin: float, end: float) -> list[str]:
+    """Return a sentence if a recording in `folder` lacks samples of `sim/truth` between two system times, s.
+
+    The simulator numbers its samples without a gap, whatever happens to the graph, so each hole is a loss.
+    """
+    found, lost = [], 0
+    for place in sorted(path for path in folder.glob('recording*') if path.is_dir()):
+        stamps = _truth_stamps(place)
+        if stamps is None:
+            found.append(f'{place.name} cannot be read')
+            continue
+        steps = np.rint(np.diff(stamps) / SAMPLE_TIME_NS).astype(int) - 1
+        times = 1e-9 * stamps[:-1]
+        lost += int(steps[(steps > 0) & (times >= begin - _SLACK) & (times <= end + _SLACK)].sum())
+    return [*found, *([f'{lost} samples of sim/truth are not in the recording'] if lost else [])]
+
+
+@lru_cache(maxsize=4)
+def _truth_stamps(place: Path) -> np.ndarray | None:
+    """Return the stamps (ns) of `sim/truth`; None where nothing can be read."""
+    try:
+        recording = engine_mount.open(place)
+        return recording['sim/truth'].stamps if 'sim/truth' in recording else np.empty(0, np.int64)
+    except (ReadingError, KeyError):
+        return None

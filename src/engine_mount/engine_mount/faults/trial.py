@@ -4,19 +4,22 @@ import math
 import time
 
 from engine_mount.faults.case import FaultCase, Reaction
-from engine_mount.faults.graph import START_PATIENCE, GraphUnderTest
-from engine_mount.faults.injection import injection, take_through
-from engine_mount.faults.judge import Course, Outcome, judged, tells
-from engine_mount.faults.observers import Told, since
+from engine_mount.faults.graph import LOOK_PERIOD, START_PATIENCE, GraphUnderTest
+from engine_mount.faults.injection import change_states, injection
+from engine_mount.faults.judge import Course, Outcome, judge, reports_fault
+from engine_mount.faults.observers import Report, since
 from mount_ros.nodes.diagnostics import Level
 
 _END_PATIENCE = 20.0  # s, chosen: for the end of a drive that closes and audits its recording
 _RECOVERY_PATIENCE = 8.0  # s, chosen
 _OWN_RECOVERY = 12.0  # s, chosen: a supervisor that initialises again by itself has done so by then
-_LOOK_PERIOD = 0.005  # s
+_BY_HAND = [
+    *((node, 'deactivate') for node in ('mount_control', 'mount_init', 'mount_driver')),
+    *((node, 'activate') for node in ('mount_driver', 'mount_init', 'mount_control')),
+]
 
 
-def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
+def try_fault(case: FaultCase, graph: GraphUnderTest) -> Outcome:
     """Try one fault in a graph that damps (or, for a fault of the start, that starts) and judge it."""
     trial = _Trial(case, graph)
     with injection(case, graph) as begin:
@@ -24,14 +27,13 @@ def tried(case: FaultCase, graph: GraphUnderTest) -> Outcome:
         begin()
         starts = case.reaction is Reaction.NOT_STARTED
         lasts = START_PATIENCE if starts else _END_PATIENCE if case.ends_drive else case.lasts
-        trial.watch(course.begun + lasts)
+        trial.watch(course.begun + lasts - time.monotonic())
         cleared = time.monotonic()
     if not course.ended and not case.for_good:
         course.cleared = cleared
         trial.recover()
-    course.over = time.monotonic()
-    course.printed = tuple(trial.printed)
-    outcome = judged(case, course, graph.observed)
+    course.over, course.printed = time.monotonic(), trial.printed
+    outcome = judge(case, course, graph.observed)
     if graph.refusals:
         outcome.detected_by, outcome.sentence = 'each node', '; '.join(graph.refusals)
         graph.refusals.clear()
@@ -45,50 +47,41 @@ class _Trial:
         self._case, self._graph = case, graph
         self._read: dict[str, int] = {}  # characters of each output
         self.course = Course(begun=math.nan)
-        self.printed: list[Told] = []
-        self._look()
+        self.printed: list[Report] = []
+        self._read_outputs()
         self.printed.clear()
 
-    def watch(self, end: float, until_damping: bool = False) -> bool:
-        """Watch up to a time (s), until the graph has ended or damps again; return whether it damps again."""
-        course = self.course
+    def watch(self, limit: float, until_damping: bool = False) -> None:
+        """Watch for `limit` s, until the graph has ended or damps again."""
+        course, end = self.course, time.monotonic() + limit
         while time.monotonic() < end and not course.ended and math.isnan(course.damping_again):
-            time.sleep(_LOOK_PERIOD)
-            self._look()
+            time.sleep(LOOK_PERIOD)
+            self._read_outputs()
             course.ended = self._graph.ended
-            if until_damping and self._graph.damping():
+            if until_damping and self._graph.is_damping():
                 course.damping_again = time.monotonic()
-        return not math.isnan(course.damping_again)
 
     def recover(self) -> None:
         """Wait for damping; where a new initialisation is required, see that there is none before it."""
-        by_hand = self._case.reaction is Reaction.SAFE_UNTIL_INITIALISED
-        if (
-            by_hand
-            and not self.watch(time.monotonic() + _OWN_RECOVERY, until_damping=True)
-            and not self.course.ended
-        ):
-            for node in ('mount_control', 'mount_init', 'mount_driver'):
-                take_through(self._graph, node, 'deactivate')
-            for node in ('mount_driver', 'mount_init', 'mount_control'):
-                take_through(self._graph, node, 'activate')
-        self.watch(time.monotonic() + _RECOVERY_PATIENCE, until_damping=True)
+        if self._case.reaction is Reaction.SAFE_UNTIL_INITIALISED:
+            self.watch(_OWN_RECOVERY, until_damping=True)
+            if math.isnan(self.course.damping_again) and not self.course.ended:
+                change_states(self._graph, _BY_HAND)
+        self.watch(_RECOVERY_PATIENCE, until_damping=True)
         if self._case.reaction is Reaction.TOLD:
             self._graph.wait_until(self._is_reported, _RECOVERY_PATIENCE)
 
     def _is_reported(self) -> bool:
         """Return whether a sentence has come: a supervisor reports a node when it has brought it back."""
-        self._look()
-        told = [*since(self._graph.observed.told, self.course.begun), *self.printed]
-        return any(tells(self._case, each) for each in told)
+        self._read_outputs()
+        reports = [*since(self._graph.observed.reports, self.course.begun), *self.printed]
+        return any(reports_fault(self._case, each) for each in reports)
 
-    def _look(self) -> None:
-        """Take what was printed since the last look."""
+    def _read_outputs(self) -> None:
+        """Take the whole lines that were printed since the last call."""
         now = time.monotonic()
         for name, text in self._graph.outputs().items():
-            begin = self._read.get(name, 0)
-            whole = text[begin : text.rfind('\n') + 1]
-            self._read[name] = begin + len(whole)
-            self.printed += [
-                Told(now, name, Level.WARN, line.strip()) for line in whole.splitlines() if line.strip()
-            ]
+            begin, end = self._read.get(name, 0), text.rfind('\n') + 1
+            self._read[name] = max(begin, end)
+            lines = map(str.strip, text[begin:end].splitlines())
+            self.printed += [Report(now, name, Level.WARN, line) for line in lines if line]

@@ -1,83 +1,63 @@
-"""Many recordings: indexed, replayed with other parameters, asked.
-
-What the three steps need is loaded when they are called.
-"""
+"""Many recordings: indexed, replayed with other parameters, asked and reported."""
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pyarrow
 
-    from engine_mount.fleet.foreign import Said
-
-Place = str | os.PathLike[str]
+_Place = str | os.PathLike[str]
 
 
-def index(
-    places: Sequence[Place],
-    out: Place,
-    *,
-    mapping_files: Sequence[Place] = (),
-    dbc: Place | None = None,
-    scheduler: str = 'local',
-    workers: int = 0,
-) -> 'pyarrow.Table':
-    """Return the table `recordings` of `engine-mount fleet index`: what each recording is and holds.
+class Fleet:
+    """Recordings at and below `places` (folders, recordings, URIs), with their catalogue in the folder `out`.
 
-    `places` are folders, recordings and URIs, `out` the folder of the catalogue, which is brought up to date.
-    Files of others are rows too where `mapping_files` say what their columns are (`dbc`: of CAN logs).
-    Raises an `OSError` or `ValueError` with the reason where a place cannot be listed, what is said is not
-    understood, or `out` not be written.
+    Each method returns a pyarrow table; its columns: docs/reference/fleet_columns.md. The work is done by
+    `workers` processes (0: one on each core), or by the Dask cluster at the address `scheduler`. An
+    interrupted call goes on where it stopped. Raises a `ValueError` or `OSError` with the reason.
     """
-    from engine_mount.fleet.catalogue.index import indexed
 
-    said = _said(mapping_files, dbc)
-    return indexed(places, out, said, scheduler=scheduler, workers=workers).recordings
+    def __init__(
+        self, places: Sequence[_Place], out: _Place, *, scheduler: str = 'local', workers: int = 0
+    ) -> None:
+        self.places, self.catalogue = places, Path(out)
+        self.result: Path | None = None
+        """The folder of the last `replay`."""
+        self._options: dict[str, Any] = {'scheduler': scheduler, 'workers': workers}
 
+    def index(self) -> 'pyarrow.Table':
+        """Return the table `recordings` of the catalogue: what each recording is and holds."""
+        from engine_mount.fleet.catalogue import index
 
-def replay(
-    places: Sequence[Place],
-    settings: Mapping[str, Any],
-    out: Place,
-    *,
-    closed_loop: bool = False,
-    mapping_files: Sequence[Place] = (),
-    dbc: Place | None = None,
-    scheduler: str = 'local',
-    workers: int = 0,
-) -> 'pyarrow.Table':
-    """Return the table of `engine-mount fleet replay`: recordings as recorded and with other parameters.
+        return index(self.places, self.catalogue, **self._options).recordings
 
-    `places` are catalogues, URIs and paths, `settings` {parameter: value} as after `--set`, `out` the folder
-    that holds the result and from which an interrupted call goes on; `mapping_files` and `dbc` as for
-    `index`. Raises a `ValueError` or `OSError` with
-    the reason where the order is refused or cannot go on.
-    """
-    from pathlib import Path
+    def replay(
+        self, changes: Mapping[str, Any], out: _Place, *, closed_loop: bool = False
+    ) -> 'pyarrow.Table':
+        """Return the table `result` in the folder `out`: the catalogue as recorded and with `changes`.
 
-    from engine_mount.drives.replay import parsed_changes
-    from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
+        These are {parameter: value} as after `--set`. With `closed_loop` the displacement is simulated anew.
+        """
+        from engine_mount.drives.replay import parsed_changes
+        from engine_mount.fleet.replay import replay_fleet
 
-    changes, said = parsed_changes(settings), _said(mapping_files, dbc)
-    order = FleetOrder([os.fspath(place) for place in places], changes, closed_loop, said)
-    return replay_fleet(order, Path(out), scheduler=scheduler, workers=workers).table
+        if not self.catalogue.exists():
+            self.index()
+        changed, self.result = parsed_changes(changes), Path(out)
+        return replay_fleet([str(self.catalogue)], changed, self.result, closed_loop, **self._options).table
 
+    def query(self, sql: str) -> 'pyarrow.Table':
+        """Return the answer to one SELECT about the catalogue, and about the result of the last `replay`."""
+        from engine_mount.fleet.questions import query
 
-def _said(mapping_files: Sequence[Place], dbc: Place | None) -> 'Said':
-    from pathlib import Path
+        return query(self.result or self.catalogue, sql)
 
-    from engine_mount.fleet.foreign import said_in
+    def report(self, by: str = '', count: int = 10) -> 'pyarrow.Table':
+        """Write report.html beside the last result; return its worst `count` rows by the column `by`."""
+        from engine_mount.fleet.page import write_page
+        from engine_mount.fleet.tables import COLUMNS, table_of
 
-    return said_in([Path(file) for file in mapping_files], None if dbc is None else Path(dbc))
-
-
-def query(folder: Place, sql: str) -> 'pyarrow.Table':
-    """Return the answer to one SELECT about a catalogue or result, as `engine-mount fleet query` does.
-
-    Tables and columns: docs/reference/fleet_columns.md. Raises a `ValueError` with the reason.
-    """
-    from engine_mount.fleet.questions import query as answer_of
-
-    return answer_of(folder, sql)
+        _, looks = write_page(self.result or self.catalogue, None, by, count)
+        return table_of(COLUMNS['result'], [look.row for look in looks])

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
-from engine_mount.fleet.catalogue.places import places
-from engine_mount.fleet.catalogue.reading import read_place
-from engine_mount.fleet.example.fleet import Ordered, make_one
-from engine_mount.fleet.example.variations import VARIATIONS, Drive
-from engine_mount.fleet.what_if.one import replay_one
+from engine_mount.fleet import catalogue, replay
+from engine_mount.fleet.example import Ordered, make_one
+from engine_mount.fleet.places import places
 from mount_control.policy.registry import POLICIES
 
 _SCENARIOS = ('bench', 'motorway')
@@ -22,9 +20,11 @@ def prepare(scenarios: Sequence[str] = _SCENARIOS, policies: Sequence[str] = tup
     """
     with tempfile.TemporaryDirectory() as folder:
         for number, (scenario, policy) in enumerate(product(scenarios, policies)):
-            drive = Drive(f'{scenario}_{policy}', {'scenario': scenario}, {'policy': policy})
-            make_one(Ordered(Path(folder) / drive.name, number, drive, VARIATIONS[0]))
+            drive = {'sim': {'scenario': scenario}, 'control': {'policy': policy}}
+            make_one(Ordered(Path(folder) / f'{scenario}_{policy}', number, drive, {}))
         for place in places([folder]).values():
-            read_place(place)
+            catalogue.rows_of(Path(place.uri), place)
             for closed_loop in (False, True):
-                replay_one(place, {'mount_control': {'highest_current': 1.0}}, closed_loop)
+                replay.rows_of(
+                    Path(place.uri), place, {'mount_control': {'highest_current': 1.0}}, closed_loop
+                )

@@ -1,26 +1,34 @@
 """Questions to the tables of a fleet, in SQL, answered by DuckDB from the Parquet files of a folder."""
 
+import difflib
 import json
 import os
+import shlex
 import threading
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.columns import TABLES
 from engine_mount.fleet.job import ORDER
+from engine_mount.fleet.places import SelectionError, select_recordings
+from engine_mount.fleet.tables import COLUMNS, NEEDED_FOR
 from engine_mount.signals.extras import required
+from engine_mount.signals.sources.source import SourceError
 
 if TYPE_CHECKING:
-    import duckdb
     import pyarrow
     import pyarrow.dataset
-
-NAMES = ('recordings', 'events', 'result')
-"""The tables that a folder can hold, each a file NAME.parquet."""
 
 _MEMORY = '1GB'  # chosen: what a question may take, before it is refused
 _TIME_LIMIT = 60.0  # s, chosen: what takes longer is refused
 _ROW_LIMIT = 1_000_000  # chosen: of an answer, which stands in memory
+_CONFIGURATION = {
+    'threads': 1,  # rows without ORDER BY come in the order of the file
+    'memory_limit': _MEMORY,
+    'temp_directory': '',
+    'autoinstall_known_extensions': False,
+    'autoload_known_extensions': False,
+}
 _LOCKS = (
     'SET python_enable_replacements = false',  # no variable of this program is a table
     'SET enable_external_access = false',  # no other file, no network, no extension
@@ -33,30 +41,43 @@ class QueryError(ValueError):
     """A question cannot be answered; the text says why, and what could be asked."""
 
 
+class Worst(NamedTuple):
+    """A row of a table, its value in the column of the question, its place, and commands that open it."""
+
+    row: Mapping[str, Any]
+    value: float
+    uri: str
+    commands: list[str]
+
+
 def query(folder: str | os.PathLike[str], sql: str, time_limit: float = _TIME_LIMIT) -> 'pyarrow.Table':
     """Return the answer to one SELECT about the tables of a catalogue or result.
 
     Their columns and units: docs/reference/fleet_columns.md. Nothing can be written, and no other file be
     read. Raises `QueryError`, also for what takes longer than `time_limit` (s).
     """
-    engine = required('duckdb', 'a question to a fleet')
+    duckdb = required('duckdb', 'a question to a fleet')
     tables = tables_of(folder)
-    connection = _locked(engine, tables)
+    connection = duckdb.connect(':memory:', config=_CONFIGURATION)
+    for name, table in tables.items():
+        connection.register(name, table)
+    for lock in _LOCKS:
+        connection.execute(lock)
     timer = threading.Timer(time_limit, connection.interrupt)
     timer.start()
     try:
         statements = connection.extract_statements(sql)
-        if len(statements) != 1 or statements[0].type != engine.StatementType.SELECT:
+        if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
             raise QueryError('a question is one SELECT statement; tables: ' + ', '.join(tables))
         rows: pyarrow.Table = connection.sql(sql).limit(_ROW_LIMIT + 1).to_arrow_table()
         if len(rows) > _ROW_LIMIT:
             raise QueryError(f'the answer has more than {_ROW_LIMIT} rows (limit): aggregate, or add LIMIT')
         return rows
-    except engine.InterruptException:
+    except duckdb.InterruptException:
         raise QueryError(
             f'no answer within {time_limit:g} s (limit): ask for less, or raise --time-limit'
         ) from None
-    except engine.Error as error:
+    except duckdb.Error as error:
         raise QueryError(_sentence(str(error), sql, tables)) from None
     finally:
         timer.cancel()
@@ -70,19 +91,20 @@ def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Data
     Those of a result have the tables of the catalogue beside them that it was made of, if it was. Raises
     `QueryError`.
     """
-    dataset = required('pyarrow.dataset', TABLES)
-    if Path(folder).is_file():
-        raise QueryError(f'{folder} is a file; name the folder that it is in, {Path(folder).parent}')
-    there = _files(Path(folder))
-    if not there and (Path(folder) / ORDER).is_file():
+    dataset, folder = required('pyarrow.dataset', NEEDED_FOR), Path(folder)
+    if folder.is_file():
+        raise QueryError(f'{folder} is a file; name the folder that it is in, {folder.parent}')
+    there = _files(folder)
+    is_result = (folder / ORDER).is_file()
+    if not there and is_result:
         raise QueryError(f'{folder} is not finished; the same engine-mount fleet replay goes on with it')
     if not there:
         raise QueryError(
-            f'{folder} holds no table of a fleet ({", ".join(f"{name}.parquet" for name in NAMES)}); '
+            f'{folder} holds no table of a fleet ({", ".join(f"{name}.parquet" for name in COLUMNS)}); '
             'engine-mount fleet index or replay makes one'
         )
-    for place in _asked_for(Path(folder)):
-        there = _files(Path(place)) | there
+    for source in _sources(folder) if is_result else ():
+        there = _files(Path(source)) | there
     try:
         return {name: dataset.dataset(file, format='parquet') for name, file in there.items()}
     except (OSError, ValueError) as error:
@@ -98,37 +120,69 @@ def result_of(folder: str | os.PathLike[str]) -> 'pyarrow.Table':
     return table
 
 
+def worst(folder: str | os.PathLike[str], by: str, count: int = 10, *, lowest: bool = False) -> list[Worst]:
+    """Return the rows with the largest absolute values of column `by`, the largest first.
+
+    Of a result, or where there is none of a catalogue. `lowest`: those with the smallest values instead.
+    Rows without a number are left out; equal ones stand by the names of their recordings. Raises
+    `QueryError`.
+    """
+    tables = tables_of(folder)
+    name = 'result' if 'result' in tables else 'recordings'
+    numbers = [field.name for field in tables[name].schema if str(field.type) in ('double', 'int64')]
+    if by not in numbers:
+        near = difflib.get_close_matches(by, numbers, n=3)
+        hint = f'did you mean {" or ".join(near)}?' if near else f'there are {", ".join(numbers)}'
+        raise QueryError(f'{by!r} is no column of numbers of {name}; {hint}')
+    order = f'"{by}"' if lowest else f'abs("{by}") desc'
+    sql = f'select * from {name} where "{by}" is not null order by {order}, recording, mount limit {count}'
+    places = _places(Path(folder)) if name == 'result' else {}
+    found = []
+    for row in query(folder, sql).to_pylist():
+        uri = row.get('uri') or places.get(row['recording'], row['recording'])
+        found.append(Worst(row, float(row[by]), uri, _commands(row, uri)))
+    return found
+
+
+def _commands(row: Mapping[str, Any], uri: str) -> list[str]:
+    """Return the commands that open a recording: its page, and of a result the replay with the change."""
+    place = shlex.quote(uri)
+    changes = json.loads(row.get('changes') or '{}')
+    if not changes or row['asked'] == 'displacement':
+        return [f'engine-mount report {place}', f'engine-mount view {place}']
+    mount = [f'--mount {row["mount"]}'] if row['mount'] else []
+    settings = [
+        f'--set {shlex.quote(f"{node}.{name}={value if isinstance(value, str) else json.dumps(value)}")}'
+        for node, values in changes.items()
+        for name, value in values.items()
+    ]
+    return [f'engine-mount report {place}', ' '.join([f'engine-mount replay {place}', *mount, *settings])]
+
+
+def _places(folder: Path) -> dict[str, str]:
+    """Return {recording: URI} of the recordings of a result, looked up where its order found them."""
+    try:
+        return {place.recording: place.uri for place in select_recordings(_sources(folder))}
+    except (SelectionError, SourceError) as error:
+        raise QueryError(
+            f'where the recordings of {folder} lie is not known: {error}; what was moved is found by a link '
+            'where it was'
+        ) from None
+
+
 def _files(folder: Path) -> dict[str, Path]:
     """Return the tables that are in a folder, by their names."""
-    files = {name: folder / f'{name}.parquet' for name in NAMES}
+    files = {name: folder / f'{name}.parquet' for name in COLUMNS}
     return {name: file for name, file in files.items() if file.is_file()}
 
 
-def _asked_for(folder: Path) -> list[str]:
-    """Return the places that the result in a folder was made of, none where it holds no result."""
-    order = folder / ORDER
-    if not order.is_file():
-        return []
-    places: list[str] = json.loads(order.read_text(encoding='utf-8'))['asked_for']
-    return places
+def _sources(folder: Path) -> list[str]:
+    """Return the places that the result in a folder was made of."""
+    sources: list[str] = json.loads((folder / ORDER).read_text(encoding='utf-8'))['asked_for']
+    return sources
 
 
-def _locked(engine: Any, tables: dict[str, 'pyarrow.dataset.Dataset']) -> 'duckdb.DuckDBPyConnection':
-    """Return a connection that knows the tables, and from then on nothing else.
-
-    One thread, so that rows without ORDER BY come in the order of the file.
-    """
-    plain = {'threads': 1, 'memory_limit': _MEMORY, 'temp_directory': ''}
-    closed = {'autoinstall_known_extensions': False, 'autoload_known_extensions': False}
-    connection = engine.connect(':memory:', config={**plain, **closed})
-    for name, table in tables.items():
-        connection.register(name, table)
-    for lock in _LOCKS:
-        connection.execute(lock)
-    return connection
-
-
-def _sentence(reason: str, sql: str, tables: dict[str, 'pyarrow.dataset.Dataset']) -> str:
+def _sentence(reason: str, sql: str, tables: Mapping[str, 'pyarrow.dataset.Dataset']) -> str:
     """Return DuckDB's reason as one sentence, and what there is of the tables that the question names."""
     first = reason.split('\n')[0].rstrip(' !.')
     if 'file system operations are disabled' in reason or 'disabled through configuration' in reason:

@@ -1,4 +1,8 @@
-"""Many independent tasks on processes of this machine or on a Dask cluster; results come as they are done."""
+"""Many independent tasks on processes of this machine or on a Dask cluster; results come as they are done.
+
+The processes have a pipe each and no pool of `concurrent.futures`: there the reader of results waits for ever
+for the rest of one whose process was killed while it sent it.
+"""
 
 import contextlib
 import ctypes
@@ -12,27 +16,20 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Generic, TypeVar
-
-from engine_mount.fleet.interrupts import remembered_interrupts
-
-Item = TypeVar('Item')
-Result = TypeVar('Result')
+from typing import Any, NamedTuple
 
 LOCAL = 'local'
 LOSSES = 3
 """Workers that may be lost with a task before it is given up; chosen."""
 
 _LOST = f'{LOSSES} workers were lost with it: killed, or out of memory'
-_POLL = 0.1  # s, chosen: between two looks at an interrupt; a result ends the wait at once
 _NICENESS = 10  # chosen: the user of the machine comes first
 _MEMORY_CHECK = 0.1  # s, chosen
 _PR_SET_PDEATHSIG = 1  # Linux, linux/prctl.h
-_CONNECT, _CLOSE = 10.0, 10.0  # s, chosen: limits for the scheduler of a cluster
+_LIMIT = 10.0  # s, chosen: for a cluster to answer, and to be left
 _OF_WORKERS = (
     'OMP_NUM_THREADS',
     'OPENBLAS_NUM_THREADS',
@@ -48,27 +45,26 @@ class SchedulerLostError(ConnectionError):
     """A Dask cluster does not answer, or no longer does; the text says which."""
 
 
-@dataclass(frozen=True)
-class Done(Generic[Result]):
+class Done(NamedTuple):
     """The task at `place` of a sequence: its result, or the reason why there is none.
 
     `error` is the exception of the task; None where its workers were lost.
     """
 
     place: int
-    result: Result | None
+    result: Any
     reason: str = ''
     error: BaseException | None = None
 
 
 def run_tasks(
-    work: Callable[[Item], Result],
-    items: Sequence[Item],
+    work: Callable[[Any], Any],
+    items: Sequence[Any],
     *,
     scheduler: str = LOCAL,
     workers: int = 0,
     memory: int = 0,
-) -> Iterator[Done[Result]]:
+) -> Iterator[Done]:
     """Yield `work(item)` of each item as it is done, in any order.
 
     `scheduler` is `local` (`workers` processes of this machine, 0 for one on each core; each ends beyond
@@ -78,12 +74,10 @@ def run_tasks(
     `ChildProcessError` where no process can start.
     """
     if not items:
-        return
-    with remembered_interrupts() as raise_lost:
-        if scheduler == LOCAL:
-            yield from _run_here(work, items, processes_for(workers, len(items)), memory, raise_lost)
-        else:
-            yield from _run_on_cluster(work, items, scheduler, raise_lost)
+        return iter(())
+    if scheduler == LOCAL:
+        return _run_here(work, items, processes_for(workers, len(items)), memory)
+    return _run_on_cluster(work, items, scheduler)
 
 
 def processes_for(workers: int, tasks: int) -> int:
@@ -97,17 +91,14 @@ class _Worker:
     def __init__(self, memory: int):
         context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
         self.pipe, theirs = context.Pipe()
-        self.place: int | None = None
-        """Which task it does."""
         self.is_ready = False
         self._process = context.Process(target=_serve, args=(theirs, os.getpid(), memory), daemon=True)
         with _environment_of_workers():
             self._process.start()
         theirs.close()
 
-    def begin(self, place: int, task: bytes) -> None:
+    def begin(self, task: bytes) -> None:
         """Hand over a task; a worker that is lost by then is noticed by its pipe."""
-        self.place = place
         with contextlib.suppress(OSError):
             self.pipe.send_bytes(task)
 
@@ -118,63 +109,51 @@ class _Worker:
         self.pipe.close()
 
 
-def _run_here(
-    work: Callable[[Item], Result],
-    items: Sequence[Item],
-    threads: int,
-    memory: int,
-    raise_lost: Callable[[], None],
-) -> Iterator[Done[Result]]:
+def _run_here(work: Callable, items: Sequence[Any], count: int, memory: int) -> Iterator[Done]:
     import cloudpickle  # only where tasks leave this process
 
     limit = memory or _memory_of_machine() // (os.cpu_count() or 1)
     waiting, losses, failed_starts = deque(range(len(items))), Counter[int](), 0
-    workers: list[_Worker] = []
+    workers: dict[Any, _Worker] = {}  # by their pipes
+    under_way: dict[Any, int] = {}
     try:
-        while waiting or any(worker.place is not None for worker in workers):
-            while waiting and len(workers) < threads:
-                workers.append(_Worker(limit))
-            for worker in workers:
-                if waiting and worker.place is None:
-                    place = waiting.popleft()
-                    worker.begin(place, cloudpickle.dumps((work, items[place])))
-            busy: dict[Any, _Worker] = {worker.pipe: worker for worker in workers if worker.place is not None}
-            for pipe in wait(list(busy), _POLL):
-                worker = busy[pipe]
-                assert worker.place is not None
+        while waiting or under_way:
+            while waiting and len(workers) < count:
+                worker = _Worker(limit)
+                workers[worker.pipe] = worker
+            for pipe in list(workers.keys() - under_way)[: len(waiting)]:
+                under_way[pipe] = waiting.popleft()
+                workers[pipe].begin(cloudpickle.dumps((work, items[under_way[pipe]])))
+            for pipe in wait(list(under_way)):
+                worker, place = workers[pipe], under_way[pipe]
                 try:
                     answer = worker.pipe.recv()
                 except (EOFError, OSError):
-                    workers.remove(worker)
+                    del workers[pipe], under_way[pipe]
                     worker.end()
                     failed_starts = 0 if worker.is_ready else failed_starts + 1
-                    _check_starts(failed_starts)
-                    losses[worker.place] += 1
-                    if losses[worker.place] < LOSSES:
-                        waiting.append(worker.place)
+                    if failed_starts == LOSSES:
+                        raise ChildProcessError(
+                            f'no worker process could start in {LOSSES} attempts: a script needs the line '
+                            "if __name__ == '__main__' where it starts workers; else check the memory of "
+                            'this machine'
+                        ) from None
+                    losses[place] += 1
+                    if losses[place] < LOSSES:
+                        waiting.append(place)
                     else:
-                        yield Done(worker.place, None, _LOST)
+                        yield Done(place, None, _LOST)
                     continue
-                worker.is_ready = True
-                if answer is not None:
-                    place, worker.place = worker.place, None
+                if worker.is_ready:
+                    del under_way[pipe]
                     yield _done(place, *answer)
-            raise_lost()
+                worker.is_ready = True
     finally:
-        for worker in workers:
+        for worker in workers.values():
             worker.end()
 
 
-def _check_starts(failed: int) -> None:
-    """Raise `ChildProcessError` where no worker could begin to work, several times in a row."""
-    if failed >= LOSSES:
-        raise ChildProcessError(
-            f'no worker process could start in {LOSSES} attempts: a script needs the line '
-            "if __name__ == '__main__' where it starts workers; else check the memory of this machine"
-        )
-
-
-def _done(place: int, result: Any, error: BaseException | None) -> Done[Any]:
+def _done(place: int, result: Any, error: BaseException | None) -> Done:
     if error is None:
         return Done(place, result)
     return Done(place, None, f'{type(error).__name__}: {error}', error)
@@ -194,9 +173,8 @@ def _environment_of_workers() -> Iterator[None]:
         yield
     finally:
         for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
+            del os.environ[name]
+            if value is not None:
                 os.environ[name] = value
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
@@ -210,21 +188,19 @@ def _memory_of_machine() -> int:
 
 
 def _serve(pipe: Connection, starter: int, memory: int) -> None:
-    """Do pickled tasks from a pipe, one after the other, until it is closed."""
-    _prepare_worker(starter, memory)
-    pipe.send(None)  # it has begun to work
-    with contextlib.suppress(EOFError):
-        while True:
-            pipe.send_bytes(_perform(pipe.recv_bytes()))
+    """Do pickled tasks from a pipe, one after the other, until it is closed.
 
-
-def _prepare_worker(starter: int, memory: int) -> None:
-    """Tie this process to its starter, lower its priority, and end it beyond `memory` bytes."""
+    The process ends with its starter and beyond `memory` bytes, at a low priority.
+    """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != starter:  # it ended before
         os.kill(os.getpid(), signal.SIGKILL)
     os.nice(_NICENESS)
     threading.Thread(target=_limit_memory, args=(memory,), name='memory', daemon=True).start()
+    pipe.send(None)  # it has begun to work
+    with contextlib.suppress(EOFError):
+        while True:
+            pipe.send_bytes(_perform(pipe.recv_bytes()))
 
 
 def _limit_memory(memory: int) -> None:
@@ -249,81 +225,41 @@ def _perform(task: bytes) -> bytes:
         return pickle.dumps((None, error))
 
 
-def _run_on_cluster(
-    work: Callable[[Item], Result], items: Sequence[Item], address: str, raise_lost: Callable[[], None]
-) -> Iterator[Done[Result]]:
+def _run_on_cluster(work: Callable, items: Sequence[Any], address: str) -> Iterator[Done]:
     import cloudpickle
-    from distributed import KilledWorker, as_completed
+    from distributed import Client, KilledWorker, as_completed
 
-    left = len(items)
-    with _quiet_dask(), _client(address) as client:
-        try:
-            futures = client.map(_perform, [cloudpickle.dumps((work, item)) for item in items], pure=False)
-            places = {future.key: place for place, future in enumerate(futures)}
-            arriving = as_completed(futures, loop=client.loop)
-            del futures  # a result is dropped from the cluster once it is here
-            while left:
-                arrived = arriving.next_batch(block=False)
-                if not arrived:
-                    with arriving.thread_condition:
-                        arriving.thread_condition.wait(_POLL)
-                    raise_lost()
-                for future in arrived:
-                    place = places[future.key]
-                    try:
-                        done = _done(place, *pickle.loads(future.result()))
-                    except (CancelledError, KilledWorker):
-                        client.nthreads()  # raises where it was the scheduler that was lost
-                        done = Done(place, None, _LOST)
-                    except OSError:
-                        raise  # of the connection
-                    except Exception as error:  # a worker cannot load its task
-                        done = _done(place, None, error)
-                    left -= 1
-                    yield done
-        except OSError as error:
-            raise SchedulerLostError(
-                f'the scheduler ({address}) was lost with {left} tasks under way; what was done until then '
-                f'stands ({error})'
-            ) from None
-
-
-@contextlib.contextmanager
-def _client(address: str) -> Iterator[Any]:
-    """Give a client of the cluster at `address`.
-
-    It is left within `_CLOSE` s: after an interrupt inside Dask its `close` was seen to wait for ever.
-    """
-    from distributed import Client
-
+    for name in _LOGGERS:  # what a user needs to know comes with the results
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
-        client = Client(address, timeout=_CONNECT, set_as_default=False)
+        client = Client(address, timeout=_LIMIT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise SchedulerLostError(f'{address}: no Dask scheduler answers there ({error})') from None
-
-    def close() -> None:
-        with contextlib.suppress(Exception):
-            client.close()
-
+    left = len(items)
     try:
-        yield client
-    finally:
-        closing = threading.Thread(target=close, daemon=True)
+        futures = client.map(_perform, [cloudpickle.dumps((work, item)) for item in items], pure=False)
+        places = {future.key: place for place, future in enumerate(futures)}
+        arriving = as_completed(futures, loop=client.loop)
+        del futures  # a result is dropped from the cluster once it is here
+        for future in arriving:
+            place = places[future.key]
+            try:
+                done = _done(place, *pickle.loads(future.result()))
+            except (CancelledError, KilledWorker):
+                client.nthreads()  # raises where it was the scheduler that was lost
+                done = Done(place, None, _LOST)
+            except OSError:
+                raise  # of the connection
+            except Exception as error:  # a worker cannot load its task
+                done = _done(place, None, error)
+            left -= 1
+            yield done
+    except OSError as error:
+        raise SchedulerLostError(
+            f'the scheduler ({address}) was lost with {left} tasks under way; what was done until then '
+            f'stands ({error})'
+        ) from None
+    finally:  # after an interrupt inside Dask its `close` was seen to wait for ever
+        closing = threading.Thread(target=client.close, daemon=True)
         closing.start()
-        closing.join(_CLOSE)
-
-
-@contextlib.contextmanager
-def _quiet_dask() -> Iterator[None]:
-    """Keep Dask's log to itself: what a user needs to know comes with the results."""
-    import distributed  # noqa: F401  # it sets its levels when it is loaded
-
-    loggers = [logging.getLogger(name) for name in _LOGGERS]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
+        closing.join(_LIMIT)

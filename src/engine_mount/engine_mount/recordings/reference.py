@@ -1,6 +1,5 @@
 """Reference recordings: short drives in the repository whose setpoints a replay must meet to the bit."""
 
-import os
 import re
 import shutil
 from collections.abc import Mapping
@@ -13,11 +12,9 @@ import yaml
 
 from engine_mount.recordings.bag_copy import BagCopy, Messages, read_messages
 from engine_mount.recordings.compare import compare
-from engine_mount.recordings.difference import time_text as moment_text
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
-from engine_mount.recordings.times import distinct
 from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_recorder.session import session_message, session_text, time_text
 from mount_ros.topics import (
@@ -35,39 +32,6 @@ from mount_ros.topics import (
 
 ANSWERS = (CURRENT_SETPOINT, CONTROL_TRACE)
 """What a replay makes."""
-
-
-def differences_from_reference(
-    reference: Recording | str | os.PathLike[str], replayed: Recording | str | os.PathLike[str]
-) -> list[str]:
-    """Return how the answers in `replayed` differ from those in `reference`, in words; empty when to the bit.
-
-    Compared are `current_setpoint` and `control_trace` by their stamps. From the first traced sample on
-    every answer must be there and no other; of the ramp before it those that both have are compared. Raises
-    `ReadingError` or `ComparisonError` where that cannot be told.
-    """
-    a, b = (each if isinstance(each, Recording) else open_recording(each) for each in (reference, replayed))
-    comparison = compare(a, b, topics=ANSWERS)
-    if not comparison.alignment.same_stamps:
-        return ['the replay has other stamps than the reference: it answers other samples']
-    traced = a[CONTROL_TRACE.name].stamps
-    if not len(traced):
-        return ['the reference holds no control_trace: there is nothing to meet']
-    sentences = comparison.difference_sentences()
-    for topic in ANSWERS:
-        # When mount_control is deactivated it answers its last sample a second time, with 0 A; so distinct.
-        stamps = [
-            distinct(each[topic.name].stamps) if topic.name in each else np.empty(0, np.int64)
-            for each in (a, b)
-        ]
-        for here, there, where in ((*stamps, 'the replay'), (*stamps[::-1], 'the reference')):
-            missing = np.setdiff1d(here[here >= traced.min()], there)
-            if len(missing):
-                first = moment_text(float(comparison.alignment.axis.of_stamps(missing[:1])[0]))
-                sentences.append(
-                    f'{len(missing)} samples of {topic.name} are missing in {where}, first at {first}'
-                )
-    return sentences
 
 
 ACCEPTED_NAME = 'accepted.yaml'

@@ -80,8 +80,8 @@ def report(
     path: str | Path | Sequence[str | Path],
     *,
     compare_with: str | Path | None = None,
-    out: Path | None = None,
-    pictures: Path | None = None,
+    out: str | Path | None = None,
+    pictures: str | Path | None = None,
     on_step: OnStep = lambda share, what: None,
 ) -> Report:
     """Return the report of the recordings or runs at `path`, and how the one to `compare_with` differs.
@@ -102,20 +102,19 @@ def report(
         except ComparisonError as error:
             raise ReportError(f'{error}; without --compare both can share a page') from None
     made = make_report(subjects, lambda share, what: on_step(0.2 + 0.4 * share, what))
+    file, folder = (None if place is None else Path(place) for place in (out, pictures))
+    drawn: list[Path] = []
     try:
-        if out is not None:
+        if file is not None:
             on_step(0.6, 'writing the page')
-            out.parent.mkdir(parents=True, exist_ok=True)
-            made.write_page(out)
-        drawn = (
-            made.write_pictures(pictures, lambda share, what: on_step(0.7 + 0.3 * share, what))
-            if pictures
-            else []
-        )
+            file.parent.mkdir(parents=True, exist_ok=True)
+            made.write_page(file)
+        if folder is not None:
+            drawn = made.write_pictures(folder, lambda share, what: on_step(0.7 + 0.3 * share, what))
     except OSError as error:
-        file = error.filename or out
-        raise ReportError(f'{file} cannot be written: {error.strerror}; choose another --out') from None
-    return replace(made, page=out, pictures=drawn)
+        place = error.filename or file
+        raise ReportError(f'{place} cannot be written: {error.strerror}; choose another --out') from None
+    return replace(made, page=file, pictures=drawn)
 
 
 def default_page(path: Path) -> Path:

@@ -23,7 +23,7 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
-from engine_mount.signals.times import SLOWEST, may_hold_times, times_of
+from engine_mount.signals.times import SLOWEST, is_time, times_of
 from engine_mount.signals.units import is_unit, unit_of
 from mount_models.arithmetic.averages import mean
 
@@ -81,13 +81,17 @@ def select_rows(
     mapping = _mapping(choices, known).of(known)
     there = _headings(source) if isinstance(source, Measured) else headings(source, mapping.stated)
     uri = source.provenance.uri if isinstance(source, Measured) else str(source)
+    for named in mapping.columns.values():
+        heading_of(there, named.column, uri)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
         if name not in mapping.columns:
             option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
+            measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
+            columns = '; '.join((listed(there), *measured.notes))
             raise SignalError(
-                f'{uri} has no column for {name} (its columns: {listed(there)}); name it as in {option}'
+                f'{uri} has no column for {name} (its columns: {columns}); name it as in {option}'
             )
     signals = _select(source, mapping, known, timed=timed, slowest=slowest, whole=True).signals
     first = next(iter(signals.values()))
@@ -173,7 +177,7 @@ def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     wanted += [mapping.time.column] if timed and mapping.time.column else []
     names = {heading_of(there, text, str(source)).name for text in wanted}
     if timed and not mapping.time.column:
-        names |= may_hold_times(there)
+        names |= {one.name for one in there if is_time(one)}
     return read(source, [one.name for one in there if one.name in names], mapping.stated)
 
 
@@ -210,9 +214,10 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
     known = np.isfinite(column.values)
     bad = np.flatnonzero(~known if whole else np.isinf(column.values))
     if bad.size:
+        at = '' if base.told == _ROWS else f', at {base.times[bad[0]]:.4f} s'
         raise SignalError(
-            f'{where}: value number {bad[0]} is {column.values[bad[0]]}, at {base.times[bad[0]]:.4f} s '
-            f'({bad.size} such of {known.size}); repair it or cut it out'
+            f'{where}: value number {bad[0]} is {column.values[bad[0]]}{at} ({bad.size} such of '
+            f'{known.size}); repair it or cut it out'
         )
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
     return known

@@ -1,7 +1,5 @@
 """The times of a column: from the format, from a column, or from a stated rate, in s."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from engine_mount.signals.formats.measured import Heading, Measured, MeasuredColumn, TimeBase, listed
@@ -29,28 +27,21 @@ def is_time(heading: Heading) -> bool:
     return heading.date or heading.name[len(_group(heading)) :].lower().replace(' ', '_') in TITLES
 
 
-def may_hold_times(there: Sequence[Heading]) -> set[str]:
-    """Return the names of the columns that are read for the times of others."""
-    return {one.name for one in there if is_time(one)} | {one.name for one in there[:1] if not one.timed}
-
-
 def times_of(
     measured: Measured, column: MeasuredColumn, choice: TimeChoice, slowest: float = SLOWEST
 ) -> Times:
     """Return the times of a column.
 
-    What is said by hand goes before what the format tells, that before a column with a usual title, and that
-    before a first column that rises. A rate below `slowest` (Hz) doubts their unit. Raises `SignalError`.
+    What is said by hand goes before what the format tells, and that before a column with a usual title. A
+    rate below `slowest` (Hz) doubts their unit. Raises `SignalError`.
     """
     if choice.column:
         return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
-    others = [one for one in measured.columns.values() if one is not column]
     titled = sorted(
-        filter(is_time, others),
+        (one for one in measured.columns.values() if one is not column and is_time(one)),
         key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
     )
-    rising = [one for one in others if one.number == 0 and np.all(np.diff(one.values) > 0.0)]
-    found = next(iter([*titled, *rising]), None)
+    found = titled[0] if titled else None
     if choice.rate is not None:
         return _at_rate(measured, column, choice.rate, found)
     if column.time is not None:
@@ -61,9 +52,7 @@ def times_of(
             f'--time COLUMN:UNIT (there are {listed([*measured.columns.values(), *measured.others])}), or '
             'the rate with --rate HZ'
         )
-    base, notes = _in_column(measured, found, choice.unit, slowest)
-    first = () if titled else (f'{found.name}: the first column rises: taken as the time',)
-    return base, (*first, *notes)
+    return _in_column(measured, found, choice.unit, slowest)
 
 
 def _group(heading: Heading) -> str:

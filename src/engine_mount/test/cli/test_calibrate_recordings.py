@@ -9,10 +9,8 @@ import pytest
 import yaml
 
 from engine_mount.cli.command import main
-from engine_mount.identification.rack.columns import RackRecordingError
-from engine_mount.identification.rack.force_points import read_force
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.identification.fitting import IdentificationError
+from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.mapping import ColumnChoice, Mapping
 from mount_models.actuator.law import checked_force
 from mount_models.coil.gap import evaluate
@@ -29,7 +27,7 @@ from mount_sim.rack.coil import drawn_rack, record_ripple
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)
 AREA = default_specimen().turns_area
-NOTHING = GivenValues({}, {})
+NOTHING = FileValues()
 
 
 def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
@@ -118,7 +116,7 @@ def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path)
     np.testing.assert_allclose(
         ripple.inductance, AREA * columns['flux_rate_t_per_s'] / columns['current_rate_a_per_s'], rtol=1e-12
     )
-    given = GivenValues({bag: 350e-6}, {bag: 20.0})
+    given = FileValues({bag: 350e-6}, {bag: 20.0})
     (ripple,) = read_ripple([bag], {}, given, AREA)
     assert (ripple.gap, ripple.celsius) == (350e-6, 20.0)
 
@@ -136,24 +134,24 @@ def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
 
 def test_a_recording_without_what_is_needed_is_refused(tmp_path):
     bag = record(tmp_path / 'held', 349e-6)
-    with pytest.raises(RackRecordingError, match='its air gap is not known; add --gap held=UM'):
+    with pytest.raises(IdentificationError, match='its air gap is not known; add --gap held=UM'):
         read_ripple([bag], Mapping(), NOTHING, AREA)
-    given = GivenValues({bag: 349e-6}, {})
-    with pytest.raises(RackRecordingError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
+    given = FileValues({bag: 349e-6}, {})
+    with pytest.raises(IdentificationError, match=r'has no topic sim/mount_force; it holds .*clamp_force'):
         read_force([bag], Mapping({'force': ColumnChoice('sim/mount_force:wrench.force.z')}), given)
-    with pytest.raises(RackRecordingError, match='of an MCAP recording write TOPIC:FIELD'):
+    with pytest.raises(IdentificationError, match='of an MCAP recording write TOPIC:FIELD'):
         read_force([bag], Mapping({'force': ColumnChoice('kraft')}), given)
 
 
 def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6, spoil=5)
-    with pytest.raises(RackRecordingError, match='20% of the inductances are not positive, at most 10%'):
+    with pytest.raises(IdentificationError, match='20% of the inductances are not positive, at most 10%'):
         read_ripple([bag], Mapping(), NOTHING, AREA)
 
 
 def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path):
     bag = record(tmp_path / 'held_349um', 349e-6, warming=10.0)
-    with pytest.raises(RackRecordingError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
+    with pytest.raises(IdentificationError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
         read_ripple([bag], Mapping(), NOTHING, AREA)
 
 

@@ -64,7 +64,7 @@ def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(che
     assert one.exit_code == 0, one.output
     assert '2 of 2 manoeuvres within their 11 limits.' in one.output
     assert all(len(line) <= 80 for line in one.output.splitlines() if 'page' not in line)
-    assert (tmp_path / 'one' / 'check.html').read_text(encoding='utf-8').count('<li class="good">') == 2
+    assert (tmp_path / 'one' / 'check.html').read_text(encoding='utf-8').count('Within all limits.') == 2
     assert (tmp_path / 'one' / 'gap' / 'recording').is_dir()
     assert check('two', '--jobs', '2')[1] == figures
     gap = json.loads(figures)['manoeuvres']['gap']['figures']

@@ -7,11 +7,8 @@ from engine_mount.cli.calibration.given import rack_mapping
 from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
 from engine_mount.fleet.foreign import mapped_in, said_in
-from engine_mount.identification.friction.channels import friction_mapping
-from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.rack.force_points import read_force
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.identification.friction.files import friction_mapping, read_recording
+from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.reading import read_files
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
@@ -19,7 +16,7 @@ from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
 
 GRAVITY, POUND, INCH = 9.80665, 4.4482216152605, 0.0254
-NOTHING = GivenValues({}, {}, 20.0)
+NOTHING = FileValues(celsius_of_others=20.0)
 TIME = np.arange(2000) / 1000.0
 WAY = 1e-3 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m
 SHAKING = 3.0 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m/s^2
@@ -116,21 +113,6 @@ def test_a_unit_beside_it_makes_a_scale_a_calibration(rig, read, quantity, facto
         assert read(file, path) == pytest.approx(0.98 * values, rel=1e-9, abs=1e-9 * np.abs(values).max())
 
 
-def write_german_csv(file, columns):
-    lines = [';'.join(columns)]
-    lines += [
-        ';'.join(f'{value:.15g}'.replace('.', ',') for value in row)
-        for row in zip(*columns.values(), strict=True)
-    ]
-    file.write_text('\n'.join(lines) + '\n')
-
-
-def write_mat(file, columns):
-    from scipy.io import savemat
-
-    savemat(file, columns)
-
-
 def write_mdf(file, columns):
     from asammdf import MDF, Signal
 
@@ -142,7 +124,7 @@ def write_mdf(file, columns):
         written.save(file)
 
 
-FORMATS = [('csv', write_csv), ('txt', write_german_csv), ('mat', write_mat), ('mf4', write_mdf)]
+FORMATS = [('csv', write_csv), ('mf4', write_mdf)]
 MOTION = {'Zeit': 1e3 * TIME, 'way': WAY / INCH, 'cell': FORCE / POUND, 'load': LOAD / POUND / 1e3}
 MOTION_SAID = ['time=Zeit:ms', 'displacement=way:in', 'friction_force=cell:lbf', 'normal_force=load:kip']
 GAP, CURRENT = (grid.ravel() for grid in np.meshgrid(np.linspace(300, 500, 6), np.linspace(0.2, 3.0, 9)))
@@ -174,7 +156,7 @@ def test_titles_of_rigs_and_racks_tell_quantity_and_unit(tmp_path):
         'friction_force (kip)': FORCE / POUND / 1e3,
         'normal_force_n': LOAD,
     }
-    write_german_csv(tmp_path / 'rig.csv', titled)
+    write_csv(tmp_path / 'rig.csv', titled)
     found = read_recording(tmp_path / 'rig.csv')
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
@@ -198,8 +180,8 @@ def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs_and_racks(tmp_
         'time: {column: Zeit, unit: ms}\ncolumns:\n  displacement: {column: way, unit: in, offset: mean}\n'
         '  force: {column: cell, unit: lbf, scale: -1}\n  normal_force: {column: load, unit: kip}\n'
     )
-    write_mat(tmp_path / 'rig.mat', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
-    found = read_recording(tmp_path / 'rig.mat', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
+    write_csv(tmp_path / 'rig.csv', {**MOTION, 'way': MOTION['way'] + 3.0, 'cell': -MOTION['cell']})
+    found = read_recording(tmp_path / 'rig.csv', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
     (tmp_path / 'rack.yaml').write_text(

@@ -17,10 +17,9 @@ from engine_mount.experiments import (
     ramp_and_hold,
     sawtooth,
 )
-from engine_mount.experiments.harness.contract import Experiment, Holds, Order, Outcome, Statement
-from engine_mount.experiments.registry import NAMES, experiment_named
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
+from engine_mount.experiments.harness.experiment import Claim, Experiment, Holds, Outcome, holds_if
+from engine_mount.experiments.registry import NAMES, experiment, experiment_named, experiments_named
+from engine_mount.identification.rack import FileValues, read_ripple
 from engine_mount.recordings.audit import audit
 from engine_mount.signals.mapping import Mapping
 from mount_models.friction.contact import FrictionContact
@@ -37,11 +36,6 @@ SHORT_SAWTOOTH = {
 }
 
 
-def run(module, folder, **settings) -> Outcome:
-    order = Order(folder, {module.NAME: settings})
-    return module.EXPERIMENT.run(order, lambda share, what: None)
-
-
 def command(*arguments):
     return CliRunner().invoke(app, ['experiment', *arguments])
 
@@ -50,7 +44,7 @@ def check(outcome):
     json.dumps(outcome.figures, allow_nan=False)
     assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
     assert outcome.pictures
-    assert outcome.statements
+    assert outcome.claims
 
 
 # Contract and command.
@@ -63,6 +57,13 @@ def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
         assert experiment.title
         assert experiment.reference.startswith('Sec' if experiment.needs else 'Fig')
         assert list(experiment.known_settings()) == [name]
+
+
+def test_all_are_those_that_need_nothing_and_those_that_are_named_besides():
+    needing = [name for name in NAMES if experiment_named(name).needs]
+    assert needing == ['recorded_drive', 'measured_road']
+    chosen = [each.name for each in experiments_named(['all', needing[0]])]
+    assert chosen == [name for name in NAMES if name != needing[1]]
 
 
 def test_the_list_names_every_experiment():
@@ -80,6 +81,12 @@ def test_the_list_names_every_experiment():
         (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
         (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
         (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
+        (['sensitivity', '--set', 'sensitivity.damper=stiff'], 'no damper curve'),
+        (['bench', '--set', 'bench.damper=stiff'], 'no damper curve'),
+        (
+            ['bench', '--set', 'mount_sim.mount=hydro'],
+            'mount_sim.mount is set by the experiment bench itself',
+        ),
         (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
     ],
 )
@@ -117,41 +124,48 @@ def test_the_command_writes_figures_page_and_pictures(tmp_path):
     assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
 
 
-def test_the_page_puts_pictures_beside_statements_and_counts_the_answers(tmp_path):
-    picture = tmp_path / 'a.png'
+def test_the_page_puts_pictures_beside_claims_counts_the_answers_and_leads_to_an_own_page(tmp_path):
+    picture, own = tmp_path / 'a.png', tmp_path / 'own.md'
     picture.write_bytes(PNG)
-    told = [
-        Statement('Fig. 1', 'it is so', 'it was not', Holds.NO),
-        Statement('Fig. 2', 'so too', 'it was', Holds.YES),
+    own.write_text('own')
+    claims = [
+        Claim('Fig. 1', 'it is so', 'it was not', Holds.NO),
+        Claim('Fig. 2', 'so too', 'it was', Holds.YES),
     ]
-    experiment = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), run)
-    page.write_page([(experiment, Outcome({}, [picture], [], told))], tmp_path / 'docs' / 'page.md')
-    text = (tmp_path / 'docs' / 'page.md').read_text()
+    known = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), lambda order: None)
+    docs = tmp_path / 'docs'
+    page.write_page([Outcome(known, {}, claims, [picture], pages=[own])], docs / 'page.md')
+    text = (docs / 'page.md').read_text()
     assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
     assert '| Fig. 1 | it is so | it was not | no |' in text
-    assert (tmp_path / 'docs' / 'figures' / 'a.png').exists()
+    assert '[own.md](own.md)' in text
+    assert (docs / 'own.md').read_text() == 'own'
+    assert (docs / 'figures' / 'a.png').exists()
+
+
+@pytest.mark.parametrize(
+    ('answers', 'holds'),
+    [([True], Holds.YES), ([True, False], Holds.PARTLY), ([False], Holds.NO), ([], Holds.NOT_COMPARABLE)],
+)
+def test_a_claim_holds_where_it_came_out_in_all_cases(answers, holds):
+    assert holds_if(answers) is holds
 
 
 def test_without_noise_the_ramp_gives_the_true_parameters(tmp_path):
-    outcome = run(ramp_and_hold, tmp_path, force_noise=0.0, displacement_noise=0.0)
+    outcome = experiment(ramp_and_hold.NAME, out=tmp_path / 'ramp', force_noise=0.0, displacement_noise=0.0)
     check(outcome)
     assert outcome.figures['time_constant_s'] == pytest.approx(0.44118, abs=2e-4)
     assert max(map(abs, outcome.figures['errors'].values())) < 5e-3
     assert abs(outcome.figures['errors_without_ramp_correction']['tangential_stiffness']) > 0.1
-
-
-def test_sliding_pads_are_told(tmp_path):
-    outcome = run(ramp_and_hold, tmp_path, normal_force=60.0, hold_time=2.0)
-    microslip = outcome.statements[0]
-    assert 'microslip' in microslip.paper
-    assert microslip.holds is Holds.NO
+    sliding = experiment(ramp_and_hold.NAME, out=tmp_path / 'sliding', normal_force=60.0, hold_time=2.0)
+    assert [each.claims[0].holds for each in (outcome, sliding)] == [Holds.YES, Holds.NO]
 
 
 # Each experiment.
 
 
 def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(tmp_path):
-    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH)
+    outcome = experiment(sawtooth.NAME, out=tmp_path, **SHORT_SAWTOOTH)
     check(outcome)
     recording = engine_mount.open(outcome.recordings[0])
     assert set(recording.topics) == {'/session', '/displacement', '/sim/mount_force', '/sim/clamp_force'}
@@ -164,7 +178,9 @@ def test_the_saw_tooth_is_recorded_in_the_topics_of_a_drive_and_nothing_is_lost(
 
 
 def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
-    outcome = run(sawtooth, tmp_path, **SHORT_SAWTOOTH, force_noise=0.0, displacement_noise=0.0)
+    outcome = experiment(
+        sawtooth.NAME, out=tmp_path, **SHORT_SAWTOOTH, force_noise=0.0, displacement_noise=0.0
+    )
     assert outcome.figures['strokes'] == 4
     assert outcome.figures['a_rms_error'] < 3e-3
     assert outcome.figures['b_rms_error_per_mm'] < 0.5
@@ -176,14 +192,16 @@ def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
 def test_other_pads_change_what_holds(tmp_path):
     light = {**SHORT_SAWTOOTH, 'lowest_normal_force': 40.0, 'highest_normal_force': 40.0, 'force_noise': 0.1}
     law = 1
-    printed = run(sawtooth, tmp_path / 'printed', **light).statements[law]
-    negative = run(sawtooth, tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}).statements[law]
+    printed = experiment(sawtooth.NAME, out=tmp_path / 'printed', **light).claims[law]
+    negative = experiment(
+        sawtooth.NAME, out=tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}
+    ).claims[law]
     assert (printed.reference, printed.holds) == ('Sec. 4, Eq (12)', Holds.PARTLY)
     assert negative.holds is Holds.YES
 
 
 def test_the_force_characteristic_meets_the_published_accuracy_of_the_fit(tmp_path):
-    outcome = run(force_characteristic, tmp_path)
+    outcome = experiment(force_characteristic.NAME, out=tmp_path)
     check(outcome)
     assert outcome.figures['law_relative_rms'] < 0.005
     assert outcome.figures['law_relative_worst'] < 0.01
@@ -191,7 +209,7 @@ def test_the_force_characteristic_meets_the_published_accuracy_of_the_fit(tmp_pa
 
 
 def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
-    outcome = run(inductance_map, tmp_path)
+    outcome = experiment(inductance_map.NAME, out=tmp_path)
     check(outcome)
     figures = outcome.figures
     assert figures['ramp_gap_at_rest_m'] == pytest.approx(492e-6, abs=4e-6)
@@ -206,14 +224,14 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
 
 def _check_that_calibration_reads_the_ramp(folder, inductance_at_rest):
     turns_area = default_specimen().turns_area
-    (ripple,) = read_ripple([folder], Mapping(), GivenValues({folder: 492e-6}, {}), turns_area)
+    (ripple,) = read_ripple([folder], Mapping(), FileValues({folder: 492e-6}, {}), turns_area)
     assert ripple.celsius == 20.0
     resting = np.abs(ripple.current - 0.2) < 0.005
     assert np.nanmean(ripple.inductance[resting]) == pytest.approx(inductance_at_rest, rel=1e-3)
 
 
 def test_both_computations_of_the_penetration_agree_at_rest(tmp_path):
-    outcome = run(field_penetration, tmp_path, highest_current=0.1, current_step=0.2)
+    outcome = experiment(field_penetration.NAME, out=tmp_path, highest_current=0.1, current_step=0.2)
     check(outcome)
     assert outcome.figures['currents_a'] == [0.0]
     assert outcome.figures['equivalent_depth_m'][0] == pytest.approx(16.15e-6, abs=0.02e-6)

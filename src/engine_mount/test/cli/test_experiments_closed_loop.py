@@ -3,16 +3,15 @@
 import json
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from engine_mount.experiments import bench, motorway_gap, page, sensitivity, sweep
-from engine_mount.experiments.harness.contract import Experiment, ExperimentError, Holds, Order, Outcome
-from engine_mount.experiments.harness.many_runs import Job, run_all, run_job
-from engine_mount.experiments.harness.measures import sweep_parameters
-from engine_mount.experiments.registry import NAMES, experiment_named
+from engine_mount.experiments import bench, motorway_gap, sensitivity, sweep
+from engine_mount.experiments.harness.closed_loop import Case, run_case, run_cases
+from engine_mount.experiments.harness.experiment import Holds
+from engine_mount.experiments.harness.measures import peak_and_rms, sweep_parameters
+from engine_mount.experiments.registry import NAMES, experiment, experiment_named
 from engine_mount.experiments.sweep import defined_peak
 from engine_mount.recordings.recording import open_recording
 from mount_models.damper import damper_curve
@@ -23,35 +22,29 @@ pytestmark = pytest.mark.slow
 PNG = b'\x89PNG'
 
 
-def quiet(share, what):
-    pass
-
-
-def run(module, folder, nodes=None, **settings) -> Outcome:
-    return module.EXPERIMENT.run(Order(folder, {module.NAME: settings, **(nodes or {})}), quiet)
-
-
 def check(outcome):
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.pictures
     assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
     assert all('sim/truth' in open_recording(place) for place in outcome.recordings)
-    assert outcome.statements
+    assert outcome.claims
 
 
 @pytest.fixture(scope='module')
 def rack(tmp_path_factory):
-    return run(bench, tmp_path_factory.mktemp('rack'))
+    return experiment(bench.NAME, out=tmp_path_factory.mktemp('rack'))
 
 
 @pytest.fixture(scope='module')
 def swept(tmp_path_factory):
-    return run(sweep, tmp_path_factory.mktemp('sweep'), last_frequency=14.5, idle_amplitude=0.0)
+    return experiment(
+        sweep.NAME, out=tmp_path_factory.mktemp('sweep'), last_frequency=14.5, idle_amplitude=0.0
+    )
 
 
 @pytest.fixture(scope='module')
 def gaps(tmp_path_factory):
-    return run(motorway_gap, tmp_path_factory.mktemp('gap'), duration=2.5, gap_time=0.5)
+    return experiment(motorway_gap.NAME, out=tmp_path_factory.mktemp('gap'), duration=2.5, gap_time=0.5)
 
 
 # Rack.
@@ -93,17 +86,6 @@ def test_each_characteristic_gives_its_first_harmonic_and_loss(rack, damper, fir
     assert found['loss_stiffness_n_per_m'] == pytest.approx(loss_stiffness, rel=0.03)
 
 
-@pytest.mark.parametrize('damper', bench.FAMILY)
-def test_friction_has_the_harmonics_that_the_dead_zone_asks_for(rack, damper):
-    # of c_d max(|v| - dead zone, 0): the same numbers from a fine grid, without any simulation
-    velocity = 2 * np.pi * 8e-3 * np.cos(2 * np.pi * np.arange(20000) / 20000)
-    force = np.sign(velocity) * float(damper[8:]) * np.maximum(np.abs(velocity) - 0.004, 0.0)
-    exact = np.abs(np.fft.rfft(force))[[3, 5, 7]] / 10000
-    found = np.array(rack.figures['runs'][damper]['friction_harmonics_n'])[[2, 4, 6]]
-    # the light pressure of 2 N fills the dead zone a little, the fitted force law bends the rest
-    assert found == pytest.approx(exact, rel=0.1)
-
-
 def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack(rack):
     page = Path(__file__).parents[4] / 'docs' / 'explanation' / 'differences.md'
     rows = re.findall(r'^\| (\d000) \| ([357]) \| ([\d.]+) \| ([\d.]+) \|', page.read_text(), re.MULTILINE)
@@ -115,16 +97,15 @@ def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack
         assert float(told_law) == pytest.approx(exact, abs=0.001)
         here = rack.figures['runs'][f'viscous_{damping}']['friction_harmonics_n'][int(order) - 1]
         assert float(told_here) == pytest.approx(here, abs=0.01)
+        # the light pressure of 2 N fills the dead zone a little, the fitted force law bends the rest
+        assert here == pytest.approx(exact, rel=0.1)
 
 
 def test_odd_harmonics_lie_below_those_of_the_hydromount_up_to_3000(rack):
     for damper in ('viscous_1000', 'viscous_2000', 'viscous_3000'):
         assert {1, 3, 5, 7} <= set(rack.figures['runs'][damper]['lower_than_hydromount'])
-    assert 7 not in rack.figures['runs']['viscous_4000']['lower_than_hydromount']
-
-
-def test_distortion_is_at_most_half_that_of_the_hydromount(rack):
     runs = rack.figures['runs']
+    assert 7 not in runs['viscous_4000']['lower_than_hydromount']
     assert runs['viscous_2000']['thd'] <= 0.5 * runs[bench.HYDRO]['thd']
 
 
@@ -135,22 +116,10 @@ def test_plain_coulomb_has_the_harmonics_of_a_rectangle_and_no_even_ones(rack):
     assert found == pytest.approx(expected, rel=0.01, abs=0.1)
 
 
-def test_an_unknown_damper_is_refused_before_anything_is_made(tmp_path):
-    for module in (bench, sweep, motorway_gap, sensitivity):
-        with pytest.raises(ParameterError, match='no damper curve'):
-            run(module, tmp_path / 'out', damper='stiff')
-    assert not (tmp_path / 'out').exists()
-
-
-def test_what_the_experiment_sets_itself_cannot_be_set_on_a_node(tmp_path):
-    with pytest.raises(ExperimentError, match=r'mount_sim\.mount is set by the experiment bench itself'):
-        run(bench, tmp_path, {'mount_sim': {'mount': 'hydro'}})
-
-
 def test_other_parameters_of_nodes_reach_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, 'FAMILY', ('viscous_2000',))  # one characteristic tells it
     loose = {'mount_sim': {'friction.scale': 0.5}}
-    outcome = run(bench, tmp_path, loose, settling=0.5, periods=4)
+    outcome = experiment(bench.NAME, out=tmp_path, **loose, settling=0.5, periods=4)
     assert outcome.figures['runs']['viscous_2000']['loss_stiffness_n_per_m'] < 70e3
 
 
@@ -166,11 +135,11 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
         'electronics.ripple_noise': 0.0,
     }
     paper = {'policy': 'switched_viscous'}
-    job = Job(('rack',), {'mount_sim': quiet_bench, 'mount_control': paper})
+    case = Case({'mount_sim': quiet_bench, 'mount_control': paper}, sensitivity.rack_harmonics)
     found = []
     for step in (5e-5, 2.5e-5):
         monkeypatch.setattr('mount_sim.excitation.building.STEP_TIME', step)
-        found.append(np.array(run_job(job)[1]['harmonics_n'])[[0, 2, 4, 6]])
+        found.append(np.array(run_case(case)['harmonics_n'])[[0, 2, 4, 6]])
     assert not np.array_equal(*found)
     assert found[1] == pytest.approx(found[0], rel=0.005)
 
@@ -217,12 +186,9 @@ def test_damping_comes_and_goes_at_its_frequencies(swept):
 def test_only_the_hydromount_shows_a_resonance_peak(swept):
     assert swept.figures['runs'][sweep.FRICTION]['defined_peak'] is None
     assert swept.figures['runs'][sweep.HYDRO]['defined_peak'][0] == 9.5
-    assert [statement.holds for statement in swept.statements[:2]] == [Holds.YES, Holds.YES]
-
-
-def test_bands_that_the_sweep_does_not_reach_are_unknown(swept):
+    # the sweep ends before the bands of isolation
     assert swept.figures['runs'][sweep.FRICTION]['isolation_rms'] == [None, None, None]
-    assert swept.statements[-1].holds is Holds.NOT_COMPARABLE
+    assert [each.holds for each in swept.claims] == [Holds.YES] * 3 + [Holds.NOT_COMPARABLE]
 
 
 def test_a_resonance_peak_is_a_local_maximum_well_above_the_switch_on_level():
@@ -250,13 +216,13 @@ def test_damping_leaves_less_of_the_ringing_than_none(gaps):
 
 def test_a_gap_that_does_not_reach_the_level_is_told_as_such(tmp_path):
     order = {'mount_sim': {'motorway.roughness': 0.0}}
-    outcome = run(
-        motorway_gap, tmp_path, order, gap_depth=0.001, compared_depths='0.001,',
+    outcome = experiment(
+        motorway_gap.NAME, out=tmp_path, **order, gap_depth=0.001, compared_depths='0.001,',
         duration=2.5, gap_time=0.5,
     )  # fmt: skip
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['gaps']['1 mm']['on_delay_s'] is None
-    assert '1 mm: never' in outcome.statements[0].found
+    assert '1 mm: never' in outcome.claims[0].found
 
 
 # Sensitivity.
@@ -272,17 +238,17 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
         'last_frequency': 14.5,
         'workers': 2,
     }
-    order = Order(tmp_path, {sensitivity.NAME: settings})
-    outcome = sensitivity.EXPERIMENT.run(order, lambda share, what: told.append(what))
+    order = sensitivity.EXPERIMENT.order(tmp_path, {sensitivity.NAME: settings})
+    outcome = sensitivity.EXPERIMENT.run(order.shown_on(lambda share, what: told.append(what)))
     check(outcome)
-    assert '11 of 11 runs' in told
+    assert 'sensitivity: 11 of 11 runs' in told
     ratios = np.array(outcome.figures['peak_ratio'])[:, 0, 0, 0]
     assert ratios[1] == pytest.approx(0.72, rel=0.03)
     assert ratios[0] > 1.3
     text = outcome.pages[0].read_text()
     assert '| displacement, V0 = 0.06 m/s, R_d = 1e+08, F_i = 0 N | 1.78 | 1.78 | yes |' in text
     assert 'at V0 = 0.12 m/s it wins whatever the rest; at V0 = 0.06 m/s it loses whatever the rest' in text
-    assert [statement.holds for statement in outcome.statements] == [
+    assert [statement.holds for statement in outcome.claims] == [
         Holds.PARTLY,
         Holds.NOT_COMPARABLE,
         Holds.PARTLY,
@@ -294,27 +260,19 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
 @pytest.mark.parametrize('text', ['', 'fast', '0.1, 0.1', '0.1, 3'])
 def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
     with pytest.raises(ParameterError, match=r'sensitivity\.road_levels'):
-        run(sensitivity, tmp_path, road_levels=text)
+        experiment(sensitivity.NAME, out=tmp_path, road_levels=text)
 
 
 def test_what_fails_in_a_process_ends_the_grid_with_its_reason():
-    job = Job(('wrong',), {'mount_sim': {'scenario': 'nowhere'}})
+    order = sensitivity.EXPERIMENT.order(Path(), {sensitivity.NAME: {'workers': 1}})
     with pytest.raises(ValueError, match='nowhere'):
-        run_all([job], 1, lambda done: None, run_job)
+        run_cases(order, {'wrong': Case({'mount_sim': {'scenario': 'nowhere'}}, peak_and_rms)})
 
 
 def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):
     sim = {**sweep_parameters(0.12, 14.5), 'mount': 'hydro'}
-    _, found = run_job(Job(('hydro',), {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}))
-    assert found['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
-
-
-@pytest.mark.parametrize(
-    ('share', 'holds'),
-    [(1.0, Holds.YES), (0.5, Holds.PARTLY), (0.0, Holds.NO), (float('nan'), Holds.NOT_COMPARABLE)],
-)
-def test_a_claim_holds_where_it_came_out_in_all_combinations(share, holds):
-    assert sensitivity.verdict(share) is holds
+    case = Case({'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}, peak_and_rms)
+    assert run_case(case)['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
 
 
 # Contract.
@@ -323,13 +281,3 @@ def test_a_claim_holds_where_it_came_out_in_all_combinations(share, holds):
 def test_closed_loop_experiments_take_the_nodes_parameters_and_the_graph():
     closed = {name for name in NAMES if experiment_named(name).closed_loop}
     assert closed == {'bench', 'sweep', 'motorway_gap', 'measured_road', 'recorded_drive'}
-
-
-def test_an_experiments_own_page_goes_beside_the_page(tmp_path):
-    own = tmp_path / 'made' / 'own.md'
-    own.parent.mkdir()
-    own.write_text('own')
-    known = Experiment('name', 'title', 'Fig. 1', 'summary', SimpleNamespace(), lambda order, tell: None)
-    page.write_page([(known, Outcome({}, pages=[own]))], tmp_path / 'docs' / 'page.md')
-    assert (tmp_path / 'docs' / 'own.md').read_text() == 'own'
-    assert '[own.md](own.md)' in (tmp_path / 'docs' / 'page.md').read_text()

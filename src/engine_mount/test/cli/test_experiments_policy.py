@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from engine_mount.experiments import policy, policy_figures, policy_runs
+from engine_mount.experiments import policy, policy_cases
 from engine_mount.experiments.harness import measures
-from engine_mount.experiments.harness.contract import Order
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
+from engine_mount.experiments.registry import experiment
 from engine_mount.signals.roads.inversion import road_of
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.road import RandomRoad, random_road
@@ -29,7 +29,7 @@ SHORT = {
 @pytest.fixture(scope='module')
 def compared(tmp_path_factory):
     folder = tmp_path_factory.mktemp('policy')
-    return policy.EXPERIMENT.run(Order(folder, {policy.NAME: SHORT}), lambda share, what: None)
+    return experiment(policy.NAME, out=folder, **SHORT)
 
 
 @pytest.mark.slow
@@ -72,8 +72,8 @@ def test_road_behind_an_acceleration_gives_that_acceleration_again():
 
 
 def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():
-    assert policy_figures.sweep_limit(0.06, 3000.0) < policy_figures.sweep_limit(0.06, 1000.0)
-    peaks = [policy_figures.gap_limit(0.02, 2000.0, delay).peak_m for delay in (0.0, 0.065, 0.15)]
+    assert policy.sweep_limit(0.06, 3000.0) < policy.sweep_limit(0.06, 1000.0)
+    peaks = [policy.gap_limit(0.02, 2000.0, delay)[0] for delay in (0.0, 0.065, 0.15)]
     assert peaks[0] < peaks[1] < peaks[2]
 
 
@@ -87,4 +87,4 @@ def test_first_extremum_is_the_first_clear_turning_point():
 def test_frequency_in_band_is_that_of_a_sine():
     time = SAMPLE_TIME * np.arange(4000)
     motion = 1e-3 * np.sin(2.0 * np.pi * 7.0 * time) + 1e-3 * np.sin(2.0 * np.pi * 30.0 * time)
-    assert policy_runs.frequency_in_band(motion) == pytest.approx(7.0, abs=0.05)
+    assert policy_cases.frequency_in_band(motion) == pytest.approx(7.0, abs=0.05)

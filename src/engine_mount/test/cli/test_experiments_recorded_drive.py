@@ -6,21 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from engine_mount.cli.command import app
 from engine_mount.experiments import page, recorded_drive
-from engine_mount.experiments.harness.contract import ExperimentError, Holds, Order
+from engine_mount.experiments.harness.experiment import ExperimentError, Holds
+from engine_mount.experiments.harness.measures import rms_in_bands
 from engine_mount.experiments.recorded_drive import (
     BANDS,
     ELASTOMER,
     FRICTION,
     HYDRO,
-    near,
-    rms_in_bands,
     rms_in_bands_within,
 )
-from engine_mount.experiments.registry import experiments_named
+from engine_mount.experiments.registry import experiment
 from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from engine_mount.signals.sources.source import SourceError
 from mount_models.sampling import SAMPLE_TIME
@@ -35,11 +32,6 @@ needs_i280 = pytest.mark.skipif(
 )
 
 
-def run(folder, file, **settings):
-    order = Order(folder, {recorded_drive.NAME: {'file': str(file), **settings}})
-    return recorded_drive.EXPERIMENT.run(order, lambda share, what: None)
-
-
 @pytest.fixture(scope='module')
 def driven(tmp_path_factory):
     # 20 Hz all the time; from 6 to 7 s the engine's eigenfrequency
@@ -50,7 +42,9 @@ def driven(tmp_path_factory):
     np.savetxt(
         folder / 'drive.csv', np.column_stack([times, down]), delimiter=',', header='t,az', comments=''
     )
-    return run(folder / 'out', folder / 'drive.csv', column='az', scale=-2.0)
+    return experiment(
+        recorded_drive.NAME, out=folder / 'out', file=str(folder / 'drive.csv'), column='az', scale=-2.0
+    )
 
 
 def test_it_writes_recordings_pictures_plain_figures_and_a_page_without_places(driven):
@@ -90,19 +84,20 @@ def test_a_drive_without_damping_says_so(tmp_path):
     times = np.arange(0.0, 13.0, 0.005)
     np.savetxt(tmp_path / 'calm.csv', np.column_stack([times, 0.1 * np.sin(90 * times)]), delimiter=',',
                header='t,az', comments='')  # fmt: skip
-    outcome = run(tmp_path / 'out', tmp_path / 'calm.csv', column='az')
+    outcome = experiment(
+        recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'calm.csv'), column='az'
+    )
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['times_on'] == 0
     assert 'Damping was never on' in outcome.pages[0].read_text()
-    assert outcome.statements[1].holds is Holds.NOT_COMPARABLE
+    assert outcome.claims[1].holds is Holds.NOT_COMPARABLE
 
 
-@pytest.mark.parametrize(('frequency', 'band'), [(3.0, 0), (8.0, 1), (20.0, 2)])
-def test_a_sine_has_its_rms_in_its_own_band(frequency, band):
-    values = 5.0 + 2.0 * np.sin(2 * np.pi * frequency * np.arange(20000) * SAMPLE_TIME)
-    expected = np.zeros(3)
-    expected[band] = np.sqrt(2.0)
-    assert rms_in_bands(values, BANDS) == pytest.approx(expected, rel=0.01, abs=0.02)
+def test_a_sine_has_its_rms_in_its_own_band():
+    time = np.arange(20000) * SAMPLE_TIME
+    for frequency, expected in zip((3.0, 8.0, 20.0), np.sqrt(2.0) * np.eye(3), strict=True):
+        values = 5.0 + 2.0 * np.sin(2 * np.pi * frequency * time)
+        assert rms_in_bands(values, BANDS) == pytest.approx(expected, rel=0.01, abs=0.02)
 
 
 def test_a_part_of_the_time_has_the_rms_of_that_part():
@@ -114,36 +109,23 @@ def test_a_part_of_the_time_has_the_rms_of_that_part():
     assert rms_in_bands_within(values, np.zeros(len(values), bool)) is None
 
 
-def test_near_takes_the_margin_on_both_sides():
-    active = np.zeros(1000, bool)
-    active[400:500] = True
-    assert np.flatnonzero(near(active, 0.125))[[0, -1]].tolist() == [275, 624]
-
-
 def test_without_a_file_it_says_what_to_give(tmp_path):
-    refused = CliRunner().invoke(app, ['experiment', 'recorded_drive', '--out', str(tmp_path / 'out')])
-    assert refused.exit_code != 0
     with pytest.raises(
         ExperimentError, match=r'needs a recorded vertical acceleration .* --set recorded_drive\.file='
     ):
-        run(tmp_path / 'other', '')
+        experiment(recorded_drive.NAME, out=tmp_path / 'other', file='')
 
 
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SourceError, match='no such file'):
-        run(tmp_path / 'out', tmp_path / 'none.csv')
+        experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'))
     with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
-        run(tmp_path / 'out', tmp_path / 'none.csv', duration=5.0)
+        experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'), duration=5.0)
     assert not (tmp_path / 'out').exists()
 
 
-def test_all_are_those_that_need_nothing_and_those_asked_for_by_name():
-    assert recorded_drive.NAME not in [each.name for each in experiments_named(['all'])]
-    assert recorded_drive.NAME in [each.name for each in experiments_named(['all', recorded_drive.NAME])]
-
-
 def test_alone_its_own_page_is_the_page(driven, tmp_path):
-    page.write_page([(recorded_drive.EXPERIMENT, driven)], tmp_path / 'page.md')
+    page.write_page([driven], tmp_path / 'page.md')
     assert (tmp_path / 'page.md').read_text() == driven.pages[0].read_text()
     assert (tmp_path / 'figures' / driven.pictures[0].name).exists()
 
@@ -159,5 +141,7 @@ def test_the_committed_page_tells_of_this_recording():
 
 @needs_i280
 def test_the_first_seconds_of_the_i280_switch_damping_on_as_the_whole_drive_does(tmp_path):
-    outcome = run(tmp_path, I280, column='accelerometer.2', scale=-1.0, duration=12.5)
+    outcome = experiment(
+        recorded_drive.NAME, out=tmp_path, file=str(I280), column='accelerometer.2', scale=-1.0, duration=12.5
+    )
     assert outcome.figures['switched_on_s'] == pytest.approx([5.927, 6.661, 10.045], abs=0.002)

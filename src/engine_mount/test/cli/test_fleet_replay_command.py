@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 from engine_mount.cli.command import app
 from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if import one
 from engine_mount.signals.sources.source import SourceError
 
 REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
@@ -62,7 +61,7 @@ def test_a_store_that_is_away_is_told_and_ends_with_1(fleet, tmp_path, monkeypat
     def away(uri):
         raise SourceError(f'{uri}: no answer')
 
-    monkeypatch.setattr(one, 'local_copy', away)
+    monkeypatch.setattr(job, 'local_copy', away)
     done = command(fleet, *CHANGE, '--out', tmp_path / 'result')
     assert done.exit_code == 1
     assert 'the same command tries it again' in ' '.join(done.output.split())

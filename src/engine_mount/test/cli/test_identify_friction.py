@@ -10,11 +10,12 @@ import pytest
 from engine_mount.cli.command import main
 from engine_mount.cli.commands.identify_arguments import with_repeated_options
 from engine_mount.experiments.harness.rack_recording import record_friction_rack
-from engine_mount.identification.friction import ladder
-from engine_mount.identification.friction.channels import friction_mapping as said
+from engine_mount.identification.friction import identification, ladder
+from engine_mount.identification.friction.files import friction_mapping as said
 from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.friction.looks.force_zero import zeroed
-from engine_mount.identification.rack.given import described
+from engine_mount.identification.friction.laws import simple_laws
+from engine_mount.identification.friction.look import subtract_zero
+from engine_mount.identification.specimen import described_files
 from engine_mount.recordings.place import recording_hash
 from engine_mount.settings.chosen import chosen_control
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
@@ -130,23 +131,19 @@ def test_bad_files_are_refused_and_nothing_is_written(make, words, tmp_path, cap
 
 
 def test_one_file_trains_on_its_first_half_and_is_tried_on_its_second(rack, tmp_path, monkeypatch):
-    from engine_mount.identification.friction import identify as identify_friction
-    from engine_mount.identification.friction.ladder import fit_ladder
-    from engine_mount.identification.friction.laws.coulomb import Coulomb
-
     whole = read_recording(rack / '80.csv')
     middle = whole.force.size // 2
 
-    def quick(training, held_out, **others):
+    def quick(laws, training, held_out, *others):
         assert [each.name for each in training] == ['80.csv, first half']
         assert [each.name for each in held_out] == ['80.csv, second half']
         for (half,), part in ((training, slice(None, middle)), (held_out, slice(middle, None))):
             np.testing.assert_array_equal(half.displacement, whole.displacement[part])
             np.testing.assert_array_equal(half.force, whole.force[part])
             np.testing.assert_array_equal(half.normal_force, whole.normal_force[part])
-        return fit_ladder(training, held_out, laws=[Coulomb()])
+        return ladder.fit_ladder(laws[:1], training, held_out)
 
-    monkeypatch.setattr(identify_friction, 'fit_ladder', quick)
+    monkeypatch.setattr(identification, 'fit_ladder', quick)
     _run('identify', 'friction', '--file', str(rack / '80.csv'), '--json', str(tmp_path / 'f.json'))
     result = json.loads((tmp_path / 'f.json').read_text())
     assert 'second half is held out' in result['notes'][-1]
@@ -228,7 +225,7 @@ def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
         (run / name).write_bytes(content)
     expected = hashlib.sha256(b'firstsecond').hexdigest()
     assert recording_hash(run) == recording_hash(tmp_path / 'run') == expected
-    assert described([run / 'b_1.mcap', run]) == [
+    assert described_files([run / 'b_1.mcap', run]) == [
         {'file': 'b_1.mcap', 'sha256': hashlib.sha256(b'second').hexdigest()},
         {'file': 'recording', 'sha256': expected},
     ]
@@ -261,8 +258,8 @@ def rig_file(folder):
 
 
 def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path):
-    read, look = zeroed(read_recording(rig_file(tmp_path)), 'rest')
-    by_law, _ = zeroed(read_recording(rig_file(tmp_path)))
+    read, look = subtract_zero(read_recording(rig_file(tmp_path)), 'rest')
+    by_law, _ = subtract_zero(read_recording(rig_file(tmp_path)))
     assert by_law.force[:400] == pytest.approx(0.0, abs=40.0)  # of +- 8896 N
     assert 'from the loop; the rest before the motion agrees' in by_law.notes[-1]
     assert abs(look.zero) < 40.0
@@ -275,12 +272,9 @@ def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path)
 
 @pytest.mark.skipif(not RIG.is_dir(), reason='the measured friction damper is not committed (../shared/data)')
 def test_the_measured_damper_is_predicted_at_another_clamp():
-    from engine_mount.identification.friction.ladder import fit_ladder
-    from engine_mount.identification.friction.laws.elastic_play import ElasticPlay
-
-    first, second = (zeroed(read_recording(RIG / name))[0] for name in (
+    first, second = (subtract_zero(read_recording(RIG / name))[0] for name in (
         'ds1_1Hz80lbtension.json', 'ds2_0.5Hz36lbtension0.5amplitude.json'))  # fmt: skip
-    (rung,) = fit_ladder([first], [second], laws=[ElasticPlay()])
+    (rung,) = ladder.fit_ladder(simple_laws([first])[-1:], [first], [second])
     assert rung.held_out_error < 0.20
 
 

@@ -1,8 +1,6 @@
 """A drive as a call, and what it says of its recorder."""
 
 import io
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,18 +68,6 @@ def test_a_drive_in_core_needs_no_node_and_returns_figures_and_recording(tmp_pat
     assert driven.excitation_start == pytest.approx(2.8)
     assert len(engine_mount.open(driven.recording)['displacement']) == driven.samples
     assert driven.sentences()[-1] == f'recording {tmp_path / "run" / "recording"}'
-
-
-def test_drive_in_core_and_replay_load_no_middleware(tmp_path):
-    script = f"""
-import sys
-from engine_mount.drives.drive import drive
-from engine_mount.drives.replay import replay
-sim = {{'timeline.start': 2.8, 'timeline.duration': 0.1}}
-assert replay(drive(core=True, parameters={{'mount_sim': sim}}, out={str(tmp_path / 'run')!r}).recording).held
-assert 'rclpy' not in sys.modules
-"""
-    subprocess.run([sys.executable, '-c', script], check=True)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from engine_mount.faults.case import MATRIX, FaultCase, Reaction
-from engine_mount.faults.judge import Course, judged, tells
-from engine_mount.faults.observers import Heard, Observers, Seen, Told
+from engine_mount.faults.judge import Course, judge, reports_fault
+from engine_mount.faults.observers import Observers, Report, Setpoint, Truth
 from engine_mount.faults.page import write_page
 from mount_ros.nodes.diagnostics import Level
 from mount_sim.electronics.faults.kinds import FAULTS
@@ -21,23 +21,23 @@ def case(reaction: Reaction, **options) -> FaultCase:
     return FaultCase('name', 'meaning', reaction, words='no frames', **options)
 
 
-def observed(zero_at: float | None, until: float = 10.6, told: tuple[Told, ...] = ()) -> Observers:
+def observed(zero_at: float | None, until: float = 10.6, reports: tuple[Report, ...] = ()) -> Observers:
     """What is seen of a graph that gives 1 A but for 0 A between two times (s)."""
     seen = Observers('')
     for at in np.arange(9.0, 11.0, 1e-3):
         off = zero_at is not None and zero_at <= at < until
-        seen.heard.append(Heard(float(at), 0.0 if off else 1.0))
-        seen.seen.append(Seen(float(at), 0.0 if off else 1.0, 0.0 if off else 1.0))
-    seen.told += told
+        seen.setpoints.append(Setpoint(float(at), 0.0 if off else 1.0))
+        seen.truths.append(Truth(float(at), 0.0 if off else 1.0, 0.0 if off else 1.0))
+    seen.reports += reports
     return seen
 
 
-def told(time: float, sentence: str = SENTENCE, level: int = Level.ERROR) -> Told:
-    return Told(time, 'mount_driver', level, sentence)
+def report(time: float, sentence: str = SENTENCE, level: int = Level.ERROR) -> Report:
+    return Report(time, 'mount_driver', level, sentence)
 
 
 def test_a_safe_reaction_in_time_is_as_required():
-    outcome = judged(case(Reaction.SAFE_WHILE, silent=True), COURSE, observed(10.025, told=(told(10.1),)))
+    outcome = judge(case(Reaction.SAFE_WHILE, silent=True), COURSE, observed(10.025, reports=(report(10.1),)))
     assert outcome.ok
     assert (outcome.detected_by, outcome.sentence) == ('mount_driver', SENTENCE)
     assert outcome.zero_s == pytest.approx(0.025, abs=1e-3)
@@ -49,89 +49,91 @@ def test_a_safe_reaction_in_time_is_as_required():
 @pytest.mark.parametrize(
     ('zero_at', 'until', 'sentences', 'wrong'),
     [
-        (None, 0.0, (told(10.1),), '1.00 A at the end of the fault'),
-        (10.02, 10.3, (told(10.1),), 'does not stay at 0 A'),
+        (None, 0.0, (report(10.1),), '1.00 A at the end of the fault'),
+        (10.02, 10.3, (report(10.1),), 'does not stay at 0 A'),
         (10.02, 10.6, (), 'nothing tells of it'),
-        (10.02, 10.6, (told(10.1, 'no frames; look at the bus'),), 'no value'),
-        (10.02, 10.6, (told(10.1, 'no frames for 100 ms'),), 'no remedy'),
-        (10.09, 10.6, (told(10.2),), 'the limit is 50 ms'),
-        (10.04, 10.6, (told(10.01),), 'after detection; the limit is 20 ms'),
+        (10.02, 10.6, (report(10.1, 'no frames; look at the bus'),), 'no value'),
+        (10.02, 10.6, (report(10.1, 'no frames for 100 ms'),), 'no remedy'),
+        (10.09, 10.6, (report(10.2),), 'the limit is 50 ms'),
+        (10.04, 10.6, (report(10.01),), 'after detection; the limit is 20 ms'),
     ],
 )
 def test_what_is_not_as_required_is_said(zero_at, until, sentences, wrong):
-    outcome = judged(case(Reaction.SAFE_WHILE, silent=True), COURSE, observed(zero_at, until, sentences))
+    outcome = judge(case(Reaction.SAFE_WHILE, silent=True), COURSE, observed(zero_at, until, sentences))
     assert not outcome.ok
     assert wrong in outcome.wrong
 
 
 def test_a_coil_that_carries_current_though_none_is_wanted_is_said_where_the_graph_can_take_it_away():
-    seen = observed(10.02, told=(told(10.1),))
-    seen.seen = [each._replace(coil_current=0.2) for each in seen.seen]
-    wrong = judged(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
+    seen = observed(10.02, reports=(report(10.1),))
+    seen.truths = [each._replace(coil_current=0.2) for each in seen.truths]
+    wrong = judge(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
     assert 'the coil carries 0.2 A at the end of the fault; the limit is 0.05 A' in wrong
-    assert judged(case(Reaction.SAFE_WHILE, coil_apart=True), COURSE, seen).ok
-    seen.seen.clear()
-    assert 'nobody has seen' in judged(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
+    assert judge(case(Reaction.SAFE_WHILE, coil_apart=True), COURSE, seen).ok
+    seen.truths.clear()
+    assert 'nobody has seen' in judge(case(Reaction.SAFE_WHILE), COURSE, seen).wrong
 
 
 def test_the_current_of_the_coil_is_the_last_that_was_seen_of_it_however_late_the_others_came():
-    seen = observed(10.02, told=(told(10.1),))
-    last = [each for each in seen.seen if each.time < 10.6]
+    seen = observed(10.02, reports=(report(10.1),))
+    last = [each for each in seen.truths if each.time < 10.6]
     held_up = [each._replace(time=10.59, coil_current=1.0) for each in last[-100:-1]]  # all came at once
-    seen.seen = [*last[:-100], *held_up, last[-1]]
-    assert judged(case(Reaction.SAFE_WHILE), COURSE, seen).coil_current_a == 0.0
+    seen.truths = [*last[:-100], *held_up, last[-1]]
+    assert judge(case(Reaction.SAFE_WHILE), COURSE, seen).coil_current_a == 0.0
 
 
 def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
-    assert judged(case(Reaction.TOLERATED), COURSE, observed(None)).ok
-    assert 'damping should go on' in judged(case(Reaction.TOLERATED), COURSE, observed(10.1)).wrong
-    wrong = judged(case(Reaction.TOLERATED), COURSE, observed(None, told=(told(10.1),))).wrong
+    assert judge(case(Reaction.TOLERATED), COURSE, observed(None)).ok
+    assert 'damping should go on' in judge(case(Reaction.TOLERATED), COURSE, observed(10.1)).wrong
+    wrong = judge(case(Reaction.TOLERATED), COURSE, observed(None, reports=(report(10.1),))).wrong
     assert 'mount_driver tells an error' in wrong
 
 
 def test_a_drive_that_has_ended_has_not_recovered_and_may_only_where_that_is_required():
     course = Course(begun=10.0, over=11.0, ended=True)
-    seen = observed(10.02, 11.0, (told(10.1),))
-    assert judged(case(Reaction.SAFE_UNTIL_INITIALISED), course, seen).ok
-    assert 'does not damp again' in judged(case(Reaction.SAFE_WHILE), course, seen).wrong
+    seen = observed(10.02, 11.0, (report(10.1),))
+    assert judge(case(Reaction.SAFE_UNTIL_INITIALISED), course, seen).ok
+    assert 'does not damp again' in judge(case(Reaction.SAFE_WHILE), course, seen).wrong
 
 
 def test_damping_without_a_new_initialisation_where_one_is_required_is_said():
-    seen = observed(10.02, told=(told(10.1),))
+    seen = observed(10.02, reports=(report(10.1),))
     fault = case(Reaction.SAFE_UNTIL_INITIALISED)
-    assert 'without a new initialisation' in judged(fault, COURSE, seen).wrong
-    seen.initialised.append(10.9)
-    assert judged(fault, COURSE, seen).ok
+    assert 'without a new initialisation' in judge(fault, COURSE, seen).wrong
+    seen.initialisations.append(10.9)
+    assert judge(fault, COURSE, seen).ok
 
 
 def test_more_than_3_ampere_is_never_as_required():
     seen = observed(None)
-    seen.heard.insert(1100, Heard(seen.heard[1100].time, 3.01))
-    assert '3.01 A on the bus' in judged(case(Reaction.TOLD), COURSE, seen).wrong
+    seen.setpoints.insert(1100, Setpoint(seen.setpoints[1100].time, 3.01))
+    assert '3.01 A on the bus' in judge(case(Reaction.TOLD), COURSE, seen).wrong
 
 
 def test_what_the_electronics_follow_counts_where_frames_do_not_reach_them():
-    seen = observed(10.02, told=(told(10.1),))
-    seen.heard = [Heard(each.time, 1.0) for each in seen.heard]
-    assert judged(case(Reaction.SAFE_WHILE, in_electronics=True), COURSE, seen).ok
-    assert not judged(case(Reaction.SAFE_WHILE), COURSE, seen).ok
+    seen = observed(10.02, reports=(report(10.1),))
+    seen.setpoints = [Setpoint(each.time, 1.0) for each in seen.setpoints]
+    assert judge(case(Reaction.SAFE_WHILE, in_electronics=True), COURSE, seen).ok
+    assert not judge(case(Reaction.SAFE_WHILE), COURSE, seen).ok
 
 
 def test_a_trial_waits_for_the_end_of_what_would_pass_for_telling_of_its_fault():
     now, well = time.monotonic(), 'link to the electronics is up'
-    picks = partial(tells, case(Reaction.SAFE_WHILE))
-    seen = observed(None, told=(told(now - 1.5), told(now - 0.5, well, Level.OK)))
-    assert seen.quiet(picks)
-    seen.told.append(Told(now - 0.2, 'mount_control', Level.WARN, SENTENCE))
-    assert not seen.quiet(picks)
-    seen.told.append(Told(now - 0.1, 'mount_control', Level.WARN, 'something else (1, limit 0); look'))
-    assert seen.quiet(picks)
+    picks = partial(reports_fault, case(Reaction.SAFE_WHILE))
+    seen = observed(None, reports=(report(now - 1.5), report(now - 0.5, well, Level.OK)))
+    assert seen.is_quiet(picks)
+    seen.reports.append(Report(now - 0.2, 'mount_control', Level.WARN, SENTENCE))
+    assert not seen.is_quiet(picks)
+    seen.reports.append(Report(now - 0.1, 'mount_control', Level.WARN, 'something else (1, limit 0); look'))
+    assert seen.is_quiet(picks)
 
 
 def test_a_graph_whose_driver_complains_or_is_silent_is_not_quiet():
     now = time.monotonic()
-    assert not observed(None, told=(told(now - 60.0, 'well', Level.OK),)).quiet(lambda each: False)
-    assert not observed(None, told=(told(now - 0.5, 'anything', Level.WARN),)).quiet(lambda each: False)
+    assert not observed(None, reports=(report(now - 60.0, 'well', Level.OK),)).is_quiet(lambda each: False)
+    assert not observed(None, reports=(report(now - 0.5, 'anything', Level.WARN),)).is_quiet(
+        lambda each: False
+    )
 
 
 def test_every_fault_of_the_simulated_electronics_is_in_the_matrix():
@@ -147,8 +149,8 @@ def test_the_representative_third_is_about_a_third_and_has_every_reaction():
 
 def test_the_page_has_a_row_for_each_fault_and_says_what_is_wrong(tmp_path):
     sentence = 'no frames: 1 | 2; look (log: /home/me/runs/faults_12_3/log/mount_init.log)'
-    good = judged(case(Reaction.TOLD), COURSE, observed(None, told=(told(10.1, sentence),)))
-    wrong = judged(case(Reaction.SAFE_WHILE), COURSE, observed(None))
+    good = judge(case(Reaction.TOLD), COURSE, observed(None, reports=(report(10.1, sentence),)))
+    wrong = judge(case(Reaction.SAFE_WHILE), COURSE, observed(None))
     bad = FaultCase('other', 'meaning', Reaction.SAFE_WHILE)
     write_page({case(Reaction.TOLD): good, bad: wrong}, tmp_path / 'faults.md')
     page = (tmp_path / 'faults.md').read_text()

@@ -3,30 +3,18 @@
 import json
 import os
 import shutil
-import signal
-import subprocess
-import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.fleet.catalogue import reading
-from engine_mount.fleet.catalogue.columns import BANDS, EVENTS, RECORDINGS, band_name
-from engine_mount.fleet.catalogue.in_bands import in_bands
-from engine_mount.fleet.catalogue.index import indexed
-from engine_mount.fleet.catalogue.places import places
-from engine_mount.fleet.catalogue.reading import read_place, rows_at
-from engine_mount.fleet.columns import schema_of
+from engine_mount.fleet.catalogue import index, rows_of
+from engine_mount.fleet.places import places
+from engine_mount.fleet.tables import COLUMNS, schema_of
 from engine_mount.signals.sources.source import SourceError
 
 REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
-
-
-def table_of(places, catalogue, **options):
-    return indexed(places, catalogue, **options).recordings
 
 
 @pytest.fixture
@@ -49,8 +37,8 @@ def row_of(table, recording):
 
 
 def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_path, inside):
-    table = table_of([drives], tmp_path / 'catalogue')
-    assert table.schema.equals(schema_of(RECORDINGS))
+    table = index([drives], tmp_path / 'catalogue').recordings
+    assert table.schema.equals(schema_of(COLUMNS['recordings']))
     assert table['recording'].to_pylist() == ['a/gap', 'b/initialisation', 'b/rough', 'garbage.mcap']
     gap = row_of(table, 'a/gap')
     assert (gap['kind'], gap['whole'], gap['reason'], gap['scenario']) == ('replay', True, '', 'motorway')
@@ -72,9 +60,9 @@ def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_pat
 
 
 def test_events_have_their_recording_and_their_time(drives, tmp_path, inside):
-    made = indexed([drives], tmp_path / 'catalogue')
+    made = index([drives], tmp_path / 'catalogue')
     recordings, events = made.recordings, made.events
-    assert events.schema.equals(schema_of(EVENTS))
+    assert events.schema.equals(schema_of(COLUMNS['events']))
     assert set(events['uri'].to_pylist()) <= set(recordings['uri'].to_pylist())
     gap = [row for row in events.to_pylist() if row['recording'] == 'a/gap']
     assert [row['kind'] for row in gap] == ['switch_on', 'switch_off']
@@ -83,17 +71,17 @@ def test_events_have_their_recording_and_their_time(drives, tmp_path, inside):
 
 def test_only_what_changed_is_read_again_and_what_is_gone_leaves(drives, tmp_path, inside):
     catalogue = tmp_path / 'catalogue'
-    table_of([drives], catalogue)
+    index([drives], catalogue)
     before = (catalogue / 'recordings.parquet').read_bytes()
     inside.clear()
-    again = indexed([drives], catalogue)
+    again = index([drives], catalogue)
     assert inside == []
     assert (again.read, again.unchanged, again.vanished, again.unreadable) == (0, 4, 0, 1)
     assert (catalogue / 'recordings.parquet').read_bytes() == before
     shutil.rmtree(drives / 'a' / 'gap')
     shutil.rmtree(drives / 'b' / 'rough')
     shutil.copytree(REFERENCES / 'opening', drives / 'b' / 'rough')
-    changed = indexed([drives], catalogue)
+    changed = index([drives], catalogue)
     assert inside == [str(drives / 'b' / 'rough')]
     assert (changed.read, changed.unchanged, changed.vanished) == (1, 2, 1)
     assert row_of(changed.recordings, 'b/rough')['whole'] is True
@@ -101,83 +89,21 @@ def test_only_what_changed_is_read_again_and_what_is_gone_leaves(drives, tmp_pat
 
 
 def test_a_second_place_is_added_to_what_the_catalogue_holds(drives, tmp_path, inside):
-    table_of([drives / 'a'], tmp_path / 'catalogue')
-    both = indexed([drives / 'b'], tmp_path / 'catalogue')
+    index([drives / 'a'], tmp_path / 'catalogue')
+    both = index([drives / 'b'], tmp_path / 'catalogue')
     assert both.recordings['recording'].to_pylist() == ['gap', 'initialisation', 'rough']
     assert both.vanished == 0
 
 
-@pytest.mark.slow
-def test_rows_are_the_same_from_any_number_of_workers(drives, tmp_path):
-    for workers in (1, 2):
-        table_of([drives], tmp_path / str(workers), workers=workers)
-    for name in ('recordings.parquet', 'events.parquet'):
-        assert (tmp_path / '1' / name).read_bytes() == (tmp_path / '2' / name).read_bytes()
-
-
-def test_an_index_that_was_stopped_goes_on_and_ends_with_the_same_tables(drives, tmp_path, inside):
-    whole = table_of([drives], tmp_path / 'whole')
-    inside.clear()
-
-    def stop(progress):
-        if progress.done == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        table_of([drives], tmp_path / 'stopped', progress=stop)
-    journal = tmp_path / 'stopped' / 'journal.jsonl'
-    with journal.open('a') as file:
-        file.write('["cut off in the mid')
-    done = list(inside)
-    inside.clear()
-    gone_on = table_of([drives], tmp_path / 'stopped')
-    assert (len(done), len(inside), set(done) & set(inside)) == (2, 2, set())
-    assert gone_on.equals(whole)
-
-
-def test_what_could_not_be_fetched_is_tried_again(drives, tmp_path, inside, monkeypatch):
-    def away(uri):
-        raise SourceError('the store does not answer')
-
-    with monkeypatch.context() as patch:
-        patch.setattr(reading, 'local_copy', away)
-        row = row_of(table_of([drives / 'a'], tmp_path / 'catalogue'), 'gap')
-    assert (row['kind'], row['fingerprint'], row['reason']) == ('unreadable', '', 'the store does not answer')
-    again = indexed([drives / 'a'], tmp_path / 'catalogue')
-    assert (again.read, again.unreadable) == (1, 0)
-
-
-@pytest.mark.slow
-def test_a_killed_index_leaves_what_can_be_gone_on_with(drives, tmp_path):
-    """SIGKILL of the command itself: the same tables in the end as of one that was not stopped."""
-    program = f"""
-import os, signal
-from engine_mount.fleet.catalogue.index import indexed
-if __name__ == '__main__':
-    indexed([{str(drives)!r}], {str(tmp_path / 'killed')!r}, workers=1,
-          progress=lambda now: now.done == 2 and os.kill(os.getpid(), signal.SIGKILL))
-"""
-    script = tmp_path / 'script.py'
-    script.write_text(program)
-    assert subprocess.run([sys.executable, str(script)]).returncode == -signal.SIGKILL
-    progress = []
-    killed = table_of([drives], tmp_path / 'killed', workers=1, progress=progress.append)
-    assert progress[0].done == 2
-    assert killed.equals(table_of([drives], tmp_path / 'whole', workers=1))
-
-
 def test_each_mount_of_a_car_has_a_row_with_the_work_of_its_pads(tmp_path):
-    from engine_mount.fleet.example.fleet import make_one, whole_fleet
+    from engine_mount.fleet.example import make_one, whole_fleet
 
     (order,) = [
-        order
-        for order in whole_fleet(tmp_path)
-        if order.variation.name == 'two_mounts' and order.drive.name == 'bench_8_hz'
+        order for order in whole_fleet(tmp_path, 1.0) if order.folder.match('bench_8_hz/*_two_mounts')
     ]
-    made = make_one(replace(order, seconds=1.0))
-    place = next(iter(places([str(made)]).values()))
-    answer = read_place(place)
-    recordings, events = answer.rows['recordings'], answer.rows['events']
+    made = make_one(order)
+    rows = rows_of(made, next(iter(places([str(made)]).values())))
+    recordings, events = rows['recordings'], rows['events']
     assert [row['mount'] for row in recordings] == ['left', 'right']
     assert {row['simulated_mount'] for row in recordings} == {'left,right'}
     assert {row['mount'] for row in events} == {'left', 'right'}
@@ -197,7 +123,7 @@ def test_a_copy_elsewhere_has_the_same_row_but_for_its_address(drives, tmp_path)
             shutil.copy(drives / recording, copy)
         else:
             shutil.copytree(drives / recording, copy)
-        assert rows_at(copy, place) == rows_at(drives / recording, place)
+        assert rows_of(copy, place) == rows_of(drives / recording, place)
 
 
 def test_pieces_of_one_recording_are_one_place_and_files_of_their_own_are_several(tmp_path):
@@ -218,6 +144,13 @@ def test_pieces_of_one_recording_are_one_place_and_files_of_their_own_are_severa
     assert places([str(tmp_path / 'run')])[str(tmp_path / 'run')].fingerprint != before
 
 
+def test_a_foreign_file_is_refused_with_the_command_that_imports_it(tmp_path):
+    (tmp_path / 'rack.csv').write_text('t,x\n0,1\n')
+    assert places([str(tmp_path)]) == {}
+    with pytest.raises(SourceError, match=r'no recording .* engine-mount import makes one'):
+        places([str(tmp_path / 'rack.csv')])
+
+
 def test_a_place_is_the_same_from_wherever_it_is_named(drives, monkeypatch):
     whole = places([str(drives)])
     assert whole[str(drives / 'a' / 'gap')].recording == 'a/gap'
@@ -225,36 +158,8 @@ def test_a_place_is_the_same_from_wherever_it_is_named(drives, monkeypatch):
     assert places(['.']) == places([f'../{drives.name}/']) == places([f'file://{drives}']) == whole
 
 
-def test_a_sine_is_in_its_own_band_alone():
-    time = np.arange(40_000) * 1e-3
-    stamps = np.arange(40_000) * 1_000_000
-    values = 1e-3 * np.sin(2 * np.pi * 8.0 * time) + 5e-3
-    values[1000:1003] = np.nan
-    found = dict(zip(BANDS, in_bands(stamps, values, 1000.0, BANDS), strict=True))
-    own = found.pop((3.0, 14.0))
-    assert own.rms == pytest.approx(1e-3 / np.sqrt(2), rel=0.01)
-    assert own.peak == pytest.approx(1e-3, rel=0.2)
-    assert all(other.rms < 2e-5 for other in found.values())
-
-
-def test_too_short_a_signal_is_in_no_band():
-    assert np.isnan(in_bands(np.arange(10) * 1_000_000, np.ones(10), 1000.0, BANDS)).all()
-
-
-def test_every_column_has_a_meaning_and_what_has_a_unit_says_it():
-    names = [column.name for column in RECORDINGS]
-    assert len(set(names)) == len(names)
-    assert {band_name('peak', band) for band in BANDS} <= set(names)
-    assert all(column.meaning for column in (*RECORDINGS, *EVENTS))
-    units = {'_m': 'm', '_s': 's', '_a': 'A', '_j': 'J', '_degc': 'degC', '_bytes': 'B', '_ns': 'ns'}
-    units |= {'_hz': 'Hz', '_s2': 'm/s^2'}
-    for column in (*RECORDINGS, *EVENTS):
-        suffix = column.name[column.name.rfind('_') :]
-        assert column.unit == units.get(suffix, ''), column.name
-
-
 def test_a_journal_of_other_columns_is_not_taken(drives, tmp_path, inside):
-    table_of([drives], tmp_path / 'catalogue')
+    index([drives], tmp_path / 'catalogue')
     journal = tmp_path / 'catalogue' / 'journal.jsonl'
     journal.write_text(journal.read_text().replace('"mode"', '"modus"', 1))
-    assert indexed([drives], tmp_path / 'catalogue').read == 4
+    assert index([drives], tmp_path / 'catalogue').read == 4

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from engine_mount.fleet.catalogue.motion import displacement_figures
-from engine_mount.fleet.catalogue.trace import trace_figures
+from engine_mount.fleet.motion import band_figures, displacement_figures, trace_figures
 
 START = 1_700_000_000_000_000_000
 PERIOD = 1_000_000
@@ -71,3 +70,16 @@ def test_the_work_of_the_pads_is_that_of_all_samples(drive):
     assert found['pad_energy_j'] == pytest.approx(1e-3 * np.nansum(power), rel=1e-12)
     assert found['damping_s'] == 1e-3 * np.count_nonzero(columns['damping_active'])
     assert found['switched_on'] == np.count_nonzero(np.diff(columns['damping_active']) > 0)
+
+
+def test_a_sine_is_in_its_own_band_alone(drive):
+    stamps, values = drive
+    values[1000:1003] = np.nan
+    found = band_figures(stamps, values, RATE)
+    assert found.pop('rms_3_14_hz_m') == pytest.approx(1e-3 / np.sqrt(2), rel=0.01)
+    assert found.pop('peak_3_14_hz_m') == pytest.approx(1e-3, rel=0.2)
+    assert all(value < 2e-5 for name, value in found.items() if name.startswith('rms'))
+
+
+def test_too_short_a_signal_is_in_no_band():
+    assert np.isnan([*band_figures(np.arange(10) * PERIOD, np.ones(10), RATE).values()]).all()

@@ -2,10 +2,10 @@
 
 import pytest
 
-from engine_mount.fleet.columns import NUMBER, TEXT, Column, table_of, write_table
 from engine_mount.fleet.questions import QueryError, query
+from engine_mount.fleet.tables import Column, table_of, write_table
 
-COLUMNS = (Column('uri', TEXT, '', 'which'), Column('peak', NUMBER, 'm', 'largest displacement'))
+COLUMNS = (Column('uri', 'string', '', 'which'), Column('peak', 'double', 'm', 'largest displacement'))
 
 
 @pytest.fixture

@@ -13,12 +13,12 @@ import pytest
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import parsed_changes
+from engine_mount.fleet import job, setpoints
+from engine_mount.fleet.closed_loop import compare_motion
 from engine_mount.fleet.job import OrderError
-from engine_mount.fleet.what_if import one, run
-from engine_mount.fleet.what_if.asked import AskedError, recordings_asked
-from engine_mount.fleet.what_if.closed_loop import both_motions, compared_motion
-from engine_mount.fleet.what_if.compared import compared_setpoints, recorded_in
-from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
+from engine_mount.fleet.places import SelectionError, select_recordings
+from engine_mount.fleet.replay import count_outcomes, replay_fleet
+from engine_mount.fleet.setpoints import compare_setpoints, recorded_in
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.place import open_run
 from engine_mount.settings.options import with_sample_rate
@@ -41,8 +41,20 @@ def fleet(tmp_path):
     return folder
 
 
-def order_of(fleet):
-    return FleetOrder([str(fleet)], CHANGES)
+def replayed(fleet, out, changes=CHANGES):
+    return replay_fleet([str(fleet)], changes, out)
+
+
+def table_in(folder):
+    return (folder / 'result.parquet').read_bytes()
+
+
+@pytest.fixture
+def whole(fleet, tmp_path, inside):
+    """The bytes of the table of a run that nothing ended."""
+    replayed(fleet, tmp_path / 'whole')
+    inside.clear()
+    return table_in(tmp_path / 'whole')
 
 
 @pytest.fixture(scope='module')
@@ -61,8 +73,18 @@ def test_what_can_be_made_again_is_written_in_long_chunks(driven, tmp_path):
         assert max(chunk.size for chunk in chunks) >= LONG_CHUNK_SIZE
 
 
+@pytest.mark.parametrize('length', [700, 1500])
+def test_figures_do_not_depend_on_how_many_samples_are_answered_at_once(driven, length, monkeypatch):
+    found = []
+    for at_once in (1_000_000, length):
+        monkeypatch.setattr(setpoints, '_AT_ONCE', at_once)
+        found.append(compare_setpoints(recorded_in(open_run(driven)), CHANGES).row)
+    assert found[0]['samples'] > 3 * length
+    assert repr(found[0]) == repr(found[1])
+
+
 def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_was_recorded():
-    row = compared_setpoints(recorded_in(open_run(REFERENCES / 'opening')), CHANGES)
+    row = compare_setpoints(recorded_in(open_run(REFERENCES / 'opening')), CHANGES).row
     assert row['as_recorded'] is True
     assert row['peak_current_a'] > row['peak_current_changed_a'] == 0.7
     assert row['setpoints_differing'] > 0
@@ -74,31 +96,28 @@ def test_a_closed_loop_tells_how_both_motions_differ_at_whatever_rate(tmp_path):
     sim = {'scenario': 'motorway', 'timeline.duration': 2.0}
     parameters = with_sample_rate({'mount_sim': sim}, 500.0)
     record_core(tmp_path / 'recording', parameters, session_text({'parameters': parameters}))
-    recorded = recorded_in(open_run(tmp_path / 'recording'))
-    row = compared_motion(recorded, CHANGES)
+    row, signals = compare_motion(recorded_in(open_run(tmp_path / 'recording')), CHANGES)
     assert row['samples'] == 500.0 * row['duration_s']
-    first, other = both_motions(recorded, CHANGES)
-    assert row['peak_displacement_m'] == np.abs(first.displacement).max()
-    assert row['peak_displacement_changed_m'] == np.abs(other.displacement).max()
-    difference = other.displacement - first.displacement
+    first, other = signals.displacements
+    assert row['peak_displacement_m'] == np.abs(first).max()
+    assert row['peak_displacement_changed_m'] == np.abs(other).max()
+    difference = other - first
     place = int(np.argmax(np.abs(difference)))
     assert row['displacement_difference_largest_m'] == difference[place] != 0.0
-    assert row['displacement_difference_largest_at_s'] == pytest.approx(first.time[place])
+    assert row['displacement_difference_largest_at_s'] == pytest.approx(signals.time[place])
     assert row['displacement_difference_rms_m'] == pytest.approx(np.sqrt(np.mean(difference**2)))
-    assert np.diff(first.time) == pytest.approx(0.002)
-    assert np.array_equal(first.acceleration, other.acceleration)
+    assert np.diff(signals.time) == pytest.approx(0.002)
 
 
 def test_without_an_effect_nothing_differs():
-    row = compared_setpoints(
-        recorded_in(open_run(REFERENCES / 'gap')), parsed_changes({'longest_bridge': 0.03})
-    )
+    changes = parsed_changes({'longest_bridge': 0.03})
+    row = compare_setpoints(recorded_in(open_run(REFERENCES / 'gap')), changes).row
     assert row['setpoints_differing'] == row['switchings_moved'] == row['switchings_appeared'] == 0
     assert math.isnan(row['setpoint_difference_first_at_s'])
 
 
 def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, inside):
-    table = replay_fleet(order_of(fleet), tmp_path / 'result').table.to_pylist()
+    table = replayed(fleet, tmp_path / 'result').table.to_pylist()
     assert [row['recording'] for row in table] == ['broken.mcap', *NAMES]
     assert [bool(row['reason']) for row in table] == [True, False, False, False]
     assert str(tmp_path) not in table[0]['reason']
@@ -106,87 +125,71 @@ def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, inside):
 
 def test_a_recording_with_another_policy_is_told_apart_from_one_that_failed(fleet, tmp_path, inside):
     changes = parsed_changes({'continuous_viscous.full_amplitude': 0.0006})
-    outcome = replay_fleet(FleetOrder([str(fleet)], changes), tmp_path / 'result')
-    rows = outcome.table.to_pylist()
+    done = replayed(fleet, tmp_path / 'result', changes)
+    rows = done.table.to_pylist()
     assert [row['outcome'] for row in rows] == ['failed', 'another policy', 'replayed', 'another policy']
     assert 'of the policy continuous_viscous would have no effect' in rows[1]['reason']
     assert [bool(row['sha256']) for row in rows] == [True, False, True, False]  # not read through
-    figures = outcome.figures()
     names = ('recordings', 'replayed', 'another_policy', 'failed')
-    assert [figures[name] for name in names] == [4, 1, 2, 1]
+    assert [done.figures[name] for name in names] == [4, 1, 2, 1]
 
 
 def test_a_recording_of_several_mounts_counts_once_as_failed_before_replayed():
     outcomes = ('another policy', 'replayed', 'failed', 'replayed', 'another policy', 'another policy')
     rows = [{'recording': name, 'outcome': each} for name, each in zip('aabbcc', outcomes, strict=True)]
-    assert run._outcomes(rows) == {'another policy': 1, 'replayed': 1, 'failed': 1}
+    assert count_outcomes(rows) == {'another policy': 1, 'replayed': 1, 'failed': 1}
 
 
 def test_another_order_into_the_same_result_is_refused(fleet, tmp_path, inside):
-    replay_fleet(order_of(fleet), tmp_path / 'result')
-    other = FleetOrder([str(fleet)], parsed_changes({'highest_current': 0.8}))
+    replayed(fleet, tmp_path / 'result')
     with pytest.raises(OrderError, match=r'another order: changes was .*0\.7.* now it is .*0\.8'):
-        replay_fleet(other, tmp_path / 'result')
+        replayed(fleet, tmp_path / 'result', parsed_changes({'highest_current': 0.8}))
 
 
-def test_the_same_order_again_reads_nothing_again(fleet, tmp_path, inside):
-    first = replay_fleet(order_of(fleet), tmp_path / 'result')
-    content = first.result.read_bytes()
+def test_the_same_order_again_from_another_folder_reads_nothing_again(fleet, tmp_path, inside, monkeypatch):
+    replayed(fleet, tmp_path / 'result')
+    content = table_in(tmp_path / 'result')
     inside.clear()
-    again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert (inside, again.before, again.figures()['failed']) == ([], 4, 1)
-    assert again.result.read_bytes() == content
+    monkeypatch.chdir(tmp_path)
+    again = replayed('./fleet/', tmp_path / 'result')
+    assert (inside, again.figures['done_before'], again.figures['failed']) == ([], 4, 1)
+    assert table_in(tmp_path / 'result') == content
 
 
-def test_what_cannot_be_fetched_is_tried_again(fleet, tmp_path, inside, monkeypatch):
-    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
-    there = one.local_copy
+def test_what_cannot_be_fetched_is_tried_again(fleet, whole, tmp_path, inside, monkeypatch):
+    there = job.local_copy
 
     def away(uri):
         if uri.endswith('opening'):
             raise SourceError('the store does not answer')
         return there(uri)
 
-    monkeypatch.setattr(one, 'local_copy', away)
-    first = replay_fleet(order_of(fleet), tmp_path / 'result')
+    with monkeypatch.context() as patch:
+        patch.setattr(job, 'local_copy', away)
+        first = replayed(fleet, tmp_path / 'result')
     assert [row['reason'] for row in first.not_fetched] == ['the store does not answer']
     assert first.table.num_rows == 4
-    monkeypatch.setattr(one, 'local_copy', there)
     inside.clear()
-    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    replayed(fleet, tmp_path / 'result')
     assert inside == [str(fleet / 'opening')]
-    assert again.result.read_bytes() == whole
+    assert table_in(tmp_path / 'result') == whole
 
 
-def test_a_recording_that_changed_is_replayed_again_and_has_its_new_rows_alone(fleet, tmp_path, inside):
-    whole = replay_fleet(order_of(fleet), tmp_path / 'result')
-    content = whole.result.read_bytes()
+@pytest.mark.parametrize('is_there', [True, False])
+def test_a_recording_that_changed_has_its_new_row_alone(fleet, tmp_path, inside, monkeypatch, is_there):
+    def out_of_order(uri):
+        raise SourceError('out of order')
+
+    content = replayed(fleet, tmp_path / 'result').table
     inside.clear()
     os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))  # of the same size
-    again = replay_fleet(order_of(fleet), tmp_path / 'result')
-    assert (inside, again.before) == ([str(fleet / 'gap')], 3)
-    assert again.result.read_bytes() == content
-
-
-def test_a_recording_that_changed_and_cannot_be_fetched_has_one_row(fleet, tmp_path, inside, monkeypatch):
-    replay_fleet(order_of(fleet), tmp_path / 'result')
-    os.utime(next((fleet / 'gap').glob('*.mcap')), (1.0, 1.0))
-    monkeypatch.setattr(one, 'local_copy', out_of_order)
-    again = replay_fleet(order_of(fleet), tmp_path / 'result').table.to_pylist()
-    assert [row['recording'] for row in again] == ['broken.mcap', *NAMES]
-    assert again[1]['reason'] == 'out of order'
-
-
-def out_of_order(uri):
-    raise SourceError('out of order')
-
-
-def test_the_same_order_from_another_folder_is_the_same(fleet, tmp_path, inside, monkeypatch):
-    replay_fleet(order_of(fleet), tmp_path / 'result')
-    inside.clear()
-    monkeypatch.chdir(tmp_path)
-    assert replay_fleet(FleetOrder(['./fleet/'], CHANGES), tmp_path / 'result').before == 4
-    assert inside == []
+    if not is_there:
+        monkeypatch.setattr(job, 'local_copy', out_of_order)
+    again = replayed(fleet, tmp_path / 'result')
+    assert (inside, again.figures['done_before']) == ([str(fleet / 'gap')], 3)
+    assert again.table['recording'].to_pylist() == ['broken.mcap', *NAMES]
+    assert again.table['reason'][1].as_py() == ('' if is_there else 'out of order')
+    assert again.table.equals(content) is is_there
 
 
 KILLED = """
@@ -194,8 +197,8 @@ import os, signal, sys
 from pathlib import Path
 from engine_mount.drives.replay import parsed_changes
 from engine_mount.fleet import job
+from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
 
 def tasks(work, items, **_):
     for place, item in enumerate(items):
@@ -204,62 +207,50 @@ def tasks(work, items, **_):
         yield Done(place, work(item))
 
 job.run_tasks = tasks
-replay_fleet(FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7})), Path(sys.argv[2]))
+replay_fleet([sys.argv[1]], parsed_changes({'highest_current': 0.7}), Path(sys.argv[2]))
 """
 
 
-def test_a_command_that_is_killed_goes_on_where_it_was_with_nothing_lost_or_twice(fleet, tmp_path, inside):
-    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
+def test_a_command_that_is_killed_goes_on_where_it_was_with_nothing_lost_or_twice(
+    fleet, whole, tmp_path, inside
+):
     killed = subprocess.run([sys.executable, '-c', KILLED, str(fleet), str(tmp_path / 'result')], check=False)
     assert killed.returncode == -signal.SIGKILL
     with (tmp_path / 'result' / 'journal.jsonl').open('a') as journal:
         journal.write('["a line that the power failure cut of')
-    inside.clear()
-    again = replay_fleet(order_of(fleet), tmp_path / 'result')
+    again = replayed(fleet, tmp_path / 'result')
     assert inside == [str(fleet / name) for name in ('opening', 'rough')]
-    assert again.before == 2
-    assert again.result.read_bytes() == whole
+    assert again.figures['done_before'] == 2
+    assert table_in(tmp_path / 'result') == whole
 
 
-WITH_DASK = """
-import os, signal, sys
+WITH_WORKERS = """
+import multiprocessing, sys
 from pathlib import Path
-from engine_mount.fleet.what_if.run import FleetOrder, replay_fleet
+from engine_mount.fleet.replay import replay_fleet
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import parsed_changes
-
-def children(process):
-    found = []
-    for place in Path('/proc').glob('[0-9]*/stat'):
-        try:
-            parts = place.read_text().rpartition(')')[2].split()
-        except OSError:
-            continue
-        if int(parts[1]) == process and b'spawn_main' in place.with_name('cmdline').read_bytes():
-            found.append(int(place.parent.name))
-    return found
 
 killed = []
 
 def report(progress):
     if progress.done and not killed:
-        killed.append(children(os.getpid())[0])
-        os.kill(killed[0], signal.SIGKILL)
+        killed.append(multiprocessing.active_children()[0])
+        killed[0].kill()
 
 if __name__ == '__main__':
-    order = FleetOrder([sys.argv[1]], parsed_changes({'highest_current': 0.7}))
-    outcome = replay_fleet(order, Path(sys.argv[2]), workers=2, progress=report)
-    assert not outcome.not_fetched
+    changes = parsed_changes({'highest_current': 0.7})
+    done = replay_fleet([sys.argv[1]], changes, Path(sys.argv[2]), progress=report, workers=2)
+    assert not done.not_fetched
     assert killed
-    assert outcome.workers <= 2  # a process that takes the place of another is no further one
+    assert done.figures['workers'] <= 2  # a process that takes the place of another is no further one
 """
 
 
 @pytest.mark.slow
-def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, tmp_path, inside):
-    whole = replay_fleet(order_of(fleet), tmp_path / 'whole').result.read_bytes()
-    script = tmp_path / 'with_dask.py'
-    script.write_text(WITH_DASK, encoding='utf-8')
+def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes(fleet, whole, tmp_path):
+    script = tmp_path / 'with_workers.py'
+    script.write_text(WITH_WORKERS, encoding='utf-8')
     other = {
         'OPENBLAS_CORETYPE': 'Prescott',
         'NPY_DISABLE_CPU_FEATURES': 'AVX2 FMA3 AVX512F AVX512_SKX',
@@ -269,18 +260,17 @@ def test_two_workers_of_another_processor_one_of_them_killed_give_the_same_bytes
         env={**os.environ, **other},
         check=True,
     )
-    assert (tmp_path / 'result' / 'result.parquet').read_bytes() == whole
+    assert table_in(tmp_path / 'result') == whole
 
 
 def test_recordings_are_named_by_their_path_below_what_was_asked_for(fleet):
-    assert [asked.recording for asked in recordings_asked([str(fleet)])] == ['broken.mcap', *NAMES]
-    assert [asked.recording for asked in recordings_asked([str(fleet / 'gap')])] == ['gap']
-    with pytest.raises(AskedError, match='no recording at'):
-        recordings_asked([str(Path(__file__).parent)])
+    assert [place.recording for place in select_recordings([str(fleet)])] == ['broken.mcap', *NAMES]
+    assert [place.recording for place in select_recordings([str(fleet / 'gap')])] == ['gap']
+    with pytest.raises(SelectionError, match='no recording at'):
+        select_recordings([str(Path(__file__).parent)])
 
 
-def same(row, other):
-    """Whether two rows are the same to the bit; NaN is itself."""
-    return row.keys() == other.keys() and all(
-        value == other[name] or (value != value and other[name] != other[name]) for name, value in row.items()
-    )
+def test_names_that_mean_two_recordings_are_refused(fleet, tmp_path):
+    shutil.copytree(fleet / 'gap', tmp_path / 'other' / 'gap')
+    with pytest.raises(SelectionError, match='gap means two recordings'):
+        select_recordings([str(fleet), str(tmp_path / 'other')])

@@ -1,6 +1,7 @@
 """Tasks on processes of this machine and on a cluster: what is lost is run again, what is started ends."""
 
 import contextlib
+import json
 import os
 import re
 import signal
@@ -215,8 +216,6 @@ def cluster(tmp_path):
         scheduler = _process(stack, 'scheduler', *options)
         _wait_until(told.exists)
         _process(stack, 'worker', '--no-dashboard', '--scheduler-file', str(told), '--nthreads', '1')
-        import json
-
         yield json.loads(told.read_text())['address'], scheduler
 
 

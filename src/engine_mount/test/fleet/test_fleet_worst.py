@@ -4,11 +4,8 @@ import json
 
 import pytest
 
-from engine_mount.fleet.columns import table_of, write_table
-from engine_mount.fleet.questions import QueryError, query, result_of
-from engine_mount.fleet.what_if.columns import REPLAY_COLUMNS
-from engine_mount.fleet.what_if.run import FleetOrder
-from engine_mount.fleet.worst import worst
+from engine_mount.fleet.questions import QueryError, query, result_of, worst
+from engine_mount.fleet.tables import COLUMNS, table_of, write_table
 
 CHANGES = json.dumps({'mount_control': {'switch_on_level': 0.0006, 'policy': 'switched_viscous'}})
 BY = 'setpoint_difference_largest_a'
@@ -40,7 +37,7 @@ def result(tmp_path):
         row('d', float('nan')),
         row('b', 0.3, 'right'),
     ]
-    write_table(table_of(REPLAY_COLUMNS, rows), folder / 'result.parquet')
+    write_table(table_of(COLUMNS['result'], rows), folder / 'result.parquet')
     (folder / 'order.json').write_text(json.dumps({'asked_for': [str(drives)]}))
     return folder
 
@@ -66,15 +63,6 @@ def test_the_commands_name_the_place_the_mount_and_the_change(result):
     ]
 
 
-def test_the_places_are_found_from_any_folder(result, monkeypatch):
-    monkeypatch.chdir(result.parent)
-    told = FleetOrder(['my drives']).told()
-    (result / 'order.json').write_text(json.dumps(told))
-    (result.parent / 'elsewhere').mkdir()
-    monkeypatch.chdir(result.parent / 'elsewhere')
-    assert worst(result, BY, 1)[0].uri == str(result.parent / 'my drives' / 'b')
-
-
 def test_recordings_that_were_moved_are_told(result):
     drives = result.parent / 'my drives'
     drives.rename(result.parent / 'moved')
@@ -98,12 +86,10 @@ def test_an_unfinished_result_says_how_to_go_on(result):
 
 
 def test_the_catalogue_of_a_result_can_be_asked_with_it(result):
-    from engine_mount.fleet.catalogue.columns import RECORDINGS
-
     catalogue = result.parent / 'catalogue'
     catalogue.mkdir()
     rows = [{'recording': 'a', 'mount': '', 'uri': 'x/a', 'scenario': 'bench'}]
-    write_table(table_of(RECORDINGS, rows), catalogue / 'recordings.parquet')
+    write_table(table_of(COLUMNS['recordings'], rows), catalogue / 'recordings.parquet')
     (result / 'order.json').write_text(json.dumps({'asked_for': [str(catalogue)]}))
     sql = 'select scenario from result join recordings using (recording, mount)'
     assert query(result, sql).to_pylist() == [{'scenario': 'bench'}]

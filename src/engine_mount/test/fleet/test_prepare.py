@@ -11,9 +11,8 @@ import ros_testing
 _AFTER = """
 import sys
 from mount_recorder.session import session_text
-from engine_mount.fleet.catalogue.places import places
-from engine_mount.fleet.catalogue.reading import read_place
-from engine_mount.fleet.what_if.one import replay_one
+from engine_mount.fleet import catalogue, replay
+from engine_mount.fleet.places import places
 from engine_mount.drives.loop import recording
 from engine_mount.fleet.prepare import prepare
 from ros_testing import compiled_so_far
@@ -26,8 +25,9 @@ parameters = {'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}
 session = session_text({'parameters': parameters})
 recording.record_core(recording.Path(sys.argv[1]) / 'drive', parameters, session)
 for place in places([sys.argv[1]]).values():
-    row, = read_place(place).rows['recordings']
-    replayed, = replay_one(place, {'mount_control': {'highest_current': 0.7}}).rows['result']
+    path, changes = recording.Path(place.uri), {'mount_control': {'highest_current': 0.7}}
+    row, = catalogue.rows_of(path, place)['recordings']
+    replayed, = replay.rows_of(path, place, changes)['result']
     print(row['reason'] or 'indexed', replayed['outcome'], len(before), sorted(compiled_so_far() - before))
 """
 

@@ -5,15 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine_mount.identification.coil.few_points import InductanceTable, TableError, levels_of_all
-from engine_mount.identification.coil.gap_calibration import calibrate_gap_curves
-from engine_mount.identification.coil.gap_point import RippleRecording, in_steps, measured_point
-from engine_mount.identification.coil.inductance import GapOrder, calibrate_inductance
+from engine_mount.identification.coil.curves import calibrate_gap_curves
+from engine_mount.identification.coil.inductance import calibrate_inductance
+from engine_mount.identification.coil.points import InductanceTable, RippleRecording, measured_point
 from engine_mount.identification.coil.unique_region import unique_region
-from engine_mount.identification.rack.columns import RackRecordingError
-from engine_mount.identification.rack.given import GivenValues
-from engine_mount.identification.rack.ripple_recordings import read_ripple
-from engine_mount.identification.specimen import with_gap_curves
+from engine_mount.identification.fitting import IdentificationError
+from engine_mount.identification.rack import FileValues, read_ripple
+from engine_mount.recordings.screen import Screen
 from engine_mount.signals.mapping import Mapping
 from mount_models.coil.gap import evaluate
 from mount_models.quantity import LawRefusedError
@@ -21,7 +19,7 @@ from mount_models.specimen import default_specimen
 
 GAPS = np.linspace(280e-6, 540e-6, 9)
 CURRENTS = np.array([0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1.1, 1.3, 1.5, 1.75, 2.0, 2.5])
-NOTHING = GivenValues({}, {}, 20.0)
+NOTHING = FileValues(celsius_of_others=20.0)
 
 
 def inductance(current, gap, celsius=20.0, initial=0.0):
@@ -82,26 +80,19 @@ def test_a_coil_that_never_saturates_is_refused_for_that():
         measured_point(low, 0.2, 10e-3)
 
 
-def test_a_level_that_is_not_reached_is_refused_with_those_that_all_fall_through():
-    recordings = [table(gap) for gap in GAPS]
-    low, high = levels_of_all([in_steps(each) for each in recordings])
-    assert low < 15e-3 < high < 30e-3
-    order = GapOrder(0.25, 30e-3, 0.0043)
-    with pytest.raises(LawRefusedError, match=rf'{low * 1e3:.1f} \.\. {high * 1e3:.1f} mH') as refusal:
-        calibrate_inductance(recordings, default_specimen().force_law, order)
-    assert 'choose a --crossing-inductance from there' in str(refusal.value)
+def test_a_level_that_is_not_reached_is_refused_with_the_range_of_the_table():
+    refusal = r'280 um: .* fall through 50\.0 mH; instead it falls from .* choose a --crossing-inductance'
+    with pytest.raises(LawRefusedError, match=refusal):
+        measured_point(table(GAPS[0]), 0.25, 50e-3)
 
 
-def test_four_currents_are_refused():
-    with pytest.raises(TableError, match='4 different currents, at least 5'):
-        InductanceTable(CURRENTS[:4], inductance(CURRENTS[:4], 300e-6))
-
-
-def test_a_table_that_crosses_the_level_several_times_is_refused():
-    wild = inductance(CURRENTS, 300e-6)
-    wild[-2] = 20e-3
-    with pytest.raises(TableError, match='crosses it several times'):
-        InductanceTable(CURRENTS, wild).falls_through(15e-3)
+def test_four_currents_and_a_table_that_crosses_the_level_several_times_are_refused():
+    with pytest.raises(LawRefusedError, match='300 um: 4 different currents, at least 5'):
+        measured_point(table(300e-6, CURRENTS[:4]), 0.2, 15e-3)
+    wild = table(300e-6)
+    wild.inductance[-2] = 20e-3
+    with pytest.raises(LawRefusedError, match=r'300 um: coil .* crosses it several times'):
+        InductanceTable(wild).falls_through(15e-3)
 
 
 def test_tables_tell_where_they_are_unique():
@@ -123,7 +114,7 @@ def written(file, celsius=(20.0,), drift=0.0):
     return file
 
 
-def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path):
+def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path, capsys):
     file = written(tmp_path / 'all.csv', (20.0, 80.0))
     recordings = read_ripple([file], Mapping(), NOTHING, 0.1)
     assert len(recordings) == 2 * GAPS.size
@@ -131,18 +122,16 @@ def test_temperatures_mixed_in_one_file_become_recordings_of_their_own(tmp_path)
     for each in recordings:
         np.testing.assert_allclose(each.inductance, inductance(CURRENTS, each.gap, each.celsius), rtol=1e-4)
     assert recordings[1].name.endswith('um, 80 degC')
-    result = calibrate_inductance(recordings, default_specimen().force_law, GapOrder(0.25, 15e-3, 0.0043))
+    base = replace(default_specimen(), rest_current=0.25, crossing_inductance=15e-3, turns_area=0.1)
+    result = calibrate_inductance(recordings, base, [file])
     assert result.compensated_by.startswith('measured at 20 and 80 degC')
-    assert any(
-        'are tables of few points, measured within 0.10 .. 2.50 A' in each for each in result.sentences()
-    )
-    specimen = with_gap_curves(
-        default_specimen(), 'own', result.calibration, result.compensation, result.compensated_by, 0.1, [file]
-    )
+    result.report(Screen())
+    assert 'are tables of few points, measured within 0.10 .. 2.50 A' in capsys.readouterr().out
+    specimen = result.specimen('own')
     assert specimen.provenance['parts']['gap_curves']['valid']['interpolated_within_current'] == [0.1, 2.5]
 
 
 def test_a_temperature_that_runs_is_refused_still(tmp_path):
     file = written(tmp_path / 'runs.csv', drift=2.0)
-    with pytest.raises(RackRecordingError, match=r'coil temperature ran from 20\.0 to 42\.0 degC'):
+    with pytest.raises(IdentificationError, match=r'coil temperature ran from 20\.0 to 42\.0 degC'):
         read_ripple([file], Mapping(), NOTHING, 0.1)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from engine_mount.identification.coil.gap_calibration import calibrate_gap_curves
-from engine_mount.identification.coil.gap_point import GapPoint
+from engine_mount.identification.coil.curves import calibrate_gap_curves
+from engine_mount.identification.coil.points import GapPoint
 from mount_models.coil.gap import (
     check_gap_curves,
     crossing_current_from_gap,

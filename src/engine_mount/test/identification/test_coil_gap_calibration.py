@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine_mount.identification.coil.gap_calibration import calibrate_gap_curves
-from engine_mount.identification.coil.gap_point import RippleRecording, measured_point
-from engine_mount.identification.coil.temperature_fit import (
+from engine_mount.identification.coil.curves import calibrate_gap_curves
+from engine_mount.identification.coil.points import RippleRecording, measured_point
+from engine_mount.identification.coil.temperature import (
     gap_reluctance,
     measured_compensation,
     stated_compensation,
 )
-from engine_mount.identification.coil.unique_region import unique_region, warnings
+from engine_mount.identification.coil.unique_region import unique_region
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import evaluate
 from mount_models.coil.temperature import (
@@ -122,7 +122,7 @@ def test_the_stated_uncertainty_is_that_of_repeated_calibrations(calibration):
 
 def test_a_gap_that_contradicts_the_others_is_refused_and_named(points):
     wrong = [replace(p, gap=p.gap + 15e-6) if p.name == '390 um' else p for p in points]
-    with pytest.raises(LawRefusedError, match=r'390 um: the .* off the given 405\.0 um'):
+    with pytest.raises(LawRefusedError, match=r'390 um: by the .* off the given 405\.0 um'):
         calibrate_gap_curves(wrong)
 
 
@@ -161,11 +161,11 @@ def test_the_unique_region_is_found_from_the_data(recordings):
     assert 0.95 <= rising[0] <= 1.2 < 1.9 <= rising[1]
     assert levels[0] < 10e-3
     assert 25e-3 < levels[1] < 36e-3
-    assert warnings(region, 0.2, 20e-3) == []
+    assert region.warnings(0.2, 20e-3) == []
 
 
 def test_choices_in_the_ambiguous_region_are_warned_of(recordings):
-    current, inductance = warnings(unique_region(recordings), 0.9, 34e-3)
+    current, inductance = unique_region(recordings).warnings(0.9, 34e-3)
     assert 'rest_current (0.90 A) must lie where' in current
     assert 'crossing_inductance (34.0 mH) must be one' in inductance
 
@@ -189,8 +189,7 @@ def test_a_wrong_coefficient_matters_little_where_two_temperatures_were_measured
 
 
 def test_a_stated_compensation_takes_the_larger_part(calibration, points):
-    law = default_specimen().force_law
-    found = stated_compensation(calibration.curves, 20.0, points, law, 0.2, 20e-3)
+    found = stated_compensation(calibration.curves, 20.0, points, default_specimen())
     rest, contact = gap_errors(calibration.curves, 80.0)
     left_rest, left_contact = gap_errors(calibration.curves, 80.0, found)
     assert left_rest <= 0.35 * rest

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from joint import DT, jenkin, measured, motion
 
-from engine_mount.identification.friction.laws.dahl import Dahl
-from engine_mount.identification.friction.looks.first_look import first_look
+from engine_mount.identification.friction.laws import dahl_force
+from engine_mount.identification.friction.look import first_look
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_sim.plant.friction import full_response
@@ -13,7 +13,7 @@ from mount_sim.plant.friction import full_response
 
 @pytest.mark.parametrize('zero', [-400.0, 0.0, 250.0])
 @pytest.mark.parametrize('play', [0.0, 1e-3])
-def test_the_zero_is_told_although_the_contact_holds_a_force_at_rest(zero, play):
+def test_the_zero_is_known_although_the_contact_holds_a_force_at_rest(zero, play):
     x = motion(0.01)
     force = jenkin(x, (600.0, 600.0), 1e6, play, play + 0.5e-3)  # stuck at rest with a preload of 500 N
     recording = measured(x, force, zero)
@@ -34,7 +34,7 @@ def test_friction_that_differs_by_direction_is_within_the_stated_deviation_where
     assert abs(look.zero) < 3.0 * look.deviation
 
 
-def test_play_tells_the_zero_even_where_friction_differs_by_direction():
+def test_play_determines_the_zero_even_where_friction_differs_by_direction():
     x = motion(0.01)
     recording = measured(x, jenkin(x, (700.0, 500.0), 1e6, 2e-3, 0.0), 120.0)
     assert first_look(recording).zero == pytest.approx(120.0, abs=15.0)
@@ -46,14 +46,14 @@ def test_laws_that_are_not_the_fitted_one_have_their_zero_within_three_deviation
     zero = float(random.uniform(-60.0, 60.0))
     x = motion(3e-3, 0.7)
     pads, _, _ = full_response(FrictionContact(), FrictionCoefficients(), x, np.full(x.size, 100.0), DT)
-    dahl = Dahl().simulate(np.array([0.5, 0.52, 3e5]), x, DT, np.full((x.size, 2), 100.0))
+    dahl = dahl_force(np.array([0.5, 0.52, 3e5]), x, DT, np.full((x.size, 2), 100.0))
     for force in (pads, dahl):
         look = first_look(measured(x, force, zero, seed))
         assert abs(look.zero - zero) < 3.0 * look.deviation
         assert look.known
 
 
-def test_a_contact_that_never_slips_does_not_tell_its_zero():
+def test_a_contact_that_never_slips_does_not_show_its_zero():
     x = motion(0.3e-3)
     recording = measured(x, jenkin(x, (600.0, 600.0), 1e6, 0.0, 0.1e-3), 0.0)
     look = first_look(recording)

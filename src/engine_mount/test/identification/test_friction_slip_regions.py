@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from engine_mount.identification.friction.recording import checked_recording
-from engine_mount.identification.friction.steps.sawtooth import stroke_lines
-from engine_mount.identification.friction.steps.slip_regions import slip_regions
+from engine_mount.identification.friction.sawtooth import slip_regions, stroke_lines
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_sim.plant.friction import full_response

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from engine_mount.identification.specimen_file import save_specimen, specimen_to_mapping
+from engine_mount.identification.specimen import save_specimen, specimen_to_mapping
 from mount_models.specimen import SpecimenError, default_specimen, load_specimen, specimen_from_mapping
 
 DEFAULT = default_specimen()
@@ -81,7 +81,7 @@ def test_a_disk_that_fails_leaves_the_file_as_it_was(tmp_path, monkeypatch):
     def fails(*_):
         raise OSError('no space left')
 
-    monkeypatch.setattr('engine_mount.identification.specimen_file.os.replace', fails)
+    monkeypatch.setattr('engine_mount.identification.specimen.os.replace', fails)
     with pytest.raises(OSError, match='no space'):
         save_specimen(replace(DEFAULT, name='right'), file)
     assert file.read_bytes() == before

@@ -10,11 +10,8 @@ from mcap.reader import make_reader
 from recorded_drive import PERIOD, START, sample
 
 import engine_mount
-from engine_mount.recordings.audit import audit
-from engine_mount.recordings.compare import compare
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.merge import merge
-from engine_mount.recordings.recording import column_parts
 from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter, SplitRule
 from mount_recorder.mcap_writer import MESSAGE
@@ -131,11 +128,10 @@ def test_who_wants_one_group_unpacks_no_chunk_of_the_other(drive, group):
     stamps, columns = whole.stamps, {name: whole[name] for name in names}
     assert without(drive / 'drive_0.mcap', group) > 3
     recording = engine_mount.open(drive)
-    parts = list(column_parts(recording, {topic.name: names}))
-    np.testing.assert_array_equal(np.concatenate([part.stamps for part in parts]), stamps)
-    for name in names:
-        np.testing.assert_array_equal(np.concatenate([part.columns[name] for part in parts]), columns[name])
+    recording.load_columns({topic.name: names})
     np.testing.assert_array_equal(recording[topic.name].stamps, stamps)
+    for name in names:
+        np.testing.assert_array_equal(recording[topic.name][name], columns[name])
     assert recording.warnings == []
     other = SIM_TRUTH if group == OF_OTHERS else DISPLACEMENT
     assert not len(recording[other.name])  # what was spoilt is really gone
@@ -158,35 +154,3 @@ def test_the_slow_group_goes_to_the_file_with_the_fast_one_and_of_none_waits_mor
         assert max(waiting.values()) < CHUNK
     assert kept
     writer.close()
-
-
-def test_a_file_cut_between_the_chunks_of_two_groups_gives_those_of_the_first(tmp_path):
-    writer = write_drive(tmp_path / 'bag')
-    writer.close()
-    path = writer.folder / 'bag_0.mcap'
-    with path.open('rb') as file:
-        summary = make_reader(file).get_summary()
-    names = {number: channel.topic for number, channel in summary.channels.items()}
-    first, second = sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)[:2]
-    of_first, of_second = ({names[n] for n in index.message_index_offsets} for index in (first, second))
-    assert of_first == {'/displacement', '/current_setpoint'}
-    assert '/sim/truth' in of_second
-    (tmp_path / 'cut.mcap').write_bytes(path.read_bytes()[: second.chunk_start_offset])
-    recording = engine_mount.open(tmp_path / 'cut.mcap')
-    series = recording['displacement']
-    assert len(series) >= 10
-    assert series['mount'].tolist() == list(range(len(series)))
-
-
-def test_the_arrangement_changes_nothing_that_is_read(drive, tmp_path, monkeypatch):
-    monkeypatch.setattr('mount_recorder.bag_writer.topic_group', lambda name, type_name: 0)
-    write_drive(tmp_path / 'plain').close()
-    assert any({'/displacement', '/sim/truth'} <= topics for topics in chunks_of(tmp_path / 'plain'))
-    apart, together = engine_mount.open(drive), engine_mount.open(tmp_path / 'plain')
-    for name in together:
-        first, second = apart[name], together[name]
-        assert list(first.payloads) == list(second.payloads)
-        np.testing.assert_array_equal(first.receive_times, second.receive_times)
-        np.testing.assert_array_equal(first.publish_times, second.publish_times)
-    assert audit(apart) == audit(together)
-    assert compare(apart, together).equal

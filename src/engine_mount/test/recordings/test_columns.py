@@ -9,7 +9,6 @@ from recorded_drive import PERIOD, START, joint_state, write_drive
 import engine_mount
 from engine_mount.recordings import SeriesError
 from engine_mount.recordings.mcap_file import McapFile
-from engine_mount.recordings.recording import column_parts
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
@@ -55,20 +54,6 @@ def changing(tmp_path):
         writer.write('/displacement', raw, START + index * PERIOD)
     writer.close()
     return tmp_path / 'bag'
-
-
-@pytest.mark.parametrize('size', [1, 100, 8192])
-def test_parts_put_together_are_all_messages(changing, size):
-    whole, wanted = engine_mount.open(changing)['displacement'], ('mount', 'nothing')
-    parts = list(column_parts(engine_mount.open(changing), {'displacement': wanted}, size))
-    assert max(map(len, parts)) <= size
-    assert not any('nothing' in part.columns for part in parts)
-    for found, expected in (
-        ([part.columns['mount'] for part in parts], whole['mount']),
-        ([part.stamps for part in parts], whole.stamps),
-        ([part.receive_times for part in parts], whole.receive_times),
-    ):
-        np.testing.assert_array_equal(np.concatenate(found), expected)
 
 
 def test_a_column_that_not_every_message_has_is_that_of_all_messages(changing):

@@ -169,14 +169,3 @@ def test_a_foreign_topic_called_event_is_none_of_ours(name, with_camera):
     assert kinds == (['mark', 'switch_on', 'switch_off'] if name == 'both' else [])
     texts = [mark.text for marks in recorded_marks(recording).values() for _, mark in marks]
     assert texts == ['a bump'] * (name == 'both')
-
-
-def test_foreign_topics_called_like_ours_are_compared_as_foreign_ones(with_camera):
-    both, drive = (engine_mount.open(with_camera / name) for name in ('both', 'drive'))
-    assert compare(both, drive).equal
-    assert set(compare(both, drive).only_a) == {
-        f'/camera/{name}' for name in ('event', 'session', 'displacement', 'control_trace')
-    }
-    itself = compare(both, both)
-    assert itself.equal
-    assert 'camera/event' in {topic.name for topic in itself.topics}

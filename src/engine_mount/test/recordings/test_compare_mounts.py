@@ -68,12 +68,6 @@ def test_both_mounts_are_compared_under_their_own_names(car):
     ]
 
 
-def test_a_recording_of_two_mounts_equals_itself(car):
-    assert compare(car('a'), car('b')).sentences() == [
-        'everything is equal to the bit (32 signals of 8 topics)'
-    ]
-
-
 @pytest.mark.parametrize('phase', [-600_000, -400_000, 400_000, 600_000])
 def test_each_mount_is_aligned_by_its_own_first_sample(phase, car):
     """Their electronics sample at any time between the samples of the other."""

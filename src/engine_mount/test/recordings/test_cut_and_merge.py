@@ -88,13 +88,6 @@ def test_a_cut_says_where_it_is_from(whole, place):
     assert [step['did'] for step in origin(_cut(first, place(), 0.15, 0.2).information)] == ['cut', 'cut']
 
 
-def test_seconds_mean_the_same_in_a_cut_of_a_cut(whole, place):
-    """The session at its head keeps its time."""
-    once = _cut(whole, place(), 0.15, 0.2)
-    twice = _cut(_cut(whole, place(), 0.1, 0.3), place(), 0.15, 0.2)
-    assert _messages(once) == _messages(twice)
-
-
 @pytest.mark.parametrize(
     ('begin', 'end', 'why'),
     [
@@ -137,7 +130,6 @@ def test_cuts_merged_in_any_order_are_the_original(whole, place, ends, shift, ov
     assert compare(whole, united).equal
     assert merged.messages == whole.message_count
     assert merged.repeated == sum(piece.message_count for piece in pieces) - whole.message_count
-    assert not merged.holes
     assert not united.warnings
 
 
@@ -153,11 +145,6 @@ def test_what_a_recording_has_twice_stays_twice(place):
     folder = place()
     merged = merge([write(place(), 2), write(place(), 3), write(place(), 1)], folder)
     assert (merged.messages, merged.repeated) == (3, 3)
-
-
-def test_a_hole_between_the_parts_is_told(whole, place):
-    parts = [_cut(whole, place(), None, 0.1), _cut(whole, place(), 0.3, None)]
-    assert merge(parts, place()).holes == ('between two parts 0.201 s are missing',)
 
 
 def test_recordings_of_different_sessions_are_merged_only_if_asked(whole, place):
@@ -208,27 +195,7 @@ def test_an_event_that_is_not_there_is_refused_with_those_that_are(whole, wanted
         find_event(whole, wanted)
 
 
-def test_marked_switchings_are_not_told_twice(place):
-    marks = ((101, '{kind: switch_on}'),)
-    recording = engine_mount.open(write_answers(place(), answers(200), marks=marks))
-    assert [event.kind for event in recorded_events(recording)] == ['switch_on']
-
-
 # Bags of others.
-
-
-@pytest.mark.parametrize('name', ['cdr_test', 'talker', 'wbag'])
-def test_genuine_bags_cut_and_merged_are_the_original(genuine, place, name):
-    original = engine_mount.open(genuine / name)
-    middle = 0.5e-9 * (original.time_range[1] - original.time_range[0])
-    parts = [_cut(original, place(), None, middle), _cut(original, place(), middle, None)]
-    folder = place()
-    merge(parts, folder)
-    assert _present(engine_mount.open(folder)) == _present(original)
-
-
-def _present(recording) -> dict[str, list[tuple[int, int, bytes]]]:
-    return {name: rows for name, rows in _messages(recording).items() if rows}
 
 
 def test_types_that_nobody_installed_are_cut_with_their_definition(place):

@@ -17,7 +17,6 @@ from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from recorded_drive import write_drive
 from ros_testing import mutated
-from test_other_storages import written
 
 import engine_mount
 from engine_mount.recordings import ReadingError
@@ -128,22 +127,6 @@ def test_a_damaged_declaration_behind_the_messages_is_none_of_them(tmp_path):
     content[position] = Opcode.MESSAGE
     file.write_bytes(content)
     assert contents(engine_mount.open(file)) <= original
-
-
-@pytest.fixture(scope='module')
-def database(tmp_path_factory):
-    """Return the file of a recording in sqlite3 and its bytes."""
-    file = written(tmp_path_factory.mktemp('database') / 'bag', 20) / 'bag.db3'
-    return file, file.read_bytes()
-
-
-@ONE_FILE
-@given(SEEDS, st.booleans())
-def test_a_mutated_database_is_read_as_far_as_it_is_one(database, seed, alone):
-    file, content = database
-    file.write_bytes(mutated(content, seed))
-    with contextlib.suppress(ReadingError):
-        judged(file if alone else file.parent)
 
 
 @given(SEEDS)

@@ -147,4 +147,5 @@ def test_qos_of_old_bags_stands_in_numbers():
     }
     offer = OfferedQos('unknown', 0, 'best_effort', 'transient_local', 5, 5, 'automatic', 5, False)
     assert readable_qos(yaml.safe_dump([numbers])) == (offer,)
-    assert readable_qos([{**numbers, 'history': 9}]) == ()
+    assert readable_qos([{**numbers, 'history': 9}])[0].history == 'unknown'
+    assert readable_qos([{'history': 9}]) == ()

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from engine_mount.recordings.answers import on_one_clock, setpoint_latency
 
 SOON = st.lists(st.integers(-3_000, 30_000_000), min_size=2, max_size=60)
-ANY = st.lists(st.integers(-(10**13), 10**13) | st.integers(0, 3), min_size=2, max_size=60)
 
 
 def both(ages):
@@ -23,15 +22,6 @@ def test_latencies_are_those_of_all_ages_at_once():
         assert found.median == np.median(seconds)
         assert found.p99 == np.quantile(seconds, 0.99)
         assert found.worst == seconds.max()
-
-    check()
-
-
-def test_stamps_whose_middle_age_is_more_than_a_minute_are_of_another_clock():
-    @settings(deadline=None, derandomize=True)
-    @given(ANY)
-    def check(ages):
-        assert on_one_clock(*both(ages)) == bool(abs(np.median(ages)) <= 60e9)
 
     check()
 

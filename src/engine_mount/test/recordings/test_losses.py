@@ -48,11 +48,6 @@ def test_the_ramp_and_the_time_until_control_is_active_ask_for_nothing():
     assert (found.asked, found.unanswered, found.spans) == (600, 0, ((SAMPLES[400], SAMPLES[999]),))
 
 
-def test_a_ramp_that_was_refused_is_no_control_either():
-    found = judged(np.concatenate([SAMPLES[:290:2], SAMPLES[1400:2000]]), steps=SAMPLES[1400:2000])
-    assert (found.asked, found.unanswered) == (600, 0)
-
-
 def test_a_control_that_stalls_leaves_samples_unanswered_and_the_coil_at_0_ampere():
     found = judged(np.delete(SAMPLES, slice(1000, 1398)))
     assert (found.asked, found.unanswered) == (3000, 398)

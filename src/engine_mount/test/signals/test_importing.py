@@ -11,8 +11,8 @@ from engine_mount.recordings.cut import cut
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read
-from engine_mount.signals.importing.importing import ImportOrder, import_recording
-from engine_mount.signals.mapping import ColumnChoice, Mapping, TimeChoice
+from engine_mount.signals.importing.importing import import_files
+from engine_mount.signals.mapping import ColumnChoice, Mapping
 from engine_mount.signals.signal import SignalError
 
 TIMES = np.arange(3000) / 1000.0
@@ -29,7 +29,7 @@ def table(path, columns):
 
 
 def imported(tmp_path, *files, mapping=None, **more):
-    return import_recording(ImportOrder(list(files), tmp_path / 'out', mapping or Mapping(), **more))
+    return import_files(files, tmp_path / 'out', mapping=mapping or Mapping(), **more)
 
 
 def test_titles_and_units_tell_what_columns_are(tmp_path):
@@ -56,13 +56,13 @@ def test_titles_and_units_tell_what_columns_are(tmp_path):
 
 def test_the_session_tells_where_it_came_from(tmp_path):
     file = table(tmp_path / 'drive.csv', {'t': TIMES, 'x': 1e3 * TRAVEL, 'p': 2.0 + SHAKING})
-    mapping = Mapping(
-        {'displacement': ColumnChoice('x', 'mm', offset=0.0)},
-        {'valve': ColumnChoice('p', 'bar')},
-        TimeChoice('t', 's'),
-        'rack 2',
+    mapping = tmp_path / 'rack_2.yaml'
+    mapping.write_text(
+        'system: rack 2\ntime: {column: t, unit: s}\n'
+        'columns: {displacement: {column: x, unit: mm, offset: 0.0}}\n'
+        'others: {valve: {column: p, unit: bar}}\n'
     )
-    imported(tmp_path, file, mapping=mapping, mapping_file='rack_2.yaml')
+    imported(tmp_path, file, mapping=mapping)
     recording = open_recording(tmp_path / 'out')
     told = session_content(recorded_session(recording))
     assert told['scenario'] == 'imported'

@@ -22,7 +22,7 @@ def orders_of(text: str) -> tuple[int, int, int, int, int]:
 
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
-    from engine_mount.identification.rack.columns import RACK
+    from engine_mount.identification.rack import RACK
     from engine_mount.signals.mapping import with_options
 
     return with_options(mapping.of(RACK), columns, known=RACK, stated=stated)
@@ -50,8 +50,8 @@ def per_file(settings: list[str], files: list[Path], option: str, factor: float)
 
 
 def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
-    """Return what the caller says of gaps (um) and temperatures (degC) as `GivenValues`."""
-    from engine_mount.identification.rack.given import GivenValues
+    """Return what the caller says of gaps (um) and temperatures (degC) as `FileValues`."""
+    from engine_mount.identification.rack import FileValues
 
     single = [setting for setting in temperatures if '=' in setting]
     common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
@@ -63,7 +63,7 @@ def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) ->
             raise typer.BadParameter(
                 f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
             )
-    return GivenValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
+    return FileValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
 
 
 def positive(value: float | None, option: str, unit: str) -> float | None:

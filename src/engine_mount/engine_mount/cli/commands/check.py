@@ -45,17 +45,9 @@ def check(
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.experiments.check.report import (
-        PAGE,
-        Told,
-        all_verdicts,
-        figures_of,
-        passed,
-        table_of,
-        write_page,
-    )
-    from engine_mount.experiments.check.run import CORE, MODES, CheckOrder, run_trials, trials_of
-    from engine_mount.experiments.check.suite import chosen_of, shipped_suite, suite_in_file
+    from engine_mount.experiments.check import report
+    from engine_mount.experiments.check.run import CORE, MODES, run_trials, trials_of
+    from engine_mount.experiments.check.suite import chosen_of, passed, shipped_suite, suite_in_file
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.options import settings_of_options
     from engine_mount.settings.run_folder import make_run_folder, new_place
@@ -76,20 +68,21 @@ def check(
             given.setdefault('mount_control', {})['policy'] = policy
         if mount:
             given.setdefault('mount_sim', {})['mount'] = mount
-        of_graph = chosen_domain(domain) if through != CORE else 0
-        order = CheckOrder(chosen, through, given, jobs, of_graph, priority)
+        graph = {} if through == CORE else {'domain': chosen_domain(domain), 'priority': priority}
         place = out or new_place('check')
-        trials = trials_of(order, place)
+        trials = trials_of(chosen, given, place, through, jobs=jobs, **graph)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    folder = make_run_folder(place, 'check').path
+    file = make_run_folder(place, 'check').path / report.PAGE
     screen = TerminalScreen(console)
-    results = run_trials(trials, jobs, screen, Told(order, screen))
-    verdicts = all_verdicts(chosen, results, through)
-    screen.table(table_of(results, verdicts))
+    results = run_trials(
+        trials, jobs, screen, lambda trial, result: report.show_result(trial, result, screen)
+    )
+    verdicts = report.all_verdicts(trials, results)
+    screen.table(report.table_of(results, verdicts))
     if json_file is not None:
-        write_json(figures_of(order, results, verdicts), json_file)
-    write_page(order, results, verdicts, folder / PAGE)
-    console.print(f'page       {folder / PAGE}', soft_wrap=True)
+        write_json(report.figures_of(trials, given, results, verdicts), json_file)
+    report.write_page(trials, given, results, verdicts, file)
+    console.print(f'page       {file}', soft_wrap=True)
     if not all(map(passed, verdicts.values())):
         raise typer.Exit(1)

@@ -1,5 +1,6 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
+import functools
 from pathlib import Path
 from typing import Annotated
 
@@ -44,7 +45,7 @@ def compare(
     no recording.
     """
     try:
-        equal = _told(a, b, tolerances or [], common, json_file, figure)
+        equal = _compare(a, b, tolerances or [], common, json_file, figure)
     except (ValueError, OSError) as error:
         refuse(error)
         raise typer.Exit(_NOT_COMPARED) from None
@@ -52,7 +53,7 @@ def compare(
         raise typer.Exit(1)
 
 
-def _told(
+def _compare(
     a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
 ) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
@@ -64,17 +65,16 @@ def _told(
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
+    say = functools.partial(console.print, soft_wrap=True)
     recordings = open_run(local(a, console)), open_run(local(b, console))
     comparison = compare_recordings(*recordings, tolerances, common=common)
-    console.print(f'A {comparison.name_a}, B {comparison.name_b}', soft_wrap=True)
+    say(f'A {comparison.name_a}, B {comparison.name_b}')
     for sentence in comparison.sentences():
-        console.print(f'- {sentence}', soft_wrap=True)
+        say(f'- {sentence}')
     if comparison.differing:
         TerminalScreen(console).table(signal_table(comparison.signals))
-    console.print(
-        f'Times are from the first displacement sample of A; {alignment_sentence(comparison.alignments)}.',
-        soft_wrap=True,
-    )
+    aligned = alignment_sentence(comparison.alignments)
+    say(f'Times are from the first displacement sample of A; {aligned}.')
     for recording in recordings:
         for warning in recording.warnings:
             note(console, f'{named(recording.path)}: {warning}')
@@ -84,5 +84,5 @@ def _told(
         from engine_mount.reports.pictures import draw_comparison
 
         draw_comparison(comparison, *recordings, figure)
-        console.print(f'figure {figure}', soft_wrap=True)
+        say(f'figure {figure}')
     return comparison.equal

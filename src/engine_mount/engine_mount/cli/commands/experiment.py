@@ -59,7 +59,7 @@ def experiment(
     A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.experiments.registry import experiments_named, listed
+    from engine_mount.experiments.registry import experiments_named, known_settings, listed, orders
     from engine_mount.recordings.screen import Table
 
     console = terminal()
@@ -67,24 +67,28 @@ def experiment(
         rows = [(name, f'{title} ({reference})') for name, reference, title in listed()]
         TerminalScreen(console).table(Table('', 'll', rows, ('name', 'what is shown (in the paper)')))
         return
-    from engine_mount.experiments.orders import orders, run_all
     from engine_mount.experiments.page import print_outcome, write_page
     from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.options import settings_of_options
     from mount_bringup.settings import SettingError
 
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
     try:
-        given = orders(experiments_named(names), settings or [], out, graph=graph)
+        chosen = experiments_named(names)
+        given = settings_of_options(settings or [], known_settings(chosen))
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    screen = TerminalScreen(console)
-    outcomes = run_all(given, screen)
-    for known, outcome in outcomes:
-        print_outcome(known, outcome, screen)
+    screen, outcomes = TerminalScreen(console), []
+    for known, order in orders(chosen, given, out, graph=graph):
+        with screen.bar(known.name) as bar:
+            outcomes.append(known.run(order.shown_on(bar)))
+            bar(1.0, known.name)
+    for outcome in outcomes:
+        print_outcome(outcome, screen)
     if json_file is not None:
-        figures = {known.name: outcome.figures for known, outcome in outcomes}
-        write_json(figures if len(figures) > 1 else next(iter(figures.values())), json_file)
+        figures = {outcome.experiment.name: outcome.figures for outcome in outcomes}
+        write_json(figures if len(figures) > 1 else outcomes[0].figures, json_file)
     if page is not None:
         write_page(outcomes, page)
         console.print(f'page       {page}', soft_wrap=True)

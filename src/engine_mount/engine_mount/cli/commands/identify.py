@@ -5,10 +5,13 @@ from typing import Annotated
 
 import typer
 
+from engine_mount.cli.calibration.given import per_file
+from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
     Delimiter,
+    JsonFile,
     MapFile,
     Rate,
     TimeColumn,
@@ -28,9 +31,9 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
-
-Examples:
+EPILOG = (
+    EXIT_CODES
+    + """
 
 `engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
 --name left --out left.yaml` - into the specimen file that init and control load
@@ -43,6 +46,7 @@ Examples:
 
 `engine-mount identify friction --train a.mf4 --held-out b.mf4 --map-file rig_2.yaml` - what a team agreed on
 """
+)
 
 
 @app.callback()
@@ -91,69 +95,46 @@ def friction(
         ),
     ] = '',
     seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
-    ] = None,
-    base: Annotated[
-        Path | None, typer.Option(help='specimen that gives all other values; default: the shipped one')
-    ] = None,
-    name: Annotated[str, typer.Option(help='name of the specimen; default: that of the base')] = '',
-    out: Annotated[Path | None, typer.Option(metavar='FILE', help='write the specimen (YAML)')] = None,
-    figure: Annotated[Path | None, typer.Option(metavar='FILE', help='draw every step (PNG)')] = None,
+    json_file: JsonFile = None,
+    base: Base = None,
+    name: Name = '',
+    out: Out = None,
+    figure: Figure = None,
 ) -> None:
     """Identify the friction contact, and which law is worth its parameters.
 
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
-    from engine_mount.cli.calibration.friction_screen import print_friction
-    from engine_mount.cli.calibration.written import note_foreign
-    from engine_mount.cli.screen import progress_bar
-    from engine_mount.identification.friction.channels import friction_mapping
-    from engine_mount.identification.friction.figures import figures
-    from engine_mount.identification.friction.found import IdentifyOrder
-    from engine_mount.identification.friction.identify import identify
-    from engine_mount.identification.specimen import check_targets, foreign_parts, with_friction
-    from engine_mount.identification.specimen_file import save_specimen
-    from engine_mount.reports.json_file import write_json
+    from engine_mount.identification import identify
+    from engine_mount.identification.friction.files import friction_mapping
+    from engine_mount.identification.specimen import check_targets
     from engine_mount.signals.mapping import with_options
-    from mount_models.specimen import chosen_specimen, friction_contact
 
-    console = terminal()
     check_targets(out, json_file, figure)
-    starting = chosen_specimen(str(base) if base else '')
     mapping = with_options(mapping_of(map_file), (), time, rate)
-    mapping = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
-    order = IdentifyOrder(
-        *([local(each, console) for each in places or []] for places in (train, held_out, file)),
-        step, clamp, zero, mapping, seed, friction_contact(starting.friction),
-    )  # fmt: skip
-    with progress_bar(console, transient=True) as progress:
-        task = progress.add_task('reading', total=1.0)
-        found = identify(order, lambda law, share: progress.update(task, description=law, completed=share))
-    specimen = with_friction(starting, name, found) if out is not None else None
-    print_friction(found, console)
-    if figure is not None:
-        from engine_mount.identification.friction.picture import draw_identification
-
-        draw_identification(found, figure)
-        console.print(f'figure {figure}', soft_wrap=True)
-    if json_file is not None:
-        write_json(figures(found), json_file)
-    if out is not None and specimen is not None:
-        save_specimen(specimen, out)
-        console.print(f'specimen {out}', soft_wrap=True)
-        note_foreign(console, foreign_parts(specimen), specimen.name)
+    columns = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
+    console = terminal()
+    training, unseen, files = (
+        [local(place, console) for place in places or []] for places in (train, held_out, file)
+    )
+    with progress() as bar:
+        result = identify.friction(
+            training, unseen, files=files, step=step, clamp=clamp, zero=zero, columns=columns, seed=seed,
+            base=base or '', progress=bar,
+        )  # fmt: skip
+    publish(result, json_file, figure, out, name)
 
 
-DRIFT_EPILOG = """Exit code: 0 when all that was asked for is written, 1 with the reason when not.
-
-Examples:
+DRIFT_EPILOG = (
+    EXIT_CODES
+    + """
 
 `engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
 
 `engine-mount identify drift a b c --hours a=120 --hours b=180 --hours c=260` - by a counter
 """
+)
 
 
 @app.command(cls=Command, epilog=DRIFT_EPILOG)
@@ -173,56 +154,17 @@ def drift(
         list[str] | None,
         typer.Option(metavar='RECORDING=H', help='hours of all recordings; default: when sessions began'),
     ] = None,
-    json_file: Annotated[
-        Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
-    ] = None,
-    figure: Annotated[Path | None, typer.Option(metavar='FILE', help='draw it (PNG)')] = None,
+    json_file: JsonFile = None,
+    figure: Figure = None,
 ) -> None:
-    """Tell wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
+    """Show wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
 
     A line through the contact gaps of all recordings, weighted by the deviations that the initialisations
-    stated; where gaps scatter more than that, by as much less sure. Offset current and, where a rack's load
-    cells are recorded, friction likewise from their scatter.
+    stated; where gaps scatter more than that, by as much less sure. Offset current likewise from its scatter.
     """
-    from engine_mount.identification.drift.identify import figures, identify_drift
+    from engine_mount.identification import identify
     from engine_mount.identification.specimen import check_targets
-    from engine_mount.reports.json_file import write_json
-    from mount_models.specimen import chosen_specimen
 
-    console = terminal()
     check_targets(json_file, figure)
-    told = {}
-    for setting in hours or []:
-        named, equals, text = setting.rpartition('=')
-        meant = [path for path in recordings if str(path) == named or path.name == named]
-        try:
-            value = float(text)
-        except ValueError:
-            value = float('nan')
-        if not equals or len(meant) != 1 or value - value != 0.0:
-            raise typer.BadParameter(f'--hours {setting}: write RECORDING=H, as in bags/monday=120')
-        told[meant[0]] = value
-    result = identify_drift(recordings, chosen_specimen(str(specimen) if specimen else ''), told)
-    if figure is not None:
-        from engine_mount.identification.drift.picture import draw_drift
-
-        draw_drift(result, figure)
-        console.print(f'figure {figure}', soft_wrap=True)
-    if json_file is not None:
-        write_json(figures(result), json_file)
-    lines = [('contact gap', result.gap, 1e6, 'um/h'), ('offset current', result.current, 1e3, 'mA/h')]
-    if result.friction is not None:
-        lines.append(('friction', result.friction, 1.0, '1/h'))
-    for label, line, factor, unit in lines:
-        std = 'unknown' if line.slope_std != line.slope_std else f'{factor * line.slope_std:.2g}'
-        console.print(f'{label}: {factor * line.slope:+.3g} +- {std} {unit} (one deviation)', soft_wrap=True)
-    console.print(
-        f'{1e6 * result.left:.1f} +- {1e6 * result.left_std:.2g} um left until the contact gap reaches '
-        f'{1e6 * result.limit:.1f} um, where the pressed gap leaves the range of the law'
-        + (
-            f'; at this wear in {result.hours_left:.3g} h'
-            if result.hours_left is not None
-            else '; no wear beyond two deviations is seen'
-        ),
-        soft_wrap=True,
-    )
+    counter = per_file(hours or [], recordings, '--hours', 1.0)
+    publish(identify.drift(recordings, hours=counter, specimen=specimen or ''), json_file, figure)

@@ -14,7 +14,6 @@ from engine_mount.cli.commands.options import (
     MapFile,
     Rate,
     TimeColumn,
-    mapping_of,
     recording_argument,
     stated,
 )
@@ -66,22 +65,21 @@ def import_files(
     The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
     were sampled. A gap of more than 0.125 s parts the recording.
     """
+    from engine_mount import import_files as run_import
     from engine_mount.cli.screen import progress_bar
     from engine_mount.reports.json_file import write_json
-    from engine_mount.signals.importing.importing import ImportOrder, import_recording
-    from engine_mount.signals.mapping import with_options
+    from engine_mount.signals.mapping import Mapping
 
     console = terminal()
-    told = stated(dbc, decimal, delimiter)
-    mapping = with_options(mapping_of(map_file), column or [], time, rate, stated=told)
-    places = [str(local(file, console)) for file in files]
-    name = map_file.name if map_file else ''
-    order = ImportOrder(places, out, mapping, name, first, last)
+    places = [local(file, console) for file in files]
     with progress_bar(console, transient=True) as progress:
         task = progress.add_task('reading', total=1.0)
-        imported = import_recording(
-            order, lambda share, what: progress.update(task, completed=share, description=what)
-        )
+        imported = run_import(
+            places, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
+            stated=stated(dbc, decimal, delimiter),
+            first=first, last=last,
+            progress=lambda share, what: progress.update(task, completed=share, description=what),
+        )  # fmt: skip
     for topic, count in imported.samples.items():
         console.print(f'{topic:<28}{count} samples', soft_wrap=True)
     for sentence in imported.notes:

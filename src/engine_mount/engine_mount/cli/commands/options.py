@@ -88,16 +88,6 @@ MapFile = Annotated[
         help='recording of others: YAML file that says columns, units and times of a measuring system',
     ),
 ]
-MapFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        '--map',
-        '--map-file',
-        metavar='FILE',
-        help='files of others too: YAML file that says columns, units and times of a measuring system; may '
-        'be repeated, one for each system',
-    ),
-]
 Dbc = Annotated[
     Path | None,
     typer.Option('--dbc', metavar='FILE', help='CAN log, or MDF with raw frames: database that decodes them'),

@@ -21,7 +21,7 @@ Examples:
 
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
-All chunks whose checksum holds are kept, with topics, times, session, attachments, metadata and what the
+All chunks whose checksum holds are kept, with topics, times, session, metadata and what the
 recorder says of its own losses. A last chunk that was cut off is lost. The original is not touched.
 """
 

@@ -159,7 +159,9 @@ def control_runs(
     runs = []
     for begin, end in zip(begins, [*begins[1:], len(stamps)], strict=True):
         earlier = [gap for gap in gaps if gap.stamp < stamps[begin]]
-        whole = begin > 0 or _begins_afresh(int(stamps[begin]), answers)
+        whole = begin > 0 or answers is None
+        if answers is not None and not whole:  # its first step is not in the recording, or of an empty memory
+            whole = bool(answers.afresh[answers.step(int(stamps[begin]))[0] :][:1].all())
         if not whole:
             notes.append(
                 f'the recording begins while the controller is at work, at {notes.at(int(stamps[begin]))}: '
@@ -279,13 +281,6 @@ def _was_activated(
     # Without samples for so long a controller discards its table; with samples and no answers it is off.
     there = all_stamps[(all_stamps >= before) & (all_stamps <= after)]
     return after - before > BREAK and there.size > 1 and bool(np.diff(there).max() <= BREAK)
-
-
-def _begins_afresh(first: int, answers: RecordedAnswers | None) -> bool:
-    if answers is None:
-        return True
-    step = answers.step(first)[0]
-    return step >= len(answers.afresh) or bool(answers.afresh[step])
 
 
 # Rows of rising stamps looked up in one another.

@@ -286,11 +286,6 @@ def parameters_of(session: dict[str, Any], notes: Notes) -> dict[str, dict[str, 
     return checked_settings(with_recorded_policy(found) if was_controlled else found)
 
 
-def recorded_parameters(recording: Recording, notes: Notes) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of the nodes that replay, as recorded and still known."""
-    return parameters_of(session_of(recording, notes), notes)
-
-
 def has(recording: Recording, topic: Topic) -> bool:
     """Return whether the recording holds a message of the topic, in any namespace."""
     return topic.name in recording and recording.topics[recording.resolve(topic.name)].message_count > 0

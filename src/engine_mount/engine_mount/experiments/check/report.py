@@ -1,196 +1,131 @@
-"""The page of a check: verdicts, and a small picture of each manoeuvre."""
+"""What came of a check, for people: table, JSON, and a page with a picture of each manoeuvre."""
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from engine_mount.experiments.check.run import GRAPH, MODES, CheckOrder, Result, Shown
-from engine_mount.experiments.check.suite import CLOCK, MEASURES, RACK, Limit, Manoeuvre
-from engine_mount.experiments.harness.contract import Values
+from engine_mount.experiments.check.run import DRIVEN, GRAPH, HYDRO, MODES, UNDAMPED, Trial
+from engine_mount.experiments.check.suite import (
+    FAILED,
+    MEASURES,
+    NOT_JUDGED,
+    PASSED,
+    RACK,
+    Manoeuvre,
+    Result,
+    Verdict,
+    passed,
+    verdicts_of,
+    worst_first,
+)
+from engine_mount.experiments.harness.experiment import Settings, Values
 from engine_mount.recordings.screen import Screen
 from engine_mount.recordings.screen import Table as ScreenTable
 from engine_mount.reports.drawing.chart import Array, Chart, Curve, Panel, Span
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.drawing.style import COLOUR_OF
-from engine_mount.reports.sections.section import BAD, GOOD, Cell, Finding, Link, Section, Table
+from engine_mount.reports.sections.section import Cell, Link, Section, Table
 from mount_models.sampling import SAMPLE_TIME
 
-
-class Judged(Enum):
-    """What became of a limit."""
-
-    FAILED = 'fail'
-    PASSED = 'ok'
-    LEFT_OUT = 'none'
-    NOT_JUDGED = 'not judged'  # the manoeuvre broke down
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """One figure against one limit; `margin` is the share that is left of it, NaN of a limit of 0."""
-
-    manoeuvre: str
-    limit: Limit
-    value: float
-    judged: Judged
-    margin: float
-
-    @property
-    def has_failed(self) -> bool:
-        """Whether the manoeuvre does not pass for it."""
-        return self.judged in (Judged.FAILED, Judged.NOT_JUDGED)
-
-
-def verdicts_of(manoeuvre: Manoeuvre, result: Result, through: str) -> list[Verdict]:
-    """Return the verdicts on one manoeuvre in the order of its limits."""
-    return [_verdict(manoeuvre.name, limit, result, through) for limit in manoeuvre.limits]
-
-
-def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """Return the verdicts with those that failed first, then by the margin that is left."""
-    order = {Judged.NOT_JUDGED: 0, Judged.FAILED: 1, Judged.PASSED: 2, Judged.LEFT_OUT: 3}
-
-    def key(verdict: Verdict) -> tuple[int, float]:
-        unknown = -math.inf if verdict.judged is Judged.FAILED else math.inf
-        return order[verdict.judged], unknown if math.isnan(verdict.margin) else verdict.margin
-
-    return sorted(verdicts, key=key)
-
-
-def passed(verdicts: Sequence[Verdict]) -> bool:
-    """Return whether no limit is exceeded, and none could not be judged."""
-    return not any(verdict.has_failed for verdict in verdicts)
-
-
-def all_verdicts(
-    suite: Sequence[Manoeuvre], results: Mapping[str, Result], through: str
-) -> dict[str, list[Verdict]]:
-    """Return {manoeuvre: its verdicts}."""
-    return {each.name: verdicts_of(each, results[each.name], through) for each in suite}
-
-
-def _verdict(manoeuvre: str, limit: Limit, result: Result, through: str) -> Verdict:
-    if CLOCK in MEASURES[limit.measure].seats and through != GRAPH:
-        return Verdict(manoeuvre, limit, math.nan, Judged.LEFT_OUT, math.nan)
-    if result.broke_down:
-        return Verdict(manoeuvre, limit, math.nan, Judged.NOT_JUDGED, math.nan)
-    value = result.figures.get(limit.measure, math.nan)
-    left = limit.value - value if limit.bound == 'at_most' else value - limit.value
-    judged = Judged.PASSED if left >= 0.0 else Judged.FAILED  # a value that is not known fails
-    margin = left / abs(limit.value) if limit.value else math.nan
-    return Verdict(manoeuvre, limit, value, judged, margin)
-
-
 HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
+PAGE = 'check.html'
 _SIGNS = {'at_most': '≤', 'at_least': '≥'}
+_NUMBERS = 150_000  # of all curves together, chosen: a page of half a megabyte
+_LOOP = 0.25  # s, chosen: two periods at 8 Hz
+_COLOURS = {UNDAMPED: 'undamped', HYDRO: 'hydro', DRIVEN: 'friction'}
+"""{mount: whose colour it has}, in the order in which they are drawn."""
 
+Results = Mapping[str, Result]
 Verdicts = Mapping[str, Sequence[Verdict]]
 
 
-class Told:
-    """Tells each manoeuvre when it is done: the limit of which least is left, the time to go, its remarks."""
-
-    def __init__(self, order: CheckOrder, screen: Screen, clock: Callable[[], float] = time.monotonic):
-        self._suite = {each.name: each for each in order.manoeuvres}
-        self._through = order.through
-        self._screen = screen
-        self._clock = clock
-        self._begin = clock()
-        self._is_first = True
-
-    def __call__(self, name: str, result: Result, share: float) -> None:
-        if self._is_first:
-            self._screen.say(_line(*HEADS, 'to go'))
-            self._is_first = False
-        verdicts = worst_first(verdicts_of(self._suite[name], result, self._through))
-        row = cells(verdicts[0]) if verdicts else ('', name, 'no limit', '', '', '')
-        to_go = round((1.0 - share) / share * (self._clock() - self._begin))
-        self._screen.say(_line(*row, f'{to_go // 60}:{to_go % 60:02}'))
-        for remark in filter(None, (result.broke_down, *result.remarks)):
-            self._screen.note(remark, name)
+def all_verdicts(trials: Sequence[Trial], results: Results) -> dict[str, list[Verdict]]:
+    """Return {manoeuvre: its verdicts}."""
+    return {
+        trial.manoeuvre.name: verdicts_of(
+            trial.manoeuvre, results[trial.manoeuvre.name], real_time=trial.through == GRAPH
+        )
+        for trial in trials
+    }
 
 
-def _line(*texts: str) -> str:
-    """Return a line of at most 80 columns; the longest quantity has 32 characters."""
-    return '{:<5}{:<11}{:<33}{:>7} {:>7} {:>7} {:>6}'.format(*texts)
+def show_result(trial: Trial, result: Result, screen: Screen) -> None:
+    """Show a manoeuvre that is done: the limit of which least is left, and its remarks."""
+    name = trial.manoeuvre.name
+    verdicts = worst_first(all_verdicts([trial], {name: result})[name])
+    row = cells(verdicts[0]) if verdicts else ('', name, 'no limit', '', '', '')
+    # at most 80 columns; the longest quantity has 32 characters
+    screen.say('{:<5}{:<11}{:<33}{:>7} {:>7} {:>7}'.format(*row).rstrip())
+    for remark in filter(None, (result.broke_down, *result.remarks)):
+        screen.note(remark, name)
 
 
-def table_of(results: Mapping[str, Result], verdicts: Verdicts) -> ScreenTable:
-    """Return the table of all verdicts; a limit of all manoeuvres that held in all of them is told once."""
-    rows = told_once(verdicts)
+def table_of(results: Results, verdicts: Verdicts) -> ScreenTable:
+    """Return the table of all verdicts; a limit of all manoeuvres that held in all of them stands once."""
+    rows = summary(verdicts)
     marked = frozenset(place for place, row in enumerate(rows) if row.has_failed)
-    return ScreenTable('', 'lllrrr', texts_of(rows, results, verdicts), HEADS, sentence_of(verdicts), marked)
+    texts = [texts_of(row, results, verdicts) for row in rows]
+    return ScreenTable('', 'lllrrr', texts, HEADS, sentence_of(verdicts), marked)
 
 
-def texts_of(
-    rows: Sequence[Verdict], results: Mapping[str, Result], verdicts: Verdicts
-) -> list[tuple[str, ...]]:
-    """Return the texts of rows of `told_once`; of what broke down why, and how much is not judged."""
+def summary(verdicts: Verdicts) -> list[Verdict]:
+    """Return the verdicts worst first, each common limit that held everywhere once, where least is left.
+
+    Of a manoeuvre that broke down there is one, whichever, for all of its limits.
+    """
+    groups: dict[object, list[Verdict]] = {}
+    every = list(chain(*verdicts.values()))
+    exceeded = {_bound(each) for each in every if each.judged == FAILED}
+    for each in every:
+        if each.judged == NOT_JUDGED:
+            groups.setdefault(each.manoeuvre, []).append(each)
+        elif each.judged == FAILED or not each.limit.common:
+            groups[id(each)] = [each]
+        elif _bound(each) not in exceeded:
+            groups.setdefault(_bound(each), []).append(each)
+    return worst_first([worst_first(group)[0] for group in groups.values()])
+
+
+def _bound(verdict: Verdict) -> tuple[str, str, bool]:
+    return verdict.limit.measure, verdict.limit.bound, verdict.limit.common
+
+
+def texts_of(row: Verdict, results: Results, verdicts: Verdicts) -> tuple[str, ...]:
+    """Return the texts of a row of `summary`; of what broke down why, and how much is not judged."""
     judged, of = sum(not result.broke_down for result in results.values()), len(results)
-    shared = '' if judged < 2 else f'all {of}' if judged == of else f'{judged} of {of}'
-    texts = []
-    for row in rows:
-        result, word, name, told, *others = results[row.manoeuvre], *cells(row, shared)
-        if row.judged is Judged.NOT_JUDGED:
-            told += f': {result.broke_down}; {not_judged(verdicts[row.manoeuvre])}'
-        texts.append((word, name, told, *others))
-    return texts
+    if row.judged == NOT_JUDGED:
+        name, reason = row.manoeuvre, results[row.manoeuvre].broke_down
+        return FAILED, name, f'broke down: {reason}; {not_judged(verdicts[name])}', '', '', ''
+    word, name, *others = cells(row)
+    if row.limit.common and row.judged != FAILED and judged > 1:
+        name = f'all {of}' if judged == of else f'{judged} of {of}'
+    return word, name, *others
 
 
 def not_judged(verdicts: Sequence[Verdict]) -> str:
     """Return how many limits of a manoeuvre that broke down are not judged."""
-    return f'not judged: {sum(each.judged is Judged.NOT_JUDGED for each in verdicts)} limits'
+    return f'not judged: {sum(each.judged == NOT_JUDGED for each in verdicts)} limits'
 
 
 def sentence_of(verdicts: Verdicts) -> str:
     """Return how many manoeuvres passed."""
     failed = [name for name, each in verdicts.items() if not passed(each)]
-    count = sum(each.judged in (Judged.PASSED, Judged.FAILED) for each in chain(*verdicts.values()))
-    told = f'{len(verdicts) - len(failed)} of {len(verdicts)} manoeuvres within their {count} limits'
-    return f'{told}; not {", ".join(failed)}.' if failed else f'{told}.'
+    count = sum(each.judged in (PASSED, FAILED) for each in chain(*verdicts.values()))
+    within = f'{len(verdicts) - len(failed)} of {len(verdicts)} manoeuvres within their {count} limits'
+    return f'{within}; not {", ".join(failed)}.' if failed else f'{within}.'
 
 
-def told_once(verdicts: Verdicts) -> list[Verdict]:
-    """Return the verdicts worst first, each common limit that held everywhere once, where least is left.
-
-    Of a manoeuvre that broke down there is one, whichever, for all of its limits.
-    """
-    broken: dict[str, Verdict] = {}
-    failed: list[Verdict] = []
-    held: list[Verdict] = []
-    common: dict[tuple[str, str], list[Verdict]] = {}
-    for verdict in chain(*verdicts.values()):
-        key = (verdict.limit.measure, verdict.limit.bound)
-        if verdict.judged is Judged.NOT_JUDGED:
-            broken[verdict.manoeuvre] = verdict
-        elif verdict.judged is Judged.FAILED:
-            failed.append(verdict)
-        elif verdict.limit.common:
-            common.setdefault(key, []).append(verdict)
-        else:
-            held.append(verdict)
-    exceeded = {(verdict.limit.measure, verdict.limit.bound) for verdict in failed if verdict.limit.common}
-    for key, group in common.items():
-        if key not in exceeded:
-            held.append(worst_first(group)[0])
-    return worst_first([*broken.values(), *failed, *held])
-
-
-def cells(verdict: Verdict, shared: str = '') -> tuple[str, ...]:
-    """Return the texts of a row; of a common limit that held with the text `shared`, if given."""
-    if verdict.judged is Judged.NOT_JUDGED:
-        return Judged.FAILED.value, verdict.manoeuvre, 'broke down', '', '', ''
+def cells(verdict: Verdict) -> tuple[str, ...]:
+    """Return the texts of a row."""
+    if verdict.judged == NOT_JUDGED:
+        return FAILED, verdict.manoeuvre, 'broke down', '', '', ''
     limit = verdict.limit
-    is_shared = shared and verdict.limit.common and verdict.judged is not Judged.FAILED
     return (
-        verdict.judged.value,
-        shared if is_shared else verdict.manoeuvre,
+        verdict.judged,
+        verdict.manoeuvre,
         limit.measure,
         number(verdict.value),
         f'{_SIGNS[limit.bound]}\N{NO-BREAK SPACE}{limit.value:g}',
@@ -203,36 +138,36 @@ def number(value: float) -> str:
     return '–' if math.isnan(value) else f'{value:.0f}' if abs(value) >= 1000.0 else f'{value:.3g}'
 
 
-def figures_of(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> Values:
+def figures_of(trials: Sequence[Trial], settings: Settings, results: Results, verdicts: Verdicts) -> Values:
     """Return what `--json` writes: the same order gives the same, whatever the number of jobs."""
+
+    def as_json(verdict: Verdict) -> Values:
+        limit = verdict.limit
+        return {
+            'quantity': limit.measure,
+            'value': _known(verdict.value),
+            limit.bound: limit.value,
+            'verdict': verdict.judged,
+            'left': _known(verdict.margin),
+            'source': limit.source,
+            'reason': limit.reason,
+        }
+
     return {
         'passed': all(map(passed, verdicts.values())),
-        'through': order.through,
-        'set': {node: dict(values) for node, values in order.settings.items()},
+        'through': trials[0].through,
+        'set': settings,
         'manoeuvres': {
-            each.name: {
-                'about': each.about,
-                'passed': passed(verdicts[each.name]),
-                'broke_down': results[each.name].broke_down,
-                'remarks': list(results[each.name].remarks),
-                'figures': {name: _known(value) for name, value in results[each.name].figures.items()},
-                'verdicts': [_as_json(verdict) for verdict in verdicts[each.name]],
+            name: {
+                'about': trial.manoeuvre.about,
+                'passed': passed(verdicts[name]),
+                'broke_down': result.broke_down,
+                'remarks': list(result.remarks),
+                'figures': {measure: _known(value) for measure, value in result.figures.items()},
+                'verdicts': list(map(as_json, verdicts[name])),
             }
-            for each in order.manoeuvres
+            for trial, (name, result) in zip(trials, results.items(), strict=True)
         },
-    }
-
-
-def _as_json(verdict: Verdict) -> Values:
-    limit = verdict.limit
-    return {
-        'quantity': limit.measure,
-        'value': _known(verdict.value),
-        limit.bound: limit.value,
-        'verdict': verdict.judged.value,
-        'left': _known(verdict.margin),
-        'source': limit.source,
-        'reason': limit.reason,
     }
 
 
@@ -240,118 +175,74 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-PAGE = 'check.html'
-_NUMBERS = 150_000  # of all curves together, chosen: a page of half a megabyte
-_LOOP = 0.25  # s, chosen: two periods at 8 Hz
-_COLOURS = {'undamped': 'undamped', 'hydromount': 'hydro', 'driven': 'friction'}
-"""{mount: whose colour it has}, in the order in which they are drawn."""
-
-
-def write_page(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts, file: Path) -> None:
+def write_page(
+    trials: Sequence[Trial], settings: Settings, results: Results, verdicts: Verdicts, file: Path
+) -> None:
     """Write the page of a check; raises `OSError`."""
-    sections = [_overview(order, results, verdicts)]
-    sections += [_section(each, results[each.name], verdicts[each.name]) for each in order.manoeuvres]
-    file.write_text(page('Manoeuvre suite', sections, _NUMBERS), encoding='utf-8')
-
-
-def _overview(order: CheckOrder, results: Mapping[str, Result], verdicts: Verdicts) -> Section:
-    changed = [
-        f'{node}.{name}={value}' for node, each in order.settings.items() for name, value in each.items()
-    ]
+    changed = ', '.join(
+        f'{node}.{name}={value}' for node, each in settings.items() for name, value in each.items()
+    )
     words = [
         sentence_of(verdicts),
-        f'Driven through {MODES[order.through]}; '
-        + (f'set: {", ".join(changed)}.' if changed else 'all parameters as in the suite.'),
+        f'Driven through {MODES[trials[0].through]}; '
+        + (f'set: {changed}.' if changed else 'all parameters as in the suite.'),
     ]
-    rows = told_once(verdicts)
-    told = [_linked(texts, row) for texts, row in zip(texts_of(rows, results, verdicts), rows, strict=True)]
-    failed = sum(row.has_failed for row in rows)
-    tables = [Table(HEADS, told[:failed], 'Exceeded', frozenset(range(failed)))] if failed else []
-    tables.append(Table(HEADS, told, 'all limits, the worst first', frozenset(range(failed)), folded=True))
-    findings = [_finding(each, results[each.name], verdicts[each.name]) for each in order.manoeuvres]
-    return Section('overview', 'Overview', words, None, tables, findings)
-
-
-def _linked(row: Sequence[str], verdict: Verdict) -> list[Cell]:
-    if row[1] != verdict.manoeuvre:
-        return list(row)
-    return [row[0], Link(row[1], verdict.manoeuvre), *row[2:]]
-
-
-def _finding(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) -> Finding:
-    if result.broke_down:
-        words: list[Cell] = [f'{result.broke_down};', not_judged(verdicts)]
-        return Finding(manoeuvre.name, BAD, [Link('broke down:', manoeuvre.name), *words])
-    worst = worst_first([each for each in verdicts if not each.limit.common] or verdicts)
-    failed = [each for each in worst_first(verdicts) if each.judged is Judged.FAILED]
-    text: list[Cell] = [Link('exceeded:' if failed else 'least left:', manoeuvre.name)]
-    for place, each in enumerate(failed or worst[:1]):
-        _, _, name, value, limit, left = cells(each)
-        share = f', {left} left' if left and not failed else ''
-        text.append(f'{"· " if place else ""}{name} {value} ({limit}{share})')
-    text += [f'· {remark}' for remark in result.remarks]
-    return Finding(manoeuvre.name, BAD if failed else GOOD, text)
+    rows: list[list[Cell]] = []
+    worst = summary(verdicts)
+    for row in worst:
+        word, name, *others = texts_of(row, results, verdicts)
+        rows.append([word, Link(name, name) if name == row.manoeuvre else name, *others])
+    marked = frozenset(place for place, row in enumerate(worst) if row.has_failed)
+    overview = Section('overview', 'Overview', words, None, [Table(HEADS, rows, '', marked)])
+    sections = [
+        _section(trial.manoeuvre, results[trial.manoeuvre.name], verdicts[trial.manoeuvre.name])
+        for trial in trials
+    ]
+    file.write_text(page('Manoeuvre suite', [overview, *sections], _NUMBERS), encoding='utf-8')
 
 
 def _section(manoeuvre: Manoeuvre, result: Result, verdicts: Sequence[Verdict]) -> Section:
+    name, about = manoeuvre.name, manoeuvre.about
     if result.broke_down:
-        words = [
-            f'{manoeuvre.about} It broke down: {result.broke_down}',
-            f'{not_judged(verdicts)}.'.capitalize(),
-        ]
-        return Section(manoeuvre.name, manoeuvre.name, words)
+        words = [f'{about} It broke down: {result.broke_down}', f'{not_judged(verdicts)}.'.capitalize()]
+        return Section(name, name, words)
     ordered = worst_first(verdicts)
-    rows = [_without_name(cells(each)) for each in ordered]
-    marked = frozenset(place for place, each in enumerate(ordered) if each.judged is Judged.FAILED)
-    reasons = [
-        [f'{row[1]} {row[3]}\n{each.limit.source}', each.limit.reason]
-        for row, each in zip(rows, ordered, strict=True)
-    ]
-    figures = [[name, number(value), MEASURES[name].meaning] for name, value in result.figures.items()]
+    rows = []
+    for each in ordered:
+        word, _, *others = cells(each)
+        rows.append([word, *others, each.limit.source, each.limit.reason])
+    marked = frozenset(place for place, each in enumerate(ordered) if each.judged == FAILED)
+    figures = [[key, number(value), MEASURES[key].meaning] for key, value in result.figures.items()]
     held = 'Within all limits.' if passed(verdicts) else 'Limits are exceeded.'
-    return Section(
-        manoeuvre.name,
-        manoeuvre.name,
-        [f'{manoeuvre.about} {held}', *result.remarks],
-        _chart(manoeuvre, result.shown),
-        [
-            Table(_without_name(HEADS), rows, '', marked),
-            Table(['limit', 'where its number comes from'], reasons, 'reasons of the limits', folded=True),
-            Table(['quantity', 'value', 'meaning'], figures, 'all figures', folded=True),
-        ],
-    )
-
-
-def _without_name(row: Sequence[str]) -> list[str]:
-    return [row[0], *row[2:]]
-
-
-def _chart(manoeuvre: Manoeuvre, shown: Shown) -> Chart | None:
-    if not shown.displacement:
-        return None
-    if manoeuvre.seat == RACK:
-        return _loops(manoeuvre.name, shown)
-    time = SAMPLE_TIME * np.arange(shown.current.size)
-    moved = [_curve(name, time, 1e3 * shown.displacement[name]) for name in _COLOURS]
-    current = Curve('current', time, shown.current, COLOUR_OF['current'])
-    return Chart(
-        manoeuvre.name,
-        manoeuvre.name,
-        'seconds of excitation (s)',
-        [Panel('displacement (mm)', moved, share=0.8), Panel('current (A)', [current], share=0.4)],
-        [Span(max(begin, 0.0), end) for begin, end in shown.damping if end > 0.0],
-        'damping on',
-        (0.0, float(time[-1])),
-    )
-
-
-def _loops(name: str, shown: Shown) -> Chart:
-    last = slice(-round(_LOOP / SAMPLE_TIME) - 1, None)
-    curves = [
-        _curve(mount, 1e3 * shown.displacement[mount][last], shown.force[mount][last]) for mount in _COLOURS
+    tables = [
+        Table(('', *HEADS[2:], 'source', 'reason of the limit'), rows, '', marked),
+        Table(('quantity', 'value', 'meaning'), figures, 'all figures', folded=True),
     ]
-    return Chart(name, name, 'displacement (mm)', [Panel('mount force (N)', curves, share=1.2)])
+    return Section(name, name, [f'{about} {held}', *result.remarks], _chart(manoeuvre, result), tables)
 
 
-def _curve(mount: str, x: Array, y: Array) -> Curve:
-    return Curve('this mount' if mount == 'driven' else mount, x, y, COLOUR_OF[_COLOURS[mount]])
+def _chart(manoeuvre: Manoeuvre, result: Result) -> Chart | None:
+    name, truths = manoeuvre.name, result.truths
+    if not truths:
+        return None
+
+    def curve(mount: str, x: Array, y: Array) -> Curve:
+        return Curve('this mount' if mount == DRIVEN else mount, x, y, COLOUR_OF[_COLOURS[mount]])
+
+    if manoeuvre.seat == RACK:
+        last = slice(-round(_LOOP / SAMPLE_TIME) - 1, None)
+        loops = [
+            curve(mount, 1e3 * truths[mount].displacement[last], truths[mount].mount_force[last])
+            for mount in _COLOURS
+        ]
+        return Chart(name, name, 'displacement (mm)', [Panel('mount force (N)', loops, share=1.2)])
+    current = truths[DRIVEN].coil_current
+    time = SAMPLE_TIME * np.arange(current.size)
+    moved = [curve(mount, time, 1e3 * truths[mount].displacement) for mount in _COLOURS]
+    panels = [
+        Panel('displacement (mm)', moved, share=0.8),
+        Panel('current (A)', [Curve('current', time, current, COLOUR_OF['current'])], share=0.4),
+    ]
+    spans = [Span(max(begin, 0.0), end) for begin, end in result.damping if end > 0.0]
+    limits = (0.0, float(time[-1]))
+    return Chart(name, name, 'seconds of excitation (s)', panels, spans, 'damping on', limits)

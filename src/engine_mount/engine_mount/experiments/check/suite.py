@@ -1,32 +1,43 @@
-"""The suite: manoeuvres with their limits, from one YAML file."""
+"""The suite: manoeuvres with their limits, from one YAML file; verdicts on their figures."""
 
 import importlib.resources
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from engine_mount.experiments.harness.contract import Settings
+from engine_mount.experiments.harness.experiment import Settings, in_one_line
 from mount_bringup.settings import checked_settings
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.quantity import ParameterError, check_name
 
 BANDS = ((3.0, 14.0), (14.0, 20.0), (20.0, 30.0), (30.0, 50.0), (20.0, 200.0))
 """Hz: resonance of the engine; the isolation bands of the sweep; what the chassis passes on as sound."""
-REFERENCES = ('hydromount', 'undamped')
 ROAD, RACK, CLOCK = 'road', 'rack', 'clock'
+SOURCES = ('contract', 'derived', 'paper', 'chosen')
+"""Where the number of a limit comes from; `chosen` ones are a decision of whoever wrote the suite."""
+_BOUNDS = ('at_most', 'at_least')
+_NODES = ('mount_sim', 'mount_control', 'mount_init', 'mount_driver')
+_LONGEST_NAME = 10  # characters: the table of verdicts fits 80 columns
+NOT_JUDGED, FAILED, PASSED, LEFT_OUT = 'not judged', 'fail', 'ok', 'none'
+"""Of a limit, the worst first: its manoeuvre broke down; exceeded; held; of real time alone."""
+_ORDER = (NOT_JUDGED, FAILED, PASSED, LEFT_OUT)
 
 
-@dataclass(frozen=True)
-class Measure:
-    """What a number means, its unit ('' for counts and ratios), and on which seat it can be told.
+class SuiteError(ValueError):
+    """A suite cannot be used; the text says where, why and the remedy."""
+
+
+class Measure(NamedTuple):
+    """The unit of a number ('' for counts and ratios), its meaning, and on which seats it is known.
 
     One with the seat `CLOCK` is of real time and not judged in core and lock-step.
     """
 
     unit: str
     meaning: str
-    seats: tuple[str, ...]
+    seats: str
 
 
 def _shipped(file: str) -> Any:
@@ -34,24 +45,8 @@ def _shipped(file: str) -> Any:
     return plain_yaml(importlib.resources.files(__package__).joinpath(file).read_text(encoding='utf-8'))
 
 
-MEASURES = {
-    name: Measure(unit, meaning, tuple(seats.split()))
-    for name, (unit, meaning, seats) in _shipped('measures.yaml').items()
-}
+MEASURES = {name: Measure(*entry) for name, entry in _shipped('measures.yaml').items()}
 """{name: what it means}. A number that is not known is exceeded, whatever its limit."""
-
-
-SOURCES = ('contract', 'derived', 'paper', 'chosen')
-"""Where the number of a limit comes from; `chosen` ones are a decision of whoever wrote the suite."""
-_BOUNDS = ('at_most', 'at_least')
-_NODES = ('mount_sim', 'mount_control', 'mount_init', 'mount_driver')
-_OF_SUITE, _OF_MANOEUVRE = ('about', 'limits', 'manoeuvres'), ('about', 'evaluated_from_s', 'set', 'limits')
-_OF_LIMIT = (*_BOUNDS, 'source', 'reason')
-_LONGEST_NAME = 10  # characters: the table of verdicts fits 80 columns
-
-
-class SuiteError(ValueError):
-    """A suite cannot be used; the text says where, why and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +72,7 @@ class Manoeuvre:
     about: str
     evaluated_from: float
     settings: Settings
-    limits: tuple[Limit, ...] = ()
+    limits: Sequence[Limit] = ()
 
     @property
     def seat(self) -> str:
@@ -85,12 +80,77 @@ class Manoeuvre:
         return RACK if self.settings['mount_sim']['scenario'] == 'bench' else ROAD
 
 
-def shipped_suite() -> tuple[Manoeuvre, ...]:
+@dataclass(frozen=True)
+class Result:
+    """The figures of a manoeuvre by the names of their measures, and what was not as it should be.
+
+    `truths` are those of the driven mount and of the others beside it, from the begin of the excitation on;
+    `damping` are the stretches (s) with damping on. `broke_down`: why there are no figures, empty where
+    there are.
+    """
+
+    figures: Mapping[str, float]
+    remarks: Sequence[str] = ()
+    truths: Mapping[str, Any] = field(default_factory=dict)
+    damping: Sequence[tuple[float, float]] = ()
+    broke_down: str = ''
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One figure against one limit; `margin` is the share that is left of it, NaN of a limit of 0."""
+
+    manoeuvre: str
+    limit: Limit
+    value: float
+    judged: str
+    margin: float
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the manoeuvre does not pass for it."""
+        return self.judged in (FAILED, NOT_JUDGED)
+
+
+def verdicts_of(manoeuvre: Manoeuvre, result: Result, *, real_time: bool) -> list[Verdict]:
+    """Return the verdicts on one manoeuvre in the order of its limits."""
+
+    def verdict(limit: Limit) -> Verdict:
+        if CLOCK in MEASURES[limit.measure].seats and not real_time:
+            return Verdict(manoeuvre.name, limit, math.nan, LEFT_OUT, math.nan)
+        if result.broke_down:
+            return Verdict(manoeuvre.name, limit, math.nan, NOT_JUDGED, math.nan)
+        value = result.figures.get(limit.measure, math.nan)
+        left = limit.value - value if limit.bound == 'at_most' else value - limit.value
+        judged = PASSED if left >= 0.0 else FAILED  # a value that is not known fails
+        return Verdict(
+            manoeuvre.name, limit, value, judged, left / abs(limit.value) if limit.value else math.nan
+        )
+
+    return [verdict(limit) for limit in manoeuvre.limits]
+
+
+def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Return the verdicts with those that failed first, then by the margin that is left."""
+
+    def key(verdict: Verdict) -> tuple[int, float]:
+        unknown = -math.inf if verdict.judged == FAILED else math.inf
+        return _ORDER.index(verdict.judged), unknown if math.isnan(verdict.margin) else verdict.margin
+
+    return sorted(verdicts, key=key)
+
+
+def passed(verdicts: Sequence[Verdict]) -> bool:
+    """Return whether no limit is exceeded, and none could not be judged."""
+    return not any(verdict.has_failed for verdict in verdicts)
+
+
+def shipped_suite() -> list[Manoeuvre]:
     """Return the manoeuvres that come with the package."""
     return suite_of(_shipped('suite.yaml'))
 
 
-def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:
+def suite_in_file(file: Path) -> list[Manoeuvre]:
     """Return the manoeuvres of a file; raises `SuiteError` with its name."""
     try:
         return suite_of(plain_yaml(text_of_file(file)))
@@ -98,69 +158,65 @@ def suite_in_file(file: Path) -> tuple[Manoeuvre, ...]:
         raise SuiteError(f'suite {file}: {error}') from None
 
 
-def suite_of(content: Any) -> tuple[Manoeuvre, ...]:
+def suite_of(content: Any) -> list[Manoeuvre]:
     """Return the manoeuvres of a suite's content; raises `SuiteError`."""
-    told = _mapping('the suite', content, _OF_SUITE)
-    common = tuple(_limits('limits', told.get('limits', {}), common=True))
-    named = _mapping('manoeuvres', told.get('manoeuvres'))
-    if not named:
+    suite = _mapping('the suite', content, ('about', 'limits', 'manoeuvres'))
+    common = list(_limits('limits', suite.get('limits', {}), common=True))
+    manoeuvres = _mapping('manoeuvres', suite.get('manoeuvres'))
+    if not manoeuvres:
         raise SuiteError('manoeuvres must name at least one manoeuvre')
-    return tuple(_manoeuvre(name, entry, common) for name, entry in named.items())
+    return [_manoeuvre(name, entry, common) for name, entry in manoeuvres.items()]
 
 
-def chosen_of(suite: Sequence[Manoeuvre], names: Collection[str]) -> tuple[Manoeuvre, ...]:
+def chosen_of(suite: Sequence[Manoeuvre], names: Collection[str]) -> list[Manoeuvre]:
     """Return the manoeuvres of these names in the order of the suite, all without names."""
-    known = [manoeuvre.name for manoeuvre in suite]
     for name in names:
-        _check_key('the suite', name, known, 'manoeuvre')
-    return tuple(manoeuvre for manoeuvre in suite if not names or manoeuvre.name in names)
+        _check_key('the suite', name, [each.name for each in suite], 'manoeuvre')
+    return [each for each in suite if not names or each.name in names]
 
 
-def _manoeuvre(name: str, entry: Any, common: tuple[Limit, ...]) -> Manoeuvre:
+def _manoeuvre(name: str, entry: Any, common: Sequence[Limit]) -> Manoeuvre:
     if len(name) > _LONGEST_NAME:
         raise SuiteError(f'{name}: a name has at most {_LONGEST_NAME} characters, this one {len(name)}')
-    told = _mapping(name, entry, _OF_MANOEUVRE)
-    begin = _number(f'{name}.evaluated_from_s', told.get('evaluated_from_s', 0.0))
+    keys = _mapping(name, entry, ('about', 'evaluated_from_s', 'set', 'limits'))
+    begin = _number(f'{name}.evaluated_from_s', keys.get('evaluated_from_s', 0.0))
     if begin < 0.0:
         raise SuiteError(f'{name}.evaluated_from_s ({begin:g} s) must be 0 or more')
-    about = _text(f'{name}.about', told.get('about'))
-    made = Manoeuvre(name, about, begin, _settings(name, told.get('set')))
-    own = tuple(_limits(name, told.get('limits', {})))
-    for limit in own:
-        if made.seat not in MEASURES[limit.measure].seats:
-            raise SuiteError(f'{name}: {limit.measure} cannot be told on a {made.seat}; leave it out')
-    shared = (limit for limit in common if made.seat in MEASURES[limit.measure].seats)
-    return replace(made, limits=(*own, *shared))
-
-
-def _settings(name: str, entry: Any) -> Settings:
-    settings: Settings = {}
-    for key, value in _mapping(f'{name}.set', entry).items():
+    about = _text(f'{name}.about', keys.get('about'))
+    settings: dict[str, dict[str, Any]] = {}
+    for key, value in _mapping(f'{name}.set', keys.get('set')).items():
         node, _, parameter = key.partition('.')
         _check_key(f'{name}.set', node, _NODES, 'node')
         settings.setdefault(node, {})[parameter] = value
     try:
-        checked = checked_settings(settings)
+        settings = checked_settings(settings)
     except ParameterError as error:
         raise SuiteError(f'{name}.set: {error}') from None
-    if 'scenario' not in checked.get('mount_sim', {}):
+    if 'scenario' not in settings.get('mount_sim', {}):
         raise SuiteError(f'{name}.set must have mount_sim.scenario, such as motorway')
-    return checked
+    seat = Manoeuvre(name, about, begin, settings).seat
+    own = list(_limits(name, keys.get('limits', {})))
+    for limit in own:
+        if seat not in MEASURES[limit.measure].seats:
+            raise SuiteError(f'{name}: {limit.measure} cannot be told on a {seat}; leave it out')
+    shared = [limit for limit in common if seat in MEASURES[limit.measure].seats]
+    return Manoeuvre(name, about, begin, settings, [*own, *shared])
 
 
 def _limits(name: str, entry: Any, *, common: bool = False) -> Iterator[Limit]:
-    for measure, told in _mapping(f'{name}', entry).items():
+    for measure, content in _mapping(name, entry).items():
         _check_key(name, measure, MEASURES, 'quantity')
         place = f'{name}.{measure}'
-        limit = _mapping(place, told, _OF_LIMIT)
+        limit = _mapping(place, content, (*_BOUNDS, 'source', 'reason'))
         source, reason = (_text(f'{place}.{key}', limit.get(key)) for key in ('source', 'reason'))
         if source not in SOURCES:
             raise SuiteError(f'{place}.source must be {", ".join(SOURCES)}; instead received {source!r}')
-        bounds = [bound for bound in _BOUNDS if bound in limit]
-        if not bounds:
+        if not limit.keys() & {*_BOUNDS}:
             raise SuiteError(f'{place} must have {" or ".join(_BOUNDS)}')
-        for bound in bounds:
-            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason, common)
+        for bound in _BOUNDS:
+            if bound in limit:
+                value = _number(f'{place}.{bound}', limit[bound])
+                yield Limit(measure, bound, value, source, reason, common)
 
 
 def _mapping(place: str, entry: Any, known: Collection[str] = ()) -> Mapping[str, Any]:
@@ -188,4 +244,4 @@ def _number(place: str, value: Any) -> float:
 def _text(place: str, value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise SuiteError(f'{place} must be a text; instead received {value!r}')
-    return ' '.join(value.split())
+    return in_one_line(value)

@@ -1,49 +1,131 @@
-"""Controller and plant together, once through: driven, recorded, and read back."""
+"""Controller and plant together: drives that are recorded and read back, many runs that are not."""
 
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, TypeVar
+
+import numpy as np
 
 from engine_mount.drives.drive import drive
-from engine_mount.experiments.harness.contract import ExperimentError, Order, Settings, Values
+from engine_mount.drives.loop.messages import Samples
+from engine_mount.drives.loop.run import run_core_into
+from engine_mount.experiments.harness.experiment import ExperimentError, Order, Settings, Values
+from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.recording import open_recording
-from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
 from mount_bringup.settings import defaults_of_nodes
+from mount_control.policy import switched_viscous
+from mount_init.initialisation import InitialisationResult
+from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.excitation import Excitation
 from mount_sim.mount_choice import with_control_of_mount
+from mount_sim.parameters import SimParameters
+from mount_sim.plant.plant import TRUTH
 
+K = TypeVar('K')
 PAPER = 'switched_viscous'
 """The policy of the paper, with which its scenes are driven."""
 
 
-def mode_of(order: Order) -> str:
-    """Return how an order's runs are driven."""
-    return 'lock-step' if order.graph else 'core'
-
-
-def settings_of_run(order: Order, own: Settings, experiment: str) -> dict[str, Values]:
-    """Return the nodes' parameters: the user's and the experiment's `own`; raises where both set the same."""
+def settings_of_run(order: Order, sim: Values, control: Values) -> dict[str, Values]:
+    """Return the nodes' parameters: the user's and the experiment's own; raises where both set one."""
     merged = {node: dict(values) for node, values in order.settings.items() if node in defaults_of_nodes()}
-    for node, values in own.items():
-        for name, value in values.items():
-            if name in merged.get(node, {}):
-                raise ExperimentError(
-                    f'{node}.{name} is set by the experiment {experiment} itself; '
-                    f'choose among the parameters of {experiment}, or use engine-mount drive'
-                )
-            merged.setdefault(node, {})[name] = value
+    for node, values in (('mount_sim', sim), ('mount_control', control)):
+        doubly = merged.setdefault(node, {}).keys() & values.keys()
+        for name in sorted(doubly):
+            raise ExperimentError(
+                f'{node}.{name} is set by the experiment {order.experiment} itself; '
+                f'choose among the parameters of {order.experiment}, or use engine-mount drive'
+            )
+        merged[node] |= values
     return with_control_of_mount(merged)
 
 
-def driven(order: Order, label: str, own: Settings, experiment: str) -> DriveSignals:
-    """Run a scenario in `order.out / label`, by plain calls or through the real nodes, and read it back.
+def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSignals]:
+    """Drive {name: parameters of the simulator} with the paper's policy, by plain calls or through the nodes.
 
-    Time and truth begin with the excitation; what rack and chassis measure is taken from the truth.
-    `own` holds the parameters that the experiment sets, `mount_sim.scenario` among them.
+    Each is recorded in a folder of its name and read back. The damper is `damper` of the case, else that of
+    the order. Time and truth begin with the excitation; what rack and chassis measure is from the truth.
     """
-    parameters = settings_of_run(order, own, experiment)
-    run = drive(core=not order.graph, lockstep=order.graph, parameters=parameters, out=order.out / label)
+    drives = {}
+    for number, (name, case) in enumerate(cases.items()):
+        order.progress(0.95 * number / len(cases), name)
+        sim = {'damper': order.parameters.damper, **case}
+        control = {'policy': PAPER, 'damper': sim.pop('damper')}
+        drives[name] = _drive(order, name, settings_of_run(order, sim, control))
+    order.progress(0.95, 'pictures')
+    return drives
+
+
+def paper_policy(order: Order) -> switched_viscous.Parameters:
+    """Return the parameters of the paper's policy in the drives of an order."""
+    return with_flattened(switched_viscous.Parameters(), order.settings.get('mount_control', {}))
+
+
+def _drive(order: Order, name: str, parameters: dict[str, Values]) -> DriveSignals:
+    out = order.out / name.replace('0 A', '0A').replace(', ', '_').replace(' ', '_')
+    run = drive(core=not order.graph, lockstep=order.graph, parameters=parameters, out=out)
     recording = open_recording(run.recording)
     if complaints := [*run.complaints, *recording.warnings]:
-        raise ExperimentError(
-            f'run {label} in {run.folder.path} was not as it should be: {"; ".join(complaints)}'
-        )
+        raise ExperimentError(f'run {name} in {out} was not as it should be: {"; ".join(complaints)}')
     signals = load_drive(recording, run.excitation_start)
     return replace(signals, recording=run.recording, truth=signals.truth.since(0.0))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run that is not recorded: the parameters of all nodes, and what makes figures of the truth.
+
+    `excitation` makes one that no scenario holds.
+    """
+
+    parameters: Settings
+    figures: Callable[[Truth, SimParameters], Values]
+    excitation: Callable[[SimParameters], Excitation] | None = None
+
+
+def run_cases(order: Order, cases: Mapping[K, Case]) -> dict[K, Values]:
+    """Return {key: figures} of all cases, run in `workers` processes of the order, 0 for one on each core."""
+    found: dict[K, Values] = {}
+    keys = list(cases)
+    for done in run_tasks(run_case, list(cases.values()), workers=order.parameters.workers):
+        if done.result is None:
+            raise done.error or ChildProcessError(done.reason)
+        found[keys[done.place]] = done.result
+        order.progress(0.95 * len(found) / len(keys), f'{len(found)} of {len(keys)} runs')
+    return found
+
+
+def run_case(case: Case) -> Values:
+    """Run one case through the same closed loop as every drive in core and return its figures."""
+    sim = with_flattened(SimParameters(), case.parameters['mount_sim'])
+    excitation = None if case.excitation is None else case.excitation(sim)
+    return case.figures(truth_of_run(case.parameters, excitation), sim)
+
+
+def truth_of_run(parameters: Settings, excitation: Excitation | None = None) -> Truth:
+    """Return the truth of a run in core from the begin of the excitation on; nothing is recorded."""
+    sink = _TruthSink()
+    outcome = run_core_into(sink, parameters, excitation=excitation)
+    records = np.concatenate(sink.blocks).view(TRUTH)[round(outcome.excitation_start / SAMPLE_TIME) :, 0]
+    columns = {each.name: records[each.name].copy() for each in fields(Truth) if each.name != 'time'}
+    return Truth(time=SAMPLE_TIME * np.arange(len(records)), **columns)
+
+
+class _TruthSink:
+    """Keeps the truth of a run, nothing else."""
+
+    def __init__(self) -> None:
+        self.blocks: list[Any] = []
+
+    def write_samples(self, samples: Samples) -> None:
+        """Take the block's truths and empty it."""
+        self.blocks.append(samples.truths[: samples.count].copy())
+        samples.count = 0
+
+    def write_result(self, stamp: int, result: InitialisationResult) -> None:
+        """Let the initialisation's result pass: the controller has it."""
+
+    def write_off(self, stamp: int) -> None:
+        """Let the last setpoint pass."""

@@ -14,18 +14,39 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from engine_mount.reports.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
+from engine_mount.reports.drawing.style import (
+    COLOURS,
+    HYDROMOUNT_COLOUR,
+    LEVEL_COLOUR,
+    SPAN_COLOUR,
+    UNDAMPED_COLOUR,
+)
+from engine_mount.reports.drive.signals import Seen
 
 BLUE, RED, GREY = COLOURS[0], LEVEL_COLOUR, SPAN_COLOUR
 """Of the friction mount and other lines; of levels and what stands out; of shades."""
+HYDRO_LINE = {'color': HYDROMOUNT_COLOUR, 'linestyle': '--'}
+OFF_LINE = {'color': UNDAMPED_COLOUR, 'linestyle': ':'}
+"""Of the hydromount; of a mount without current or without friction."""
 _WIDTH = 10.0  # inches
 _DPI = 100
 _LAYOUT: Literal['constrained'] | None = 'constrained'
 _COLOURS = 256  # the most that a palette holds
 
 
-def new_figure(title: str, height: float = 5.0) -> Figure:
-    """Return an empty picture of 1000 pixels width and `height` (inches)."""
+def new_panels(title: str, rows: int = 1, columns: int = 1, height: float = 5.0, **more: Any) -> Any:
+    """Return a picture of 1000 pixels width and `height` (inches), and its panels, one or an array."""
+    figure = _empty(title, height)
+    return figure, figure.subplots(rows, columns, **more)
+
+
+def new_mosaic(title: str, places: Any, height: float, **more: Any) -> Any:
+    """Return the same with panels by the names in `places`."""
+    figure = _empty(title, height)
+    return figure, figure.subplot_mosaic(places, **more)
+
+
+def _empty(title: str, height: float) -> Figure:
     figure = Figure(figsize=(_WIDTH, height), layout=_LAYOUT)
     figure.suptitle(title)
     return figure
@@ -36,10 +57,37 @@ def family(count: int) -> Sequence[Any]:
     return [colormaps['viridis'](0.9 * k / max(count - 1, 1)) for k in range(count)]
 
 
-def finish(figure: Figure, file: Path, *, grid: bool = True) -> Path:
-    """Put a grid behind all axes, write `figure` to `file` (PNG) and return it."""
-    if grid:
-        for axes in figure.axes:
+def legend_below(figure: Any, axes: Any, columns: int, **more: Any) -> None:
+    """Put the legend of `axes` below all panels."""
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=columns, **more)
+
+
+def shade_damping(axes: Any, seen: Seen, within: Any, alpha: float) -> None:
+    """Shade the samples `within` at which damping is on."""
+    axes.fill_between(
+        seen.time[within],
+        0.0,
+        1.0,
+        where=seen.damping_active[within],
+        color=GREY,
+        alpha=alpha,
+        transform=axes.get_xaxis_transform(),
+        label='damping on',
+        step='post',
+        linewidth=0.0,
+    )
+
+
+def draw_level(axes: Any, level: float, label: str, dash: str, width: float) -> None:
+    """Draw a level of the displacement (m) on both sides, in mm."""
+    axes.axhline(1e3 * level, color=RED, linestyle=dash, linewidth=width, label=label)
+    axes.axhline(-1e3 * level, color=RED, linestyle=dash, linewidth=width)
+
+
+def finish(figure: Any, file: Path) -> Path:
+    """Put a grid behind all axes without an image, write `figure` to `file` (PNG) and return it."""
+    for axes in figure.axes:
+        if not axes.images:
             axes.grid(alpha=0.25)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.set_dpi(_DPI)

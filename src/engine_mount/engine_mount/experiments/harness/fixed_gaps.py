@@ -24,15 +24,6 @@ RIG_CURRENTS = np.linspace(0.0, HIGHEST_CURRENT, 151)
 
 
 @dataclass(frozen=True)
-class RigNoise:
-    """Standard deviations of the rig's sensors: force (N) and the ratio of flux rate to current rate (1)."""
-
-    force: float = 0.0
-    inductance_ratio: float = 0.0
-    seed: int = 0
-
-
-@dataclass(frozen=True)
 class RigMeasurements:
     """Gaps (m, shape (G,)), currents (A, (I,)), force (N, (G, I)) and incremental inductance (H, (G, I))."""
 
@@ -40,7 +31,6 @@ class RigMeasurements:
     currents: FloatArray
     force: FloatArray
     inductance: FloatArray
-    turns_area: float
 
 
 def measure_actuator(
@@ -48,21 +38,25 @@ def measure_actuator(
     coil: RippleCoil,
     gaps: npt.ArrayLike = RIG_GAPS,
     currents: npt.ArrayLike = RIG_CURRENTS,
-    noise: RigNoise | None = None,
+    *,
+    force_noise: float = 0.0,
+    ratio_noise: float = 0.0,
+    seed: int = 0,
 ) -> RigMeasurements:
-    """Return force and ripple inductance at every pair of `gaps` (m) and `currents` (A), the gap held."""
+    """Return force and ripple inductance at every pair of `gaps` (m) and `currents` (A), the gap held.
+
+    The noises are standard deviations: of the force (N), of the ratio of flux rate to current rate (1).
+    """
     gaps, currents = np.asarray(gaps, float), np.asarray(currents, float)
     turns_area = actuator.turns * actuator.gap_area
-    shape = (gaps.size, currents.size)
-    force, inductance = np.empty(shape), np.empty(shape)
-    for row, gap in enumerate(gaps):
-        for column, current in enumerate(currents):
-            force[row, column] = magnetic_force(actuator, current, gap)
-            inductance[row, column] = measured_inductance(
-                turns_area, flux_rate(coil, actuator, current), current_rate(coil, actuator, current, gap)
-            )
-    if noise is not None:
-        random = np.random.default_rng(noise.seed)
-        force = force + noise.force * random.standard_normal(shape)
-        inductance = inductance * (1.0 + noise.inductance_ratio * random.standard_normal(shape))
-    return RigMeasurements(gaps, currents, force, inductance, turns_area)
+    force, inductance = np.empty((2, gaps.size, currents.size))
+    for place in np.ndindex(force.shape):
+        gap, current = gaps[place[0]], currents[place[1]]
+        force[place] = magnetic_force(actuator, current, gap)
+        inductance[place] = measured_inductance(
+            turns_area, flux_rate(coil, actuator, current), current_rate(coil, actuator, current, gap)
+        )
+    random = np.random.default_rng(seed)
+    force += force_noise * random.standard_normal(force.shape)
+    inductance *= 1.0 + ratio_noise * random.standard_normal(force.shape)
+    return RigMeasurements(gaps, currents, force, inductance)

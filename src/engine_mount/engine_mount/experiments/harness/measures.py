@@ -1,13 +1,13 @@
 """Figures of a displacement or an acceleration at 1 kHz that several experiments share."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
-from engine_mount.experiments.harness.contract import Values
-from engine_mount.reports.drive.signals import FloatArray
+from engine_mount.experiments.harness.experiment import Values
+from engine_mount.reports.drive.signals import FloatArray, Truth
 from mount_models.sampling import SAMPLE_TIME
 
 Band = tuple[float, float]
@@ -28,6 +28,11 @@ def sweep_parameters(level: float, last: float, idle: float = 0.0) -> Values:
     }
 
 
+def swept_frequency(count: int) -> FloatArray:
+    """Return the frequency (Hz) of a sweep at its first `count` samples."""
+    return FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(count)
+
+
 def peak_in(frequency: FloatArray, displacement: FloatArray, band: Band) -> float | None:
     """Return the largest displacement (m) while the sweep passes a band (Hz), None where it does not."""
     within = _passing(frequency, band)
@@ -37,25 +42,27 @@ def peak_in(frequency: FloatArray, displacement: FloatArray, band: Band) -> floa
 def rms_in(frequency: FloatArray, acceleration: FloatArray, band: Band) -> float | None:
     """Return the rms of the acceleration (m/s^2) while the sweep passes a band, None where it does not."""
     within = _passing(frequency, band)
-    return float(np.sqrt(np.mean(acceleration[within] ** 2))) if within.any() else None
+    return rms(acceleration[within]) if within.any() else None
 
 
-def _passing(frequency: FloatArray, band: Band) -> NDArray[np.bool_]:
+def _passing(frequency: FloatArray, band: Band) -> Any:
     """Return which samples of a sweep are in a band; none where it does not pass all of it."""
     inside = (frequency >= band[0]) & (frequency < band[1])
     return inside & (frequency[-1] >= band[1] - 0.01)
 
 
-def peak_and_rms(displacement: FloatArray, acceleration: FloatArray) -> Values:
-    """Return the largest displacement (m) below the isolation bands and the rms (m/s^2) in each of them.
-
-    Both (n,) at 1 kHz from the begin of the sweep.
-    """
-    frequency = FIRST_FREQUENCY + RATE * SAMPLE_TIME * np.arange(displacement.size)
+def peak_and_rms(truth: Truth, *_: Any) -> Values:
+    """Return the largest displacement (m) below the isolation bands and the rms (m/s^2) in each of them."""
+    frequency = swept_frequency(truth.time.size)
     return {
-        'peak_m': peak_in(frequency, displacement, BELOW_ISOLATION),
-        'rms': [rms_in(frequency, acceleration, band) for band in ISOLATION_BANDS],
+        'peak_m': peak_in(frequency, truth.displacement, BELOW_ISOLATION),
+        'rms': [rms_in(frequency, truth.chassis_acceleration, band) for band in ISOLATION_BANDS],
     }
+
+
+def rms(values: Any) -> float:
+    """Return the rms about 0, NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float('nan')
 
 
 def rms_in_bands(values: FloatArray, bands: Sequence[Band]) -> list[float]:
@@ -67,6 +74,15 @@ def rms_in_bands(values: FloatArray, bands: Sequence[Band]) -> list[float]:
     frequency = np.fft.rfftfreq(len(values), SAMPLE_TIME)
     inside = [(frequency >= low) & (frequency < high) for low, high in bands]
     return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
+
+
+def highest_per_band(
+    frequency: FloatArray, values: FloatArray, width: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of bands of `width` (Hz), and the highest absolute value in each."""
+    numbers = np.floor(frequency / width).astype(int)
+    starts = np.flatnonzero(np.diff(numbers, prepend=numbers[0] - 1))
+    return (numbers[starts] + 0.5) * width, np.maximum.reduceat(np.abs(values), starts)
 
 
 def first_extremum(displacement: FloatArray) -> float:

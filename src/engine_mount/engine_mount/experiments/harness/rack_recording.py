@@ -45,8 +45,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
         writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(wrench)
-        channels = measured.displacement, measured.friction_force, measured.normal_force
-        rows = zip(*(channel.tolist() for channel in channels), strict=True)
+        rows = zip(measured.displacement, measured.friction_force, measured.normal_force, strict=True)
         for sample, (x, friction, clamp) in enumerate(rows):
             stamp = sample * SAMPLE_TIME_NS
             at = begin + stamp

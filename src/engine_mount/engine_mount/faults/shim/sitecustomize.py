@@ -12,23 +12,19 @@ import os
 import struct
 import sys
 import time
-
-_NUMBERS = struct.Struct('<qq')
+from typing import Any
 
 
 def _install(file):
     with open(file, 'rb') as opened:
         content = mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ)
 
-    def step():
-        return _NUMBERS.unpack_from(content)[0]
-
-    def hang():
-        return _NUMBERS.unpack_from(content)[1]
+    def numbers():
+        return struct.unpack_from('<qq', content)  # step of the clocks, pause of the control
 
     read, read_ns = time.time, time.time_ns
-    time.time = lambda: read() + 1e-9 * step()
-    time.time_ns = lambda: read_ns() + step()
+    time.time = lambda: read() + 1e-9 * numbers()[0]
+    time.time_ns = lambda: read_ns() + numbers()[0]
 
     def change_clock(module):
         now, steady = module.Clock.now, module.ClockType.STEADY_TIME
@@ -37,7 +33,7 @@ def _install(file):
             read = now(clock)
             if clock.clock_type == steady:
                 return read
-            return module.Time(nanoseconds=read.nanoseconds + step(), clock_type=clock.clock_type)
+            return module.Time(nanoseconds=read.nanoseconds + numbers()[0], clock_type=clock.clock_type)
 
         module.Clock.now = stepped
 
@@ -45,7 +41,7 @@ def _install(file):
         step = module.ControlLoop.step
 
         def hanging(loop, stamp, displacement):
-            if pause := hang():
+            if pause := numbers()[1]:
                 time.sleep(1e-9 * pause)
             return step(loop, stamp, displacement)
 
@@ -64,20 +60,15 @@ class _Finder(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path=None, target=None):
         if name not in self._changes:
             return None
-        spec = importlib.machinery.PathFinder.find_spec(name, path)
-        if spec is not None and spec.origin is not None:
-            spec.loader = _Loader(spec.name, spec.origin, self._changes[name])
+        spec: Any = importlib.machinery.PathFinder.find_spec(name, path)
+        execute, change = spec.loader.exec_module, self._changes[name]
+
+        def execute_changed(module):
+            execute(module)
+            change(module)
+
+        spec.loader.exec_module = execute_changed
         return spec
-
-
-class _Loader(importlib.machinery.SourceFileLoader):
-    def __init__(self, name, path, change):
-        super().__init__(name, path)
-        self._change = change
-
-    def exec_module(self, module):
-        super().exec_module(module)
-        self._change(module)
 
 
 if file := os.environ.get('ENGINE_MOUNT_SHIM'):

@@ -1,90 +1,14 @@
 """Measured (gap, current, force) points: are they enough, plausible, and without outliers?"""
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
+from engine_mount.identification.fitting import FloatArray
 from mount_models.quantity import LawRefusedError
 
-FloatArray = npt.NDArray[np.float64]
 Orders = tuple[int, int, int, int, int]
-
-
-def checked_points(
-    gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, orders: Orders
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return gaps (m), currents (A) and forces (N) as rows of one length, or raise `LawRefusedError`."""
-    if len(orders) != 5 or not all(1 <= order <= _HIGHEST_ORDER for order in orders):
-        raise LawRefusedError(
-            f'orders ({", ".join(str(order) for order in orders)}) must be five numbers of coefficients '
-            f'within 1 .. {_HIGHEST_ORDER}, for a1 .. a5; 4, 4, 4, 2, 4 as in Table 1'
-        )
-    arrays = np.broadcast_arrays(np.asarray(gap, float), np.asarray(current, float), np.asarray(force, float))
-    gaps, currents, forces = (np.ravel(array) for array in arrays)
-    unknowns = sum(orders)
-    if forces.size < 3 * unknowns:
-        raise LawRefusedError(
-            f'force measurements ({forces.size}) must be at least {3 * unknowns}, three per coefficient; '
-            f'measure more gaps or currents'
-        )
-    if not (np.isfinite(gaps).all() and np.isfinite(currents).all() and np.isfinite(forces).all()):
-        raise LawRefusedError('force measurements must be finite; leave out the points that failed')
-    if currents.min() < 0.0 or currents.max() <= 0.0:
-        raise LawRefusedError(
-            f'coil currents ({currents.min():.3f} .. {currents.max():.3f} A) must be 0 A or more, and some '
-            f'above it; is the polarity of the current sensor right?'
-        )
-    if forces.max() <= 0.0 or np.mean(forces) < 0.0:
-        raise LawRefusedError(
-            f'forces ({forces.min():.1f} .. {forces.max():.1f} N) must be positive where the magnet pulls; '
-            f'is the sign of the load cell right?'
-        )
-    _check_span(gaps, currents, max(orders))
-    return gaps, currents, forces
-
-
-def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
-    """Return the places of points that share a gap (m), by rising gap; measured gaps may scatter a little."""
-    order = np.argsort(gap, kind='stable')
-    span = float(gap[order[-1]] - gap[order[0]])
-    apart = np.diff(gap[order]) > max(_SAME_GAP, 0.01 * span)
-    return np.split(order, np.flatnonzero(apart) + 1)
-
-
-def check_outliers(
-    gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, tolerance: FloatArray
-) -> None:
-    """Raise `LawRefusedError` naming the points whose force lies far from the `expected` one (N).
-
-    Far is more than six standard deviations of points with like forces, and more than `tolerance` (N).
-    """
-    misfit = np.abs(force - expected) / tolerance
-    far = far_points(force, misfit)
-    if not far.size:
-        return
-    if far.size > _MANY * force.size:
-        raise LawRefusedError(
-            f'{far.size} of {force.size} points lie far from any law of this form, the worst at '
-            f'{_point(gap, current, force, expected, far[np.argmax(misfit[far])])}: are gap, current and '
-            'force of the same actuator, in the units of their columns, and taken at the same time?'
-        )
-    worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
-    named = '; '.join(_point(gap, current, force, expected, place) for place in worst)
-    others = f' and {far.size - worst.size} more' if far.size > worst.size else ''
-    raise LawRefusedError(
-        f'{far.size} of {force.size} points are outliers, off by more than {_FAR:.0f} standard deviations of '
-        f'points with like forces: {named}{others}: measure them again, or leave them out'
-    )
-
-
-def far_points(force: FloatArray, misfit: FloatArray) -> npt.NDArray[np.intp]:
-    """Return the places of outliers among misfits in units of their tolerance, by `force` (N)."""
-    order = np.argsort(force, kind='stable')
-    parts = np.array_split(order, max(1, min(_PARTS, force.size // _FEWEST_IN_PART)))
-    middles = np.array([np.median(force[part]) for part in parts])
-    scatters = np.array([1.4826 * np.median(misfit[part]) for part in parts])
-    limit = np.maximum(_FAR * np.interp(force, middles, scatters), 1.0)
-    return np.flatnonzero(misfit > limit)
-
 
 _HIGHEST_ORDER = 7
 _PARTS, _FEWEST_IN_PART = 8, 25  # chosen: noise often grows with the force
@@ -96,22 +20,57 @@ _MANY = 0.1  # chosen: that many are not outliers, something is wrong
 _NAMED = 5
 
 
-def _check_span(gaps: FloatArray, currents: FloatArray, highest_order: int) -> None:
-    groups = gap_groups(gaps)
-    span = float(gaps.max() - gaps.min())
-    steps = len(groups) if len(groups) > 1 else np.unique(gaps).size
-    needed = highest_order + 1
+class ForcePoints(NamedTuple):
+    """Measured points, rows of one length: gap (m), current (A), force (N)."""
+
+    gap: FloatArray
+    current: FloatArray
+    force: FloatArray
+
+
+def checked_points(
+    gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, orders: Orders
+) -> ForcePoints:
+    """Return points of shapes that broadcast as rows of one length, or raise `LawRefusedError`."""
+    if len(orders) != 5 or not all(1 <= order <= _HIGHEST_ORDER for order in orders):
+        raise LawRefusedError(
+            f'orders ({", ".join(str(order) for order in orders)}) must be five numbers of coefficients '
+            f'within 1 .. {_HIGHEST_ORDER}, for a1 .. a5; 4, 4, 4, 2, 4 as in Table 1'
+        )
+    arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (gap, current, force)))
+    points = ForcePoints(*(np.ravel(array) for array in arrays))
+    gaps, currents, forces = points
+    if forces.size < 3 * sum(orders):
+        raise LawRefusedError(
+            f'force measurements ({forces.size}) must be at least {3 * sum(orders)}, three per coefficient; '
+            'measure more gaps or currents'
+        )
+    if not np.isfinite(points).all():
+        raise LawRefusedError('force measurements must be finite; leave out the points that failed')
+    if currents.min() < 0.0 or currents.max() <= 0.0:
+        raise LawRefusedError(
+            f'coil currents ({currents.min():.3f} .. {currents.max():.3f} A) must be 0 A or more, and some '
+            'above it; is the polarity of the current sensor right?'
+        )
+    if forces.max() <= 0.0 or np.mean(forces) < 0.0:
+        raise LawRefusedError(
+            f'forces ({forces.min():.1f} .. {forces.max():.1f} N) must be positive where the magnet pulls; '
+            'is the sign of the load cell right?'
+        )
+    groups, needed = gap_groups(gaps), max(orders) + 1
+    held = len(groups) > 1  # else the gap was moved all the time
+    steps = len(groups) if held else np.unique(gaps).size
     if steps < needed:
         raise LawRefusedError(
             f'force measurements must span at least {needed} air gaps, one more than the longest polynomial '
             f'has coefficients; {steps} given: measure more gaps, or choose lower orders'
         )
-    if span < _SMALLEST_SPAN * gaps.max():
+    if np.ptp(gaps) < _SMALLEST_SPAN * gaps.max():
         raise LawRefusedError(
             f'air gaps ({gaps.min() * 1e6:.1f} .. {gaps.max() * 1e6:.1f} um) must span at least '
             f'{_SMALLEST_SPAN:.0%} of the largest; measure over the whole way of the halves'
         )
-    for group in groups if len(groups) > 1 else []:
+    for group in groups if held else []:
         different = np.unique(np.round(currents[group], 4)).size
         if different < _FEWEST_CURRENTS:
             raise LawRefusedError(
@@ -119,12 +78,50 @@ def _check_span(gaps: FloatArray, currents: FloatArray, highest_order: int) -> N
                 f'{gaps[group].mean() * 1e6:.1f} um there are {different}: measure more, or leave this '
                 'gap out'
             )
+    return points
 
 
-def _point(
-    gap: FloatArray, current: FloatArray, force: FloatArray, expected: FloatArray, place: int | np.intp
-) -> str:
-    return (
-        f'{gap[place] * 1e6:.1f} um, {current[place]:.3f} A: {force[place]:.1f} N, where '
-        f'{expected[place]:.1f} N would fit'
+def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
+    """Return the places of points that share a gap (m), by rising gap; measured gaps may scatter a little."""
+    order = np.argsort(gap, kind='stable')
+    span = float(gap[order[-1]] - gap[order[0]])
+    apart = np.diff(gap[order]) > max(_SAME_GAP, 0.01 * span)
+    return np.split(order, np.flatnonzero(apart) + 1)
+
+
+def check_outliers(points: ForcePoints, expected: FloatArray, tolerance: FloatArray) -> None:
+    """Raise `LawRefusedError` naming the points whose force lies far from the `expected` one (N).
+
+    Far is more than six standard deviations of points with like forces, and more than `tolerance` (N).
+    """
+    misfit = np.abs(points.force - expected) / tolerance
+    far = far_points(points.force, misfit)
+    if not far.size:
+        return
+    worst = far[np.argsort(-misfit[far], kind='stable')][:_NAMED]
+    named = [
+        f'{points.gap[k] * 1e6:.1f} um, {points.current[k]:.3f} A: {points.force[k]:.1f} N, where '
+        f'{expected[k]:.1f} N would fit'
+        for k in worst
+    ]
+    if far.size > _MANY * misfit.size:
+        raise LawRefusedError(
+            f'{far.size} of {misfit.size} points lie far from any law of this form, the worst at {named[0]}: '
+            'are gap, current and force of the same actuator, in the units of their columns, and taken at '
+            'the same time?'
+        )
+    others = f' and {far.size - worst.size} more' if far.size > worst.size else ''
+    raise LawRefusedError(
+        f'{far.size} of {misfit.size} points are outliers, off by more than {_FAR:.0f} standard deviations '
+        f'of points with like forces: {"; ".join(named)}{others}: measure them again, or leave them out'
     )
+
+
+def far_points(force: FloatArray, misfit: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the places of outliers among misfits in units of their tolerance, by `force` (N)."""
+    order = np.argsort(force, kind='stable')
+    parts = np.array_split(order, max(1, min(_PARTS, force.size // _FEWEST_IN_PART)))
+    middles = np.array([np.median(force[part]) for part in parts])
+    scatters = np.array([1.4826 * np.median(misfit[part]) for part in parts])
+    limit = np.maximum(_FAR * np.interp(force, middles, scatters), 1.0)
+    return np.flatnonzero(misfit > limit)

@@ -1,70 +1,60 @@
-"""Gap curves from ripple recordings at one or more coil temperatures, with all that is to be said of them."""
+"""Gap curves from ripple recordings at one or more coil temperatures, with figures and the specimen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from engine_mount.identification.coil.few_points import levels_of_all
-from engine_mount.identification.coil.gap_calibration import GapCalibration, calibrate_gap_curves
-from engine_mount.identification.coil.gap_point import GapPoint, RippleRecording, in_steps, measured_point
-from engine_mount.identification.coil.temperature_fit import measured_compensation, stated_compensation
-from engine_mount.identification.coil.temperature_left import COEFFICIENT_ERROR, measured, predicted
-from engine_mount.identification.coil.unique_region import UniqueRegion, unique_region, warnings
-from engine_mount.recordings.screen import Table
-from mount_models.actuator.law import ForceLaw
-from mount_models.coil.temperature import TemperatureCompensation
+from engine_mount.identification.coil.curves import CurveFit, GapCalibration, calibrate_gap_curves
+from engine_mount.identification.coil.points import GapPoint, RippleRecording, measured_point
+from engine_mount.identification.coil.temperature import (
+    gap_errors,
+    measured_compensation,
+    stated_compensation,
+)
+from engine_mount.identification.coil.unique_region import UniqueRegion, interval_text, unique_region
+from engine_mount.identification.specimen import described_files, rounded, with_part
+from engine_mount.recordings.screen import Screen, Table
+from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT, TemperatureCompensation
 from mount_models.quantity import LawRefusedError, OutsideLawError
+from mount_models.specimen import Specimen
+
+_SAME_CELSIUS = 5.0  # K, chosen
+_SOURCES = {'fitted': 'measured, used by the fit', 'held out': 'measured, held out'}
 
 
 @dataclass(frozen=True)
-class GapOrder:
-    """Where the gap is measured: A and H; the core's coefficient (1/K); temperatures (degC) held out."""
+class InductanceCalibration:
+    """Curves, their compensation and its origin, what is unique, and what temperature leaves.
 
-    rest_current: float
-    crossing_inductance: float
-    coefficient: float
-    held_out: tuple[float, ...] = ()
+    `base` gives all other values, and where the gap is measured: `rest_current`, `crossing_inductance`.
+    """
 
-
-@dataclass(frozen=True)
-class InductanceResult:
-    """Curves, their compensation and how it came about, what is unique, and what temperature leaves."""
-
+    base: Specimen
+    files: Sequence[Path]
     calibration: GapCalibration
     compensation: TemperatureCompensation | None
     compensated_by: str
     region: UniqueRegion
-    left: list[dict[str, Any]]
+    temperature_errors: list[dict[str, Any]]
     warnings: list[str]
 
-    def tables(self) -> list[Table]:
-        """Return the residuals by gap, and what temperature leaves."""
-        return [self._residuals(), self._temperatures()]
+    @property
+    def tables(self) -> list[GapPoint]:
+        """The points that were interpolated from tables of few points."""
+        return [point for point in self.calibration.points if point.table is not None]
 
-    def sentences(self) -> list[str]:
-        """Return what the figures say."""
-        inductance, crossing = self.calibration.inductance, self.calibration.crossing
-        curve = inductance.polynomial
-        return [
-            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard deviation '
-            f'of a gap by the curve alone {inductance.largest_gap_std * 1e6:.2f} um at rest, '
-            f'{crossing.largest_gap_std * 1e6:.2f} um at contact',
-            f'the inductance tells the gap at {_intervals(self.region.falling, 1.0)} A (falls with the gap) '
-            f'and {_intervals(self.region.rising, 1.0)} A (rises), and by its current at '
-            f'{_intervals(self.region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown',
-            f'temperature compensation: {self.compensated_by}',
-            *_of_tables(self.calibration.points),
-            *([_OPTIMISTIC] if any(row['source'] == 'predicted' for row in self.left) else []),
-        ]
+    @property
+    def table_currents(self) -> tuple[float, float]:
+        """The range of currents (A) that all tables of few points have."""
+        low, high = zip(*(point.table for point in self.tables if point.table), strict=True)
+        return max(low), min(high)
 
     def figures(self) -> dict[str, Any]:
         """Return parameters and errors for JSON; SI units, temperatures in degC."""
-        fits = {
-            'inductance_of_gap': self.calibration.inductance,
-            'crossing_current_of_gap': self.calibration.crossing,
-        }
+        fits, compensation = self.calibration, self.compensation
         return {
             'curves': {
                 name: {
@@ -74,7 +64,10 @@ class InductanceResult:
                     'gap_rms_m': fit.gap_rms,
                     'largest_gap_std_m': fit.largest_gap_std,
                 }
-                for name, fit in fits.items()
+                for name, fit in (
+                    ('inductance_of_gap', fits.inductance),
+                    ('crossing_current_of_gap', fits.crossing),
+                )
             },
             'points': [
                 {
@@ -85,7 +78,7 @@ class InductanceResult:
                     'crossing_current_a': point.crossing_current,
                     'crossing_current_std_a': point.crossing_std,
                 }
-                for point in self.calibration.points
+                for point in fits.points
             ],
             'unique': {
                 'falling_a': self.region.falling,
@@ -94,18 +87,16 @@ class InductanceResult:
             },
             'temperature': {
                 'compensated_by': self.compensated_by,
-                'coefficient_per_k': None
-                if self.compensation is None
-                else self.compensation.conductivity_coefficient,
-                'gap_error_um': self.left,
+                'coefficient_per_k': compensation and compensation.conductivity_coefficient,
+                'gap_error_um': self.temperature_errors,
             },
             'warnings': self.warnings,
         }
 
-    def _residuals(self) -> Table:
-        points, inductance = self.calibration.points, self.calibration.inductance
-        errors = zip(points, inductance.gap_errors, self.calibration.crossing.gap_errors, strict=True)
-        rows = [
+    def report(self, screen: Screen) -> None:
+        """Show the residuals by gap, what temperature leaves, and where the gap is unique."""
+        points, fits, region = self.calibration.points, self.calibration, self.region
+        rows: list[tuple[str, ...]] = [
             (
                 f'{point.gap * 1e6:.1f}',
                 f'{point.inductance * 1e3:.3f}',
@@ -113,156 +104,135 @@ class InductanceResult:
                 f'{point.crossing_current:.4f}',
                 f'{contact * 1e6:+.2f}',
             )
-            for point, rest, contact in errors
+            for point, rest, contact in zip(
+                points, fits.inductance.gap_errors, fits.crossing.gap_errors, strict=True
+            )
         ]
-        heads = ('air gap (µm)', 'L at rest (mH)', 'error', 'crossing (A)', 'error')
-        return Table('gap curves: error of the curve as a gap (µm)', 'rrrrr', rows, heads)
-
-    def _temperatures(self) -> Table:
+        heads: tuple[str, ...] = ('air gap (µm)', 'L at rest (mH)', 'error', 'crossing (A)', 'error')
+        screen.table(Table('gap curves: error of the curve as a gap (µm)', 'rrrrr', rows, heads))
         names = ('rest_uncompensated_um', 'rest_um', 'contact_uncompensated_um', 'contact_um')
         rows = [
             (f'{row["celsius"]:.0f}', *(f'{row[name]:.1f}' for name in names), _SOURCES[row['source']])
-            for row in self.left
+            for row in self.temperature_errors
         ]
         heads = ('degC', 'at rest', 'compensated', 'at contact', 'compensated', 'from')
-        return Table('largest gap error by coil temperature (µm)', 'rrrrrl', rows, heads)
+        screen.table(Table('largest gap error by coil temperature (µm)', 'rrrrrl', rows, heads))
+        curve = fits.inductance.polynomial
+        screen.say(
+            f'valid within {curve.low * 1e6:.1f} .. {curve.high * 1e6:.1f} um; largest standard deviation '
+            f'of a gap by the curve alone {fits.inductance.largest_gap_std * 1e6:.2f} um at rest, '
+            f'{fits.crossing.largest_gap_std * 1e6:.2f} um at contact'
+        )
+        screen.say(
+            f'the inductance determines the gap at {interval_text(region.falling)} A (falls with the gap) '
+            f'and {interval_text(region.rising)} A (rises), and by its current at '
+            f'{interval_text(region.levels, 1e3)} mH; elsewhere it is ambiguous or unknown'
+        )
+        screen.say(f'temperature compensation: {self.compensated_by}')
+        if self.tables:
+            low, high = self.table_currents
+            rest, contact = (
+                1e3 * max(getattr(point, name) for point in self.tables)
+                for name in ('inductance_std', 'crossing_std')
+            )
+            screen.say(
+                f'{len(self.tables)} of {len(points)} recordings are tables of few points, measured within '
+                f'{low:.2f} .. {high:.2f} A: in between by interpolation, good to {rest:.2g} mH at rest and '
+                f'to {contact:.2g} mA of the crossing current, by how well the points predict each other'
+            )
+        for warning in self.warnings:
+            screen.note(warning, 'warning')
+
+    def specimen(self, name: str = '') -> Specimen:
+        """Return the base under `name` with the curves and their compensation; raises `SpecimenError`."""
+        fits, curve = self.calibration, self.calibration.inductance.polynomial
+        valid: dict[str, Any] = {'gap': [curve.low, curve.high]}
+        if self.tables:
+            valid['interpolated_within_current'] = rounded(self.table_currents)
+        origin = {
+            'valid': valid,
+            'celsius': rounded(float(np.mean([point.celsius for point in fits.points]))),
+            'temperature_compensation': self.compensated_by,
+            'inductance_of_gap': _fit_entry(fits.inductance),
+            'crossing_current_of_gap': _fit_entry(fits.crossing),
+        }
+        recordings = described_files(self.files)
+        return with_part(
+            self.base, name, 'gap_curves', recordings, origin, gap_curves=fits.curves,
+            temperature=self.compensation,
+        )  # fmt: skip
+
+    def draw(self, file: Path) -> None:
+        """Write the picture of map, curves and what temperature leaves to `file` (PNG)."""
+        from engine_mount.identification.pictures import draw_gap_curves
+
+        draw_gap_curves(self, file)
 
 
 def calibrate_inductance(
-    recordings: Sequence[RippleRecording], law: ForceLaw, order: GapOrder
-) -> InductanceResult:
-    """Return the calibration; raises `LawRefusedError`."""
-    points = _points(recordings, order)
-    fitted = [point for point in points if not _is_held_out(point, order)]
-    by_temperature = _by_temperature(fitted)
-    if not by_temperature:
+    recordings: Sequence[RippleRecording],
+    base: Specimen,
+    files: Sequence[Path],
+    coefficient: float = CONDUCTIVITY_COEFFICIENT,
+    held_out: Sequence[float] = (),
+) -> InductanceCalibration:
+    """Return the calibration by the core's `coefficient` (1/K); raises `LawRefusedError`.
+
+    Recordings at temperatures `held_out` (degC) only judge it.
+    """
+    points = [measured_point(each, base.rest_current, base.crossing_inductance) for each in recordings]
+    unseen = [point for point in points if any(_alike(point.celsius, celsius) for celsius in held_out)]
+    fitted = [point for point in points if point not in unseen]
+    groups: dict[float, list[GapPoint]] = {}
+    for point in sorted(fitted, key=lambda each: each.celsius):
+        near = [key for key in groups if _alike(key, point.celsius)]
+        groups.setdefault(near[-1] if near else point.celsius, []).append(point)
+    if not groups:
         raise LawRefusedError(
             f'all {len(points)} recordings are held out; leave those out of --held-out-temperature that the '
-            f'curves shall be fitted to'
+            'curves shall be fitted to'
         )
-    own = max(by_temperature, key=lambda celsius: (len(by_temperature[celsius]), -abs(celsius - 20.0)))
-    used = [each for each, point in zip(recordings, points, strict=True) if point in by_temperature[own]]
-    region = unique_region(used)
-    found = warnings(region, order.rest_current, order.crossing_inductance)
+    own = max(groups, key=lambda celsius: (len(groups[celsius]), -abs(celsius - 20.0)))
+    here = groups.pop(own)
+    region = unique_region([each for each, point in zip(recordings, points, strict=True) if point in here])
+    warnings = region.warnings(base.rest_current, base.crossing_inductance)
     try:
-        calibration = calibrate_gap_curves(by_temperature[own])
+        calibration = calibrate_gap_curves(here)
     except LawRefusedError as error:
-        raise LawRefusedError('; '.join([str(error), *found])) from error
-    celsius = float(np.mean([point.celsius for point in by_temperature[own]]))
-    others = {key: group for key, group in by_temperature.items() if key != own}
-
-    def of_coefficient(value: float) -> TemperatureCompensation:
-        if others:
-            reference = max(others, key=lambda key: (len(others[key]), abs(key - own)))
-            return measured_compensation(calibration.curves, celsius, others[reference], value)
-        return stated_compensation(
-            calibration.curves,
-            celsius,
-            _inside(law, calibration.points),
-            law,
-            order.rest_current,
-            order.crossing_inductance,
-            value,
-        )
-
+        raise LawRefusedError('; '.join([str(error), *warnings])) from error
+    curves, celsius = calibration.curves, float(np.mean([point.celsius for point in here]))
     compensation: TemperatureCompensation | None = None
-    try:
-        compensation = of_coefficient(order.coefficient)
-        how = _how(bool(others), compensation)
-    except (LawRefusedError, OutsideLawError) as error:
-        if others:
-            raise
-        how = 'none'
-        found.append(f'coil temperature is not compensated: {error}')
-    left = measured(calibration.curves, compensation, fitted, 'fitted')
-    left += measured(
-        calibration.curves, compensation, [p for p in points if _is_held_out(p, order)], 'held out'
-    )
-    if compensation is not None:
-        left += predicted(calibration.curves, compensation, of_coefficient)
-    return InductanceResult(calibration, compensation, how, region, left, found)
-
-
-def _points(recordings: Sequence[RippleRecording], order: GapOrder) -> list[GapPoint]:
-    """Return the point of each recording; a refusal names the inductances that all of them fall through."""
-    try:
-        return [measured_point(each, order.rest_current, order.crossing_inductance) for each in recordings]
-    except LawRefusedError as error:
-        low, high = levels_of_all([in_steps(each) for each in recordings])
-        if 'fall through' not in str(error) or not low < high:
-            raise
-        raise LawRefusedError(
-            f'{error}; all {len(recordings)} recordings fall through {low * 1e3:.1f} .. {high * 1e3:.1f} mH'
-        ) from error
-
-
-def _of_tables(points: Sequence[GapPoint]) -> list[str]:
-    """Return what is to be said of points that were interpolated from tables of few points."""
-    tables = [point for point in points if point.table is not None]
-    if not tables:
-        return []
-    low, high = max(point.table[0] for point in tables), min(point.table[1] for point in tables)
-    rest, contact = (
-        max(getattr(each, name) for each in tables) for name in ('inductance_std', 'crossing_std')
-    )
-    return [
-        f'{len(tables)} of {len(points)} recordings are tables of few points, measured within {low:.2f} .. '
-        f'{high:.2f} A: in between by interpolation, good to {rest * 1e3:.2g} mH at rest and to '
-        f'{contact * 1e3:.2g} mA of the crossing current, by how well the points predict each other'
-    ]
-
-
-_OPTIMISTIC = (
-    'rows marked predicted are optimistic: they hold the error of a wrong coefficient of the core alone, not '
-    'that of the skin formula, which only recordings held out at that temperature show'
-)
-_SAME_CELSIUS = 5.0  # K, chosen
-_SOURCES = {
-    'fitted': 'measured, used by the fit',
-    'held out': 'measured, held out',
-    'predicted': f'predicted, coefficient off by up to {COEFFICIENT_ERROR:.0%}',
-}
-
-
-def _how(measured_at_two: bool, compensation: TemperatureCompensation) -> str:
-    coefficient = f'{compensation.conductivity_coefficient:g} 1/K'
-    if measured_at_two:
-        return (
-            f'measured at {compensation.calibration_celsius:.0f} and '
-            f'{compensation.reference_celsius:.0f} degC, in '
-            f'between by the coefficient of the core, {coefficient}'
+    if groups:
+        other = groups[max(groups, key=lambda key: (len(groups[key]), abs(key - own)))]
+        compensation = measured_compensation(curves, celsius, other, coefficient)
+        how = (
+            f'measured at {celsius:.0f} and {compensation.reference_celsius:.0f} degC, in between by the '
+            f'coefficient of the core, {coefficient:g} 1/K'
         )
-    return (
-        f'stated: coefficient of the core {coefficient}, share of the core from the force law; recordings at '
-        'a second temperature would measure it'
-    )
+    else:
+        try:
+            compensation = stated_compensation(curves, celsius, calibration.points, base, coefficient)
+            how = (
+                f'stated: coefficient of the core {coefficient:g} 1/K, share of the core from the force law; '
+                'recordings at a second temperature would measure it'
+            )
+        except (LawRefusedError, OutsideLawError) as error:
+            how = 'none'
+            warnings.append(f'coil temperature is not compensated: {error}')
+    errors = gap_errors(curves, compensation, fitted, 'fitted')
+    errors += gap_errors(curves, compensation, unseen, 'held out')
+    return InductanceCalibration(base, files, calibration, compensation, how, region, errors, warnings)
 
 
-def _is_held_out(point: GapPoint, order: GapOrder) -> bool:
-    return any(abs(point.celsius - celsius) <= _SAME_CELSIUS for celsius in order.held_out)
+def _alike(one: float, other: float) -> bool:
+    return abs(one - other) <= _SAME_CELSIUS
 
 
-def _by_temperature(points: Sequence[GapPoint]) -> dict[float, list[GapPoint]]:
-    """Return the points in groups of one temperature (degC)."""
-    groups: dict[float, list[GapPoint]] = {}
-    for point in sorted(points, key=lambda each: each.celsius):
-        near = [key for key in groups if abs(key - point.celsius) <= _SAME_CELSIUS]
-        groups.setdefault(near[-1] if near else point.celsius, []).append(point)
-    return groups
-
-
-def _inside(law: ForceLaw, points: Sequence[GapPoint]) -> list[GapPoint]:
-    found = [point for point in points if law.gap_low <= point.gap <= law.gap_high]
-    if len(found) < 4:
-        raise LawRefusedError(
-            f'the force law of the base holds for {law.gap_low * 1e6:.0f} .. {law.gap_high * 1e6:.0f} um, '
-            f'where only {len(found)} recordings are, 4 are needed; calibrate the actuator first and give it '
-            'as --base'
-        )
-    return found
-
-
-def _intervals(intervals: Sequence[tuple[float, float]], factor: float) -> str:
-    if not intervals:
-        return 'no'
-    return ', '.join(f'{low * factor:.2f} .. {high * factor:.2f}' for low, high in intervals)
+def _fit_entry(fit: CurveFit) -> dict[str, Any]:
+    return {
+        'degree': fit.degree,
+        'gap_rms': rounded(fit.gap_rms),
+        'largest_gap_std': rounded(fit.largest_gap_std),
+        'gap_errors': rounded(fit.gap_errors),
+        'covariance': rounded(fit.covariance),
+    }

@@ -1,7 +1,7 @@
 """How a figure is spread over a fleet, before and after the change."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,9 +14,6 @@ from engine_mount.reports.sections.section import Section, Table
 
 if TYPE_CHECKING:
     import pyarrow
-
-CHANGED = '_changed'
-"""In the name of a column: the same figure with the change."""
 
 _MOST_BINS = 30  # chosen
 _QUANTILES = (('smallest', 0.0), ('median', 0.5), ('90 %', 0.9), ('99 %', 0.99), ('largest', 1.0))
@@ -36,106 +33,84 @@ class Pair:
     whole: bool = False  # it counts something
 
     @property
-    def title(self) -> str:
-        """Its name in words, without its unit."""
-        stem, _, unit = self.name.rpartition('_')
-        return (stem if unit == self.unit.lower() else self.name).replace('_', ' ')
-
-    @property
-    def told(self) -> str:
-        """What it means, of both sides."""
-        return _OF_ONE_SIDE.sub('', self.meaning)
-
-    @property
     def moved(self) -> bool:
         """Whether the change moved it anywhere."""
         return not np.array_equal(self.before, self.after)
 
 
 def pairs_of(result: 'pyarrow.Table') -> list[Pair]:
-    """Return the figures that a result has before and after the change, where both are known."""
+    """Return the figures that a result has before and after the change, where both are known.
+
+    With the change `peak_a` is `peak_changed_a`, and `count` is `count_changed`.
+    """
     found = []
-    for name in result.column_names:
-        changed = _changed_name(name, result.column_names)
-        if changed is None:
-            continue
-        field = result.schema.field(name)
-        both = [
-            np.array(result.column(each).to_pylist(), dtype=np.float64)  # null becomes NaN
-            for each in (name, changed)
-        ]
-        known = np.isfinite(both[0]) & np.isfinite(both[1])
-        if known.any():
-            told = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
-            before, after = both[0][known], both[1][known]
-            unit, meaning = told.get('unit', ''), told.get('meaning', name)
-            found.append(Pair(name, unit, meaning, before, after, str(field.type) == 'int64'))
+    for field in result.schema:
+        stem, _, unit = field.name.rpartition('_')
+        for changed in {f'{stem}_changed_{unit}', f'{field.name}_changed'} & {*result.column_names}:
+            columns = (result[name].to_pylist() for name in (field.name, changed))
+            before, after = (np.array(column, np.float64) for column in columns)  # null becomes NaN
+            known = np.isfinite(before) & np.isfinite(after)
+            unit, meaning = (field.metadata[key].decode() for key in (b'unit', b'meaning'))
+            if known.any():
+                counts = str(field.type) == 'int64'
+                found.append(Pair(field.name, unit, meaning, before[known], after[known], counts))
     return found
 
 
 def spread(pair: Pair) -> Section:
     """Return the section about one figure: how many rows have which value, and quantiles."""
     factor, unit = handy_unit(pair.unit, [*pair.before, *pair.after])
-    before, after = factor * pair.before, factor * pair.after
-    label = f'{pair.title} ({unit})' if unit else pair.title
-    low, high = float(min(before.min(), after.min())), float(max(before.max(), after.max()))
-    edges = _edges(low, high, len(before), pair.whole)
+    both = factor * pair.before, factor * pair.after
+    stem, _, suffix = pair.name.rpartition('_')
+    title = (stem if suffix == pair.unit.lower() else pair.name).replace('_', ' ')
+    behind = f' ({unit})' if unit else ''
+    edges = _edges(np.concatenate(both), len(pair.before), pair.whole)
     panels = [
-        Panel('number of rows', _curves(*_bars(before, edges), *_bars(after, edges))),
+        Panel('number of rows', list(_curves(_bars(values, edges) for values in both))),
         Panel(
-            'share of rows at or below', _curves(*_shares(before, edges), *_shares(after, edges)), share=0.8
+            'share of rows at or below', list(_curves(_shares(values, edges) for values in both)), share=0.8
         ),
     ]
-    title = f'{pair.title[:1].upper()}{pair.title[1:]}'
-    chart = Chart(pair.name, title, label, panels, limits=(float(edges[0]), float(edges[-1])))
+    limits = float(edges[0]), float(edges[-1])
+    chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
+    form = '{:g}'.format if pair.whole else number
     rows = [
-        (word, *(_told(float(np.quantile(values, share)), pair.whole) for values in (before, after)))
-        for word, share in _QUANTILES
+        (word, *(form(float(np.quantile(values, share))) for values in both)) for word, share in _QUANTILES
     ]
-    head = (f'value ({unit})' if unit else 'value', 'as recorded', 'changed')
-    moved = int(np.count_nonzero(before != after))
+    table = Table((f'value{behind}', 'as recorded', 'changed'), rows, title='Quantiles', folded=True)
+    moved = int(np.count_nonzero(both[0] != both[1]))
     words = [
-        f'{pair.told[:1].upper()}{pair.told[1:]}, in the column {pair.name}. '
-        f'{moved} of {len(before)} rows have another value with the change.'
+        f'{_capital(_OF_ONE_SIDE.sub("", pair.meaning))}, in the column {pair.name}. '
+        f'{moved} of {len(pair.before)} rows have another value with the change.'
     ]
-    table = Table(head, rows, title='Quantiles', folded=True)
-    return Section(pair.name, title, words, chart, [table], half=True)
+    return Section(pair.name, _capital(title), words, chart, [table], half=True)
 
 
-def _told(value: float, whole: bool) -> str:
-    return f'{value:g}' if whole else number(value)
+def _capital(text: str) -> str:
+    return f'{text[:1].upper()}{text[1:]}'
 
 
-def _changed_name(name: str, names: Sequence[str]) -> str | None:
-    """Return the column of the same figure with the change: `peak_a` and `peak_changed_a`."""
-    stem, _, unit = name.rpartition('_')
-    wanted = (f'{stem}{CHANGED}_{unit}', f'{name}{CHANGED}')
-    return next((each for each in wanted if each in names), None)
-
-
-def _curves(before_x: Array, before_y: Array, after_x: Array, after_y: Array) -> list[Curve]:
-    return [
-        Curve('as recorded', before_x, before_y, COLOURS[0], steps=True, width=1.6),
-        Curve('changed', after_x, after_y, COLOURS[1], DASHED, steps=True, width=1.6),
-    ]
+def _curves(both: Iterator[tuple[Array, Array]]) -> Iterator[Curve]:
+    looks = (('as recorded', COLOURS[0], 'solid'), ('changed', COLOURS[1], DASHED))
+    for (name, colour, dash), (x, y) in zip(looks, both, strict=True):
+        yield Curve(name, x, y, colour, dash, steps=True, width=1.6)
 
 
 def _bars(values: Array, edges: Array) -> tuple[Array, Array]:
-    counts = np.histogram(values, edges)[0].astype(np.float64)
-    return edges, np.append(counts, 0.0)
+    return edges, np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
 
 
 def _shares(values: Array, edges: Array) -> tuple[Array, Array]:
-    known = np.sort(values)
-    shares = np.arange(len(known) + 1) / len(known)
-    return np.concatenate([edges[:1], known, edges[-1:]]), np.append(shares, 1.0)
+    shares = np.arange(len(values) + 1) / len(values)
+    return np.concatenate([edges[:1], np.sort(values), edges[-1:]]), np.append(shares, 1.0)
 
 
-def _edges(low: float, high: float, count: int, whole: bool) -> Array:
+def _edges(values: Array, count: int, whole: bool) -> Array:
     """Return the limits of the bins; of what is counted, each bin holds so many whole numbers.
 
-    Of `count` values 2 count^(1/3) bins (Rice's rule), so that few values make no comb.
+    Of `count` rows 2 count^(1/3) bins (Rice's rule), so that few values make no comb.
     """
+    low, high = float(values.min()), float(values.max())
     bins = min(_MOST_BINS, max(1, round(2.0 * np.cbrt(count))))
     if whole or high == low:
         step = max(1.0, np.ceil((high - low) / bins))

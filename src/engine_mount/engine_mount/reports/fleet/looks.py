@@ -47,90 +47,77 @@ class Look:
         return ' '.join(filter(None, (self.row['recording'], self.row['mount'])))
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """What both drives were given, and pairs of what came of it, in handy units; the first is compared."""
-
-    given: Panel
-    pairs: Sequence[tuple[str, str, tuple[Array, Array]]]  # name, unit, values
-
-
 def look_section(number: int, look: Look) -> Section:
     """Return the section about the recording at place `number` (1: the first) of the worst."""
     title, name = f'{number}. {look.name}', f'look_{number}'
-    words = [_difference(look.row), *([f'No picture: {look.reason}'] if look.signals is None else [])]
-    chart = None if look.signals is None else _chart(name, title, look.signals)
-    return Section(name, title, list(filter(None, words)), chart, commands=look.commands, is_listed=False)
-
-
-def _difference(row: Mapping[str, Any]) -> str:
-    """Return a sentence on the largest differences that the row tells."""
-    told = []
-    for what, column, unit in (('displacement', 'displacement', 'm'), ('setpoint', 'setpoint', 'A')):
-        largest = row.get(f'{column}_difference_largest_{unit.lower()}')
-        place = row.get(f'{column}_difference_largest_at_s')
-        if largest is not None:
+    largest = []
+    for what, unit in (('displacement', 'm'), ('setpoint', 'A')):
+        value = look.row.get(f'{what}_difference_largest_{unit.lower()}')
+        place = look.row.get(f'{what}_difference_largest_at_s')
+        if value is not None:
             at = '' if place is None else f' at {place:.3f} s'
-            told.append(f'{what} {quantity(largest, unit, signed=True)}{at}')
-    return f'Largest difference, changed minus as recorded: {"; ".join(told)}.' if told else ''
+            largest.append(f'{what} {quantity(value, unit, signed=True)}{at}')
+    words = [f'Largest difference, changed minus as recorded: {"; ".join(largest)}.'] if largest else []
+    if look.signals is None:
+        words.append(f'No picture: {look.reason}')
+    chart = None if look.signals is None else _chart(name, title, look.signals)
+    return Section(name, title, words, chart, commands=look.commands, is_listed=False)
 
 
 def _chart(name: str, title: str, signals: Signals) -> Chart:
-    time = signals.time
-    compared = signals.displacements or signals.setpoints
-    difference = np.abs(compared[1] - compared[0])
-    known = bool(np.isfinite(difference).any())
-    place = int(np.nanargmax(difference)) if known else 0
+    time, moved = signals.time, signals.displacements
+    before, after = moved or signals.setpoints
+    size = np.abs(after - before)
+    place = int(np.nanargmax(size)) if np.isfinite(size).any() else 0
     part = slice(*np.searchsorted(time, [time[place] - AROUND, time[place] + AROUND]))
-    at = place - part.start
-    shown = _shown(signals, part)
-    panels = [shown.given]
-    for number, (label, unit, (before, after)) in enumerate(shown.pairs):
-        is_compared = number == 0
-        largest = Dots('largest difference', time[place : place + 1], after[at : at + 1], LEVEL_COLOUR)
-        panels.append(
-            Panel(
-                f'{label} ({unit})',
-                [
-                    Curve('as recorded', time[part], before, COLOURS[0], width=1.6),
-                    Curve('changed', time[part], after, COLOURS[1], DASHED, width=1.6),
-                ],
-                [largest] if is_compared and known and difference[place] > 0.0 else [],
-            )
-        )
-        if is_compared:
-            panels.append(_difference_panel(label, unit, time[part], after - before))
-    begin = 'beginning of the recorded acceleration' if signals.displacements else 'first displacement sample'
-    return Chart(name, title, f'seconds from the {begin}', panels, view=_view(time, float(time[place])))
-
-
-def _view(time: Array, at: float) -> tuple[float, float]:
-    """Return what is seen at first of the time axis: around `at` (s), and nothing beyond its ends."""
-    begin = min(at - AT_FIRST, float(time[-1]) - 2.0 * AT_FIRST)
+    largest = slice(place, place + 1 if size[place] > 0.0 else place)
+    x, given = time[part], signals.given[part]
+    if moved is None:
+        curve = Curve('displacement', x, _MM * given, COLOUR_OF['displacement'])
+        panels = [
+            Panel('recorded displacement (mm)', [curve]),
+            *_compared('setpoint', 'A', 1.0, time, signals.setpoints, part, largest),
+        ]
+    else:
+        curve = Curve('acceleration', x, given, COLOURS[2])
+        setpoints = _compared('setpoint in the simulation', 'A', 1.0, time, signals.setpoints, part)
+        panels = [
+            Panel('recorded acceleration of the chassis (m/s²)', [curve]),
+            *_compared('simulated displacement', 'mm', _MM, time, moved, part, largest),
+            setpoints[0],
+        ]
+    origin = 'first displacement sample' if moved is None else 'beginning of the recorded acceleration'
+    # at first what is around the difference is seen, and nothing beyond the ends of the recording
+    begin = min(float(time[place]) - AT_FIRST, float(time[-1]) - 2.0 * AT_FIRST)
     begin = max(begin, float(time[0]))
-    return begin, min(begin + 2.0 * AT_FIRST, float(time[-1]))
+    view = begin, min(begin + 2.0 * AT_FIRST, float(time[-1]))
+    return Chart(name, title, f'seconds from the {origin}', panels, view=view)
 
 
-def _difference_panel(label: str, unit: str, time: Array, difference: Array) -> Panel:
-    factor, shown = (1.0, unit)
+def _compared(
+    label: str,
+    unit: str,
+    factor: float,
+    time: Array,
+    pair: tuple[Array, Array],
+    part: slice,
+    largest: slice | None = None,
+) -> list[Panel]:
+    """Return two panels of a part of two signals: both, with a dot at the `largest`, and the difference."""
+    x, before, after = time[part], factor * pair[0][part], factor * pair[1][part]
+    curves = [
+        Curve('as recorded', x, before, COLOURS[0], width=1.6),
+        Curve('changed', x, after, COLOURS[1], DASHED, width=1.6),
+    ]
+    dots = []
+    if largest is not None and largest.start < largest.stop:
+        dots = [Dots('largest difference', time[largest], factor * pair[1][largest], LEVEL_COLOUR)]
+    difference, scale, shown = after - before, 1.0, unit
     if unit == 'mm':
-        factor, shown = handy_unit('m', difference / _MM)
-        factor /= _MM
-    curve = Curve('difference', time, factor * difference, DIFFERENCE_COLOUR)
-    return Panel(f'{label}, changed minus as recorded ({shown})', [curve], share=0.7)
-
-
-def _shown(signals: Signals, part: slice) -> _Shown:
-    time, given = signals.time[part], signals.given[part]
-    setpoints = ('setpoint', 'A', _of(signals.setpoints, part, 1.0))
-    if signals.displacements is None:
-        curve = Curve('displacement', time, _MM * given, COLOUR_OF['displacement'])
-        return _Shown(Panel('recorded displacement (mm)', [curve]), [setpoints])
-    curve = Curve('acceleration', time, given, COLOURS[2])
-    moved = ('simulated displacement', 'mm', _of(signals.displacements, part, _MM))
-    panel = Panel('recorded acceleration of the chassis (m/s²)', [curve])
-    return _Shown(panel, [moved, ('setpoint in the simulation', 'A', setpoints[2])])
-
-
-def _of(pair: tuple[Array, Array], part: slice, factor: float) -> tuple[Array, Array]:
-    return factor * pair[0][part], factor * pair[1][part]
+        scale, shown = handy_unit('m', difference / _MM)
+        scale /= _MM
+    curve = Curve('difference', x, scale * difference, DIFFERENCE_COLOUR)
+    return [
+        Panel(f'{label} ({unit})', curves, dots),
+        Panel(f'{label}, changed minus as recorded ({shown})', [curve], share=0.7),
+    ]

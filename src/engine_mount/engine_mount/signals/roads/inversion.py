@@ -75,12 +75,12 @@ class InvertedRoad:
         return file
 
 
-def inverted(signal: Signal, speed: Speed, vehicle: Vehicle | None = None) -> InvertedRoad:
+def inverted(signal: Signal, speed: Speed) -> InvertedRoad:
     """Return the road behind an acceleration of the chassis in m/s^2, upwards, recorded at `speed`.
 
     Raises `SignalError`.
     """
-    vehicle = vehicle or Vehicle()
+    vehicle = Vehicle()
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
     acceleration = acceleration_at(even, STEP_TIME)[:]
     # the road is as if repeated for ever: a pause keeps its end from its beginning

@@ -1,6 +1,6 @@
 // Draws what the stream brings: each interval carries the least and the highest value of each line.
 
-const seen = { intervals: [], frozen: null, window: {}, told: '', chart: null };
+const seen = { intervals: [], frozen: null, window: {}, data: '', chart: null };
 const element = (name) => document.getElementById(name);
 const say = (name, text) => { element(name).textContent = text; };
 
@@ -12,27 +12,27 @@ function connect() {
   stream.onmessage = (event) => take(JSON.parse(event.data));
 }
 
-function take(told) {
-  if (told.title !== undefined) {
-    say('title', told.title);
-    document.title = told.title;
-    seen.window = told.window;
+function take(data) {
+  if (data.title !== undefined) {
+    say('title', data.title);
+    document.title = data.title;
+    seen.window = data.window;
     seen.intervals = [];
   }
-  if (told.chart) takeChart(told.chart);
-  if (told.state) takeState(told.state);
-  seen.intervals.push(...told.intervals);
+  if (data.chart) takeChart(data.chart);
+  if (data.state) takeState(data.state);
+  seen.intervals.push(...data.intervals);
   const kept = seen.window.seconds * seen.window.per_second;
   if (seen.intervals.length > 1.2 * kept) seen.intervals.splice(0, seen.intervals.length - kept);
   show();
 }
 
-function takeChart(told) {
-  const text = JSON.stringify(told);
-  if (text === seen.told) return;
-  seen.told = text;
+function takeChart(data) {
+  const text = JSON.stringify(data);
+  if (text === seen.data) return;
+  seen.data = text;
   charts.length = 0;
-  seen.chart = Object.assign(build(element('panels'), told), { live: true });
+  seen.chart = Object.assign(build(element('panels'), data), { live: true });
 }
 
 function takeState({ nodes, values, events }) {
@@ -54,7 +54,7 @@ function show() {
   const known = seen.frozen || seen.intervals, end = known.length ? known[known.length - 1][1] : 0;
   const begin = end - Number(element('span').value);
   const visible = known.filter(([, time]) => time >= begin);
-  for (const { told, lines } of seen.chart.panels) lines.forEach((line, place) => fill(line, told.keys[place], visible));
+  for (const { spec, lines } of seen.chart.panels) lines.forEach((line, place) => fill(line, spec.keys[place], visible));
   seen.chart.shown = [begin, end > begin ? end : begin + 1];
   draw(seen.chart);
 }

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import typer
 
-from engine_mount.cli.commands.fleet import example, index, query, replay, report, worst
+from engine_mount.cli.commands.fleet import asking, making
 from engine_mount.cli.help import Command, Group
 
 app = typer.Typer(
@@ -15,15 +15,15 @@ app = typer.Typer(
     rich_markup_mode='markdown',
 )
 
-_COMMANDS: tuple[tuple[str, Callable[..., None], str], ...] = (
-    ('index', index.index, index.EPILOG),
-    ('replay', replay.replay, replay.EPILOG),
-    ('query', query.query, query.EPILOG),
-    ('worst', worst.worst, worst.EPILOG),
-    ('report', report.report, report.EPILOG),
-    ('example', example.example, example.EPILOG),
+_COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
+    (making.index, making.INDEX_EPILOG),
+    (making.replay, making.REPLAY_EPILOG),
+    (asking.query, asking.QUERY_EPILOG),
+    (asking.worst, asking.WORST_EPILOG),
+    (asking.report, asking.REPORT_EPILOG),
+    (making.example, making.EXAMPLE_EPILOG),
 )
-"""Name, function and epilog of each sub-command."""
+"""Function and epilog of each sub-command."""
 
-for _name, _function, _epilog in _COMMANDS:
-    app.command(name=_name, cls=Command, epilog=_epilog)(_function)
+for _function, _epilog in _COMMANDS:
+    app.command(cls=Command, epilog=_epilog)(_function)

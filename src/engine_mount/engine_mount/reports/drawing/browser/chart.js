@@ -58,22 +58,22 @@ function unitOf(label) { return (label.match(/\(([^()]*)\)\s*$/) || ['', ''])[1]
 
 // ---- a chart and what is shown of it
 
-function build(place, told) {
-  const chart = { told, place, spike: null };
+function build(place, spec) {
+  const chart = { spec, place, spike: null };
   place.replaceChildren();
   chart.reading = add(place, 'p', 'reading');
-  chart.panels = told.panels.map((panel) => builtPanel(chart, panel));
-  if (told.spans.length) add(place, 'p', 'key', `▒ ${told.span_name}`);
+  chart.panels = spec.panels.map((panel) => builtPanel(chart, panel));
+  if (spec.spans.length) add(place, 'p', 'key', `▒ ${spec.span_name}`);
   chart.whole = wholeOf(chart);
-  chart.shown = told.view || chart.whole;
+  chart.shown = spec.view || chart.whole;
   charts.push(chart);
   return chart;
 }
 
-function builtPanel(chart, told) {
+function builtPanel(chart, spec) {
   const legend = add(chart.place, 'div', 'legend');
-  add(legend, 'b', '', told.label);
-  const lines = [...told.curves.map(withNumbers), ...told.dots.map((dots) => ({ ...withNumbers(dots), dash: 'point' }))];
+  add(legend, 'b', '', spec.label);
+  const lines = [...spec.curves.map(withNumbers), ...spec.dots.map((dots) => ({ ...withNumbers(dots), dash: 'point' }))];
   for (const line of lines) {
     line.chip = add(legend, 'button', 'chip');
     line.chip.type = 'button';
@@ -90,16 +90,16 @@ function builtPanel(chart, told) {
   }
   const canvas = add(chart.place, 'canvas', '');
   canvas.setAttribute('role', 'img');
-  canvas.setAttribute('aria-label', `${told.label} over ${chart.told.x_label}`);
-  return { told, canvas, lines, unit: unitOf(told.label) };
+  canvas.setAttribute('aria-label', `${spec.label} over ${chart.spec.x_label}`);
+  return { spec, canvas, lines, unit: unitOf(spec.label) };
 }
 
-function wholeOf({ told, panels }) {
-  if (told.limits) return told.limits;
+function wholeOf({ spec, panels }) {
+  if (spec.limits) return spec.limits;
   let low = Infinity, high = -Infinity;
   for (const { lines } of panels) for (const { x } of lines) for (const value of x) { low = Math.min(low, value); high = Math.max(high, value); }
   if (!(low < high)) return isFinite(low) ? [low - 0.5, low + 0.5] : [0, 1];
-  const room = told.panels.some(({ dots }) => dots.length) ? 0.02 * (high - low) : 0;
+  const room = spec.panels.some(({ dots }) => dots.length) ? 0.02 * (high - low) : 0;
   return [low - room, high + room];
 }
 
@@ -119,20 +119,20 @@ function draw(chart) {
 
 function paintChart(chart) {
   const style = getComputedStyle(root), ink = (name) => style.getPropertyValue(name);
-  const width = Math.max(200, chart.place.clientWidth), { x_label } = chart.told;
+  const width = Math.max(200, chart.place.clientWidth), { x_label } = chart.spec;
   for (const panel of chart.panels) paintPanel(chart, panel, width, ink);
   const rising = chart.panels.some(({ lines }) => lines.some((line) => line.rising));
   chart.reading.textContent = chart.spike === null || !rising ? '' : `${x_label.replace(/ \([^()]*\)$/, '')} ${written(chart.spike, chart.shown[1] - chart.shown[0])} ${unitOf(x_label)}`;
 }
 
-function verticalOf({ told, lines }, from, to) {
+function verticalOf({ spec, lines }, from, to) {
   let low = Infinity, high = -Infinity;
   const take = (value) => { if (value < low) low = value; if (value > high) high = value; };
   for (const { x, y, hidden } of lines)
     if (!hidden) for (let place = 0; place < x.length; place += 1) if (x[place] >= from && x[place] <= to) take(y[place]);
-  for (const { value, both } of told.levels) { take(value); if (both) take(-value); }
-  told.least.forEach(take);
-  if (told.log) {
+  for (const { value, both } of spec.levels) { take(value); if (both) take(-value); }
+  spec.least.forEach(take);
+  if (spec.log) {
     if (!(high > 0)) return [-1, 1];
     low = Math.log10(Math.max(low > 0 ? low : high * 1e-4, high * 1e-6)); high = Math.log10(high);
   }
@@ -143,9 +143,9 @@ function verticalOf({ told, lines }, from, to) {
 }
 
 function paintPanel(chart, panel, width, ink) {
-  const { told, canvas, lines } = panel, last = panel === chart.panels[chart.panels.length - 1];
+  const { spec, canvas, lines } = panel, last = panel === chart.panels[chart.panels.length - 1];
   const ratio = devicePixelRatio || 1, below = last ? BOTTOM : 6;
-  const height = Math.round((width < NARROW ? LOW_HEIGHT : HEIGHT) * told.share) + below;
+  const height = Math.round((width < NARROW ? LOW_HEIGHT : HEIGHT) * spec.share) + below;
   canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
   canvas.style.height = `${height}px`;
   const paint = canvas.getContext('2d');
@@ -154,14 +154,14 @@ function paintPanel(chart, panel, width, ink) {
   const [from, to] = chart.shown, [low, high] = verticalOf(panel, from, to);
   const right = width - RIGHT, bottom = height - (last ? BOTTOM : 4);
   const x = (value) => LEFT + ((right - LEFT) * (value - from)) / (to - from);
-  const y = (value) => bottom - ((bottom - TOP) * ((told.log ? Math.log10(value) : value) - low)) / (high - low);
+  const y = (value) => bottom - ((bottom - TOP) * ((spec.log ? Math.log10(value) : value) - low)) / (high - low);
   const area = { x, y, right, bottom, low, high };
-  paintFrame(paint, chart, told, area, last, width, ink);
+  paintFrame(paint, chart, spec, area, last, width, ink);
   paint.save();
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
   const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
   for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, chart.shown, area);
-  paintLevels(paint, told.levels, area, ink);
+  paintLevels(paint, spec.levels, area, ink);
   if (chart.spike !== null) { paint.strokeStyle = ink('--ink'); stroke(paint, Math.round(x(chart.spike)) + 0.5, 0, Math.round(x(chart.spike)) + 0.5, bottom); }
   if (chart.dragged) {
     const [begin, end] = chart.dragged.map(x);
@@ -171,29 +171,29 @@ function paintPanel(chart, panel, width, ink) {
   for (const line of lines) {
     line.chip.style.color = colourOf(line.colour);
     const found = chart.live ? [line.latest] : chart.spike === null ? [] : valuesAt(line, chart.spike);
-    const texts = new Set(found.map((value) => written(value, high - low, told.log)));
+    const texts = new Set(found.map((value) => written(value, high - low, spec.log)));
     line.number.textContent = texts.size ? ` ${[...texts].join(' … ')} ${panel.unit}` : '';
   }
 }
 
-function paintFrame(paint, chart, told, { x, right, bottom, low, high }, last, width, ink) {
+function paintFrame(paint, chart, spec, { x, right, bottom, low, high }, last, width, ink) {
   const [from, to] = chart.shown;
-  paint.fillStyle = colourOf(chart.told.span_colour);
+  paint.fillStyle = colourOf(chart.spec.span_colour);
   paint.globalAlpha = 0.15;
-  for (const { begin, end } of chart.told.spans) {
+  for (const { begin, end } of chart.spec.spans) {
     const first = Math.max(LEFT, x(begin)), wide = Math.min(right, x(end)) - first;
     if (wide > 0) paint.fillRect(first, TOP, wide, bottom - TOP);
   }
   paint.globalAlpha = 1;
   paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
   paint.textAlign = 'right'; paint.textBaseline = 'middle';
-  const step = told.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
+  const step = spec.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
   for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
     const y = Math.round(bottom - ((bottom - TOP) * (place * step - low)) / (high - low)) + 0.5;
     stroke(paint, LEFT, y, right, y);
-    paint.fillText(told.log ? Number((10 ** (place * step)).toPrecision(2)) : Number((place * step).toPrecision(6)), LEFT - 6, y);
+    paint.fillText(spec.log ? Number((10 ** (place * step)).toPrecision(2)) : Number((place * step).toPrecision(6)), LEFT - 6, y);
   }
-  const stepX = niceStep(to - from, width / 90), ticks = [...chart.told.ticks];
+  const stepX = niceStep(to - from, width / 90), ticks = [...chart.spec.ticks];
   if (!ticks.length || ticks.length > width / 40) {
     ticks.length = 0;
     for (let place = Math.ceil(from / stepX); place * stepX <= to; place += 1) ticks.push(place * stepX);
@@ -207,7 +207,7 @@ function paintFrame(paint, chart, told, { x, right, bottom, low, high }, last, w
     if (last) paint.fillText(Number(tick.toPrecision(8)), at > right - 8 ? right + RIGHT : at, bottom + 4);
   }
   paint.textAlign = 'center';
-  if (last) paint.fillText(chart.told.x_label, (LEFT + right) / 2, bottom + 20);
+  if (last) paint.fillText(chart.spec.x_label, (LEFT + right) / 2, bottom + 20);
 }
 
 function stroke(paint, x0, y0, x1, y1) { paint.beginPath(); paint.moveTo(x0, y0); paint.lineTo(x1, y1); paint.stroke(); }

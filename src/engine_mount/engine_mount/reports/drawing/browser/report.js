@@ -21,7 +21,7 @@ function pan(chart, share) {
 
 function read(chart, x) { // one line through all panels over the same axis
   for (const other of charts) {
-    if (other !== chart && !(other.told.x_label === chart.told.x_label && chart.told.x_label.startsWith('time'))) continue;
+    if (other !== chart && !(other.spec.x_label === chart.spec.x_label && chart.spec.x_label.startsWith('time'))) continue;
     if (x !== null || other.spike !== null) { other.spike = x; draw(other); }
   }
 }
@@ -104,7 +104,7 @@ root.dataset.drawn = 0;
     const chart = build(place, JSON.parse(place.nextElementSibling.textContent));
     place.tabIndex = 0;
     place.setAttribute('role', 'group');
-    place.setAttribute('aria-label', `${chart.told.title}: arrow keys move, plus and minus zoom, 0 shows all`);
+    place.setAttribute('aria-label', `${chart.spec.title}: arrow keys move, plus and minus zoom, 0 shows all`);
     listen(chart);
     draw(chart);
     root.dataset.drawn = Number(root.dataset.drawn) + 1;

@@ -1,0 +1,230 @@
+"""What an experiment is: parameters, a procedure, figures, claims of the paper, pictures."""
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from mount_models.damper import damper_curve
+from mount_models.quantity import ParameterError, Quantity, flattened, with_flattened
+
+Seed = Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)]
+Workers = Annotated[int, Quantity('1', 'processes; 0: one for each core', 0, 256)]
+
+Values = dict[str, Any]
+"""Plain numbers, texts, lists and mappings by name."""
+Settings = Mapping[str, Mapping[str, Any]]
+"""{owner: {parameter: value}}; an owner is a node or an experiment."""
+
+
+class ExperimentError(ValueError):
+    """An experiment cannot be run as ordered; the text says why and the remedy."""
+
+
+class Holds(Enum):
+    """Whether what the paper says came out."""
+
+    YES = 'yes'
+    PARTLY = 'partly'
+    NO = 'no'
+    NOT_COMPARABLE = 'not comparable'
+
+
+PARTLY, NOT_COMPARABLE = Holds.PARTLY, Holds.NOT_COMPARABLE
+Verdict = tuple[Any, str]
+"""`Holds`, or what is true or false, and a text on what came out, with numbers."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the paper says at `reference`, in our words, what was `found`, and whether it holds."""
+
+    reference: str
+    paper: str
+    found: str
+    holds: Holds
+
+
+Judge = Callable[[Any], Verdict]
+_CLAIMS: dict[str, dict[str, Callable[[Any], Claim]]] = defaultdict(dict)
+
+
+def claim(reference: str, *, paper: str) -> Callable[[Judge], Judge]:
+    """Add a function from figures to a verdict to the claims about the experiment of its module."""
+
+    def add(judge: Judge) -> Judge:
+        def judged(figures: Any) -> Claim:
+            answer, found = judge(figures)
+            holds = answer if isinstance(answer, Holds) else Holds.YES if answer else Holds.NO
+            return Claim(reference, in_one_line(paper), in_one_line(found), holds)
+
+        _CLAIMS[judge.__module__][judge.__name__] = judged
+        return judge
+
+    return add
+
+
+def in_one_line(text: str) -> str:
+    """Return a text that was set in several lines as one."""
+    return ' '.join(text.split())
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is wanted: a folder, the experiment's parameters, those of the nodes, and the real nodes or not.
+
+    `progress` takes the share that is done, 0 .. 1, and what is being done.
+    """
+
+    experiment: str
+    out: Path
+    parameters: Any
+    settings: Settings = field(default_factory=dict)
+    graph: bool = False
+    progress: Callable[[float, str], None] = lambda share, what: None
+
+    @property
+    def mode(self) -> str:
+        """How drives of this order are driven."""
+        return 'lock-step' if self.graph else 'core'
+
+    def shown_on(self, bar: Callable[[float, str], None]) -> 'Order':
+        """Return the order with its progress on a bar."""
+        return replace(self, progress=lambda share, what: bar(share, f'{self.experiment}: {what}'))
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a procedure returns; `figures` is what `--json` writes: plain numbers, texts, lists, mappings.
+
+    `pictures` are {name: figure of matplotlib, or the file where one is written}; `pages` are {file name:
+    Markdown}, which find the pictures in `figures/`. Claims are judged from `judged`, by default the figures.
+    """
+
+    figures: Values
+    pictures: Mapping[str, Any]
+    recordings: Sequence[Path] = ()
+    pages: Mapping[str, str] = field(default_factory=dict)
+    judged: Any = None
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment; `defaults` is the parameter set that `--set NAME.PARAMETER=VALUE` changes.
+
+    `reference` is what it repeats of the paper, `summary` one paragraph on how. `closed_loop`: it drives
+    through controller and plant, so parameters of the nodes can be set too and `--graph` makes sense.
+    `needs`: the parameter that only the user can give; such an experiment is not among `all`.
+    """
+
+    name: str
+    title: str
+    reference: str
+    summary: str
+    defaults: NamedTuple
+    procedure: Callable[[Order], Findings]
+    closed_loop: bool = False
+    needs: str = ''
+
+    def known_settings(self) -> dict[str, Values]:
+        """Return {name: {parameter: default}} of the experiment's own parameters."""
+        return {self.name: flattened(self.defaults)}
+
+    def order(self, out: Path, settings: Settings, **more: Any) -> Order:
+        """Return the order with checked parameters; raises `ParameterError` for what is out of range."""
+        parameters = with_flattened(self.defaults, settings.get(self.name, {}))
+        if hasattr(parameters, 'damper'):
+            damper_curve(parameters.damper)  # refuses an unknown one
+        nodes = {node: values for node, values in settings.items() if node != self.name}
+        return Order(self.name, out, parameters, nodes, **more)
+
+    def run(self, order: Order) -> 'Outcome':
+        """Run the procedure, judge the claims, write pictures and pages."""
+        from engine_mount.experiments.harness.drawing import finish  # here, for it takes long to load
+
+        found = self.procedure(order)
+        order.out.mkdir(parents=True, exist_ok=True)
+        judged = found.figures if found.judged is None else found.judged
+        claims = [judge(judged) for judge in _CLAIMS[self.procedure.__module__].values()]
+        folder = order.out / 'figures' if found.pages else order.out
+        pictures = [
+            figure if isinstance(figure, Path) else finish(figure, folder / f'{name}.png')
+            for name, figure in found.pictures.items()
+        ]
+        for name, text in found.pages.items():
+            (order.out / name).write_text(text, encoding='utf-8')
+        pages = [order.out / name for name in found.pages]
+        return Outcome(self, found.figures, claims, pictures, list(found.recordings), pages)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of an experiment: figures in SI units, claims with their verdicts, and the files it made."""
+
+    experiment: Experiment
+    figures: Values
+    claims: list[Claim]
+    pictures: list[Path] = field(default_factory=list)
+    recordings: list[Path] = field(default_factory=list)
+    pages: list[Path] = field(default_factory=list)
+
+    def page(self) -> str:
+        """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`.
+
+        One that runs on what the user gave is no part of a page about the paper: its own page instead.
+        """
+        known = self.experiment
+        if known.needs:
+            return self.pages[0].read_text(encoding='utf-8')
+        pictures = ''.join(f'![{known.title}](figures/{each.name})\n\n' for each in self.pictures)
+        rows = [(each.reference, each.paper, each.found, each.holds.value) for each in self.claims]
+        pages = ''.join(f'\nAll of it: [{each.name}]({each.name})\n' for each in self.pages)
+        return f"""## {known.name}
+
+**{known.title}**, {known.reference}. {in_one_line(known.summary)}
+
+{pictures}{table(('paper', 'says', 'here', 'holds'), rows)}{pages}
+`engine-mount experiment {known.name}`
+"""
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    return table_rows([heads]) + '|' + '---|' * len(heads) + '\n' + table_rows(rows)
+
+
+def table_rows(rows: Iterable[Sequence[str]]) -> str:
+    """Return rows of a table in Markdown."""
+    return ''.join(f'| {" | ".join(row)} |\n' for row in rows)
+
+
+_EVEN = 0.02  # chosen: two rms count as even within so much of each other
+
+
+def holds_if(answers: Collection[bool]) -> Holds:
+    """Return that it holds where all answers are yes, partly where one is; without any nothing is known."""
+    if not answers:
+        return NOT_COMPARABLE
+    return Holds.YES if all(answers) else PARTLY if any(answers) else Holds.NO
+
+
+def holds_if_lower(ratios: Sequence[float]) -> Holds:
+    """Return whether it holds that all values are lower than those that they are ratios to (1)."""
+    return holds_if([ratio < 1.0 - _EVEN for ratio in ratios])
+
+
+def numbers_of(order: Order, name: str, low: float, high: float) -> list[float]:
+    """Return the numbers that a parameter lists; they must be different and within limits."""
+    text = getattr(order.parameters, name)
+    try:
+        values = [float(part) for part in text.split(',') if part.strip()]
+    except ValueError:
+        values = []
+    if not values or not all(low <= value <= high for value in values) or len(set(values)) < len(values):
+        raise ParameterError(
+            f'{order.experiment}.{name} ({text!r}) must be different numbers within {low:g} .. {high:g}, '
+            'separated by commas; a single one with a comma behind it'
+        )
+    return values

@@ -1,0 +1,137 @@
+"""Calibrate an actuator from recordings of a rack: `actuator`, `inductance`, and a simulated `rack`.
+
+Each of the first two returns a result with `figures()` in SI units, `report(screen)` for people, `draw(file)`
+and `specimen(name)`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from engine_mount.identification.actuator.calibration import ActuatorCalibration
+    from engine_mount.identification.coil.inductance import InductanceCalibration
+    from engine_mount.identification.rack import FileValues
+    from engine_mount.signals.mapping import Mapping
+
+Place = str | os.PathLike[str]
+Progress = Callable[[float, str], None]
+
+_FLOOR = 0.006  # chosen: weights as 2 N of 330 N
+
+
+def _silent(share: float, what: str) -> None:
+    pass
+
+
+def _mapping(columns: Mapping | dict[str, str] | None) -> Mapping:
+    from engine_mount.identification.rack import RACK
+    from engine_mount.signals.mapping import Mapping, with_options
+
+    if isinstance(columns, Mapping):
+        return columns
+    texts = [f'{name}={text}' for name, text in (columns or {}).items()]
+    return with_options(Mapping(), texts, known=RACK)
+
+
+def actuator(
+    files: Sequence[Place],
+    *,
+    columns: Mapping | dict[str, str] | None = None,
+    values: FileValues | None = None,
+    orders: tuple[int, int, int, int, int] = (4, 4, 4, 2, 4),
+    base: Place = '',
+    progress: Progress = _silent,
+) -> ActuatorCalibration:
+    """Return the force law, Eqs (3) and (4), fitted to measured points of gap, current and force.
+
+    `columns` is {quantity: 'COLUMN:UNIT'} for gap, current and force, `values` holds the gaps of single
+    files; `orders` are the numbers of coefficients of a1 .. a5. `base` is the specimen file that
+    gives all other values, the shipped one without. Raises `LawRefusedError` for outliers, too few gaps or
+    currents, and a law that is not positive, rising with the current and falling with the gap within the
+    measured range; and the readers' errors.
+    """
+    from engine_mount.identification.actuator.calibration import ActuatorCalibration
+    from engine_mount.identification.actuator.fit import fit_force_law
+    from engine_mount.identification.rack import FileValues, read_force
+    from mount_models.specimen import chosen_specimen
+
+    starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]
+    points = read_force(paths, _mapping(columns), values or FileValues())
+    floor = _FLOOR * float(points.force.max())
+    fit = fit_force_law(points.gap, points.current, points.force, orders, floor, progress)
+    return ActuatorCalibration(fit, starting, paths)
+
+
+def inductance(
+    files: Sequence[Place],
+    *,
+    columns: Mapping | dict[str, str] | None = None,
+    values: FileValues | None = None,
+    rest_current: float | None = None,
+    crossing_inductance: float | None = None,
+    turns_area: float | None = None,
+    supply: float | None = None,
+    coefficient: float | None = None,
+    held_out: Sequence[float] = (),
+    base: Place = '',
+) -> InductanceCalibration:
+    """Return the gap curves L_0.2 and i_20 (Fig. 4), fitted to coil ripple recorded at known gaps.
+
+    The temperature with most recordings is that of the curves. With recordings at a second one the
+    compensation is measured, else it is stated from the conductivity's `coefficient` (1/K) and the force law
+    of the `base` (a specimen file, the shipped one without). `rest_current` (A), `crossing_inductance` (H),
+    `turns_area` (m^2) and `supply` (V) are those of the base without. Recordings at temperatures `held_out`
+    (degC) only judge. Raises `LawRefusedError` and the readers' errors.
+    """
+    from engine_mount.identification.coil.inductance import calibrate_inductance
+    from engine_mount.identification.rack import FileValues, read_ripple
+    from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
+    from mount_models.specimen import chosen_specimen
+
+    starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]
+    starting = replace(
+        starting,
+        rest_current=rest_current or starting.rest_current,
+        crossing_inductance=crossing_inductance or starting.crossing_inductance,
+        turns_area=turns_area or starting.turns_area,
+        bridge=starting.bridge._replace(link_voltage=supply or starting.bridge.link_voltage),
+    )
+    recordings = read_ripple(paths, _mapping(columns), values or FileValues(), starting.turns_area)
+    chosen = CONDUCTIVITY_COEFFICIENT if coefficient is None else coefficient
+    return calibrate_inductance(recordings, starting, paths, chosen, held_out)
+
+
+def rack(
+    folder: Place,
+    *,
+    seed: int = 0,
+    noise: float = 0.01,
+    drawn: bool = False,
+    celsius: Sequence[float] = (20.0,),
+    progress: Progress = _silent,
+) -> list[Path]:
+    """Write recordings of the simulated rack into `folder`: force, ripple at 16 gaps, friction of the pads.
+
+    With `drawn` they are of another actuator with other pads, drawn by `seed` around the default ones;
+    `noise` is the relative standard deviation of each sensor, `celsius` are coil temperatures of the ripple.
+    """
+    from mount_models.friction.coefficient import FrictionCoefficients
+    from mount_models.friction.contact import FrictionContact
+    from mount_sim.rack.coil import Rack, drawn_rack, write_force, write_ripple
+    from mount_sim.rack.friction import drawn_friction, write_friction
+
+    simulated = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
+    pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
+    out, steps = Path(folder), 2 + len(celsius)
+    out.mkdir(parents=True, exist_ok=True)
+    written = [write_force(simulated, out / 'force.csv')]
+    for number, temperature in enumerate(celsius, 1):
+        progress(number / steps, 'measuring')
+        written += write_ripple(simulated, out, temperature=temperature)
+    progress(1.0 - 1.0 / steps, 'measuring')
+    return [*written, *write_friction(out, *pads, noise, seed)]

@@ -1,1 +1,0 @@
-"""How the friction drifts from drive to drive."""

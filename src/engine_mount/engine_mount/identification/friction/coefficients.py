@@ -1,0 +1,182 @@
+"""Step 3: Eqs (13), (14) through the lines of step 2, on products that are identifiable; their validation.
+
+As printed, nine numbers of a (and six of b) have scales that no measurement separates: (a_1, a_2) against
+(alpha_1, alpha_2), (b_1, b_2) against (beta_1, beta_2). Here alpha and beta are 1 at 100 N:
+
+    a = [A_1 + A_2 ln(A_3 + |v|)] [1 + s (F_N - 100 N)]      for each direction, |v| in mm/s
+    b = b_offset + (B_1 + B_2 |v|) [1 + s_b (F_N - 100 N)]
+
+Compare a and b with other results, not these numbers one by one.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from engine_mount.identification.fitting import (
+    FloatArray,
+    IdentificationError,
+    covariance_of,
+    single_threaded,
+)
+from engine_mount.identification.friction.sawtooth import StrokeLine
+from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
+
+VARIANTS = ('full', 'unloaded slope', 'constant slope')
+"""Forms of b: as above, with s_b = 0, and b = b_offset."""
+NORMALISED_AT = 100.0
+FEWEST_SPEEDS = 4
+"""In each direction: A_1, A_2, A_3 and one more."""
+SPEED_SPREAD = 2.0
+_SAME_SPEED = 0.15  # of the speed: closer ones count as one
+_SAME_LOAD = 0.05
+_TYPICAL_A = 0.005
+"""Error of a that the form of Eq (14) is allowed (chosen): noise alone would trust long strokes too much."""
+_TYPICAL_B_MM = 0.3
+_PER_100_N = np.array([1.0, 1.0, 1.0, 0.01])  # rises with the load are fitted per 100 N
+
+
+@dataclass(frozen=True)
+class CoefficientFit:
+    """Parameters of Eqs (12)-(14), and how they meet the lines: rms of a (1) and of b (1/mm).
+
+    `variant` is the form of b. `covariances` holds for the numbers that were fitted together, by their names
+    in `FrictionCoefficients`, their covariance (4, 4); with alpha_2 or beta_2 goes alpha_1 or beta_1, which
+    is 1 - 100 N times it. What was not fitted has 0. `held_out_error` is that of the full model, NaN where
+    nothing was held out.
+    """
+
+    coefficients: FrictionCoefficients
+    variant: str
+    a_rms: float
+    b_rms_mm: float
+    covariances: dict[tuple[str, ...], FloatArray]
+    held_out_error: float = math.nan
+
+
+@single_threaded()
+def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> CoefficientFit:
+    """Return the coefficients for the lines of step 2, with one of `VARIANTS`.
+
+    Without different loads nothing depends on F_N. Raises `IdentificationError` for one direction only or too
+    few speeds.
+    """
+    _check_coverage(lines)
+    loads = np.array([line.normal_force for line in lines])
+    with_load = float(np.ptp(loads)) > _SAME_LOAD * float(loads.mean())
+    values: dict[str, float] = {}
+    covariances: dict[tuple[str, ...], FloatArray] = {}
+    for side, sign in (('p', 1.0), ('n', -1.0)):
+        one_way = [line for line in lines if line.velocity * sign > 0.0]
+        (level, gain, shift, rise), covariance = _offset_fit(one_way, with_load)
+        names = (f'a_{side}1', f'a_{side}2', f'a_{side}3', f'alpha_{side}2')
+        values |= dict(zip(names, (level, gain, shift, 0.01 * rise), strict=True))
+        values[f'alpha_{side}1'] = 1.0 - 0.01 * rise * NORMALISED_AT
+        covariances[names] = covariance
+    (offset, first, second, rise), covariance = _slope_fit(lines, variant, with_load and variant == 'full')
+    names = ('b_offset', 'b_1', 'b_2', 'beta_2')
+    values |= dict(zip(names, (offset, first, second, 0.01 * rise), strict=True))
+    values['beta_1'] = 1.0 - 0.01 * rise * NORMALISED_AT
+    covariances[names] = covariance
+    fitted = FrictionCoefficients(
+        **values,
+        slope_velocity_limit=max(abs(line.velocity) for line in lines),
+        lowest_normal_force=float(loads.min()),
+        highest_normal_force=float(loads.max()),
+    )
+    a_rms, b_rms = (
+        float(np.sqrt(np.mean(np.square([form(fitted, each.velocity, each.normal_force) for each in lines]
+                                        - np.array([getattr(each, name) for each in lines])))))
+        for name, form in (('a', offset_coefficient), ('b', slope_coefficient))
+    )  # fmt: skip
+    return CoefficientFit(fitted, variant, a_rms, 1e-3 * b_rms, covariances)
+
+
+def _check_coverage(lines: Sequence[StrokeLine]) -> None:
+    for side, sign, other in (('positive', 1.0, 'negative'), ('negative', -1.0, 'positive')):
+        speeds = sorted(abs(line.velocity) for line in lines if line.velocity * sign > 0.0)
+        if not speeds:
+            raise IdentificationError(
+                f'only strokes to the {other} side ({len(lines)} strokes, 0 to the {side}); both are needed, '
+                'for each has parameters of its own: record strokes to and fro'
+            )
+        distinct = speeds[:1]
+        for speed in speeds:
+            if speed > distinct[-1] * (1.0 + _SAME_SPEED):
+                distinct.append(speed)
+        if len(distinct) < FEWEST_SPEEDS or speeds[-1] < SPEED_SPREAD * speeds[0]:
+            raise IdentificationError(
+                f'{len(distinct)} speeds to the {side} side, {1e3 * speeds[0]:.3g} .. {1e3 * speeds[-1]:.3g} '
+                f'mm/s; at least {FEWEST_SPEEDS} are needed, the highest {SPEED_SPREAD:g} times the lowest '
+                'or more: record more speeds'
+            )
+
+
+def _columns(lines: Sequence[StrokeLine], name: str, factor: float) -> tuple[FloatArray, ...]:
+    """Return speeds (mm/s), loads above 100 N (N), values of a or b, and their deviations."""
+    speed = np.array([1e3 * abs(line.velocity) for line in lines])
+    load = np.array([line.normal_force for line in lines]) - NORMALISED_AT
+    values, deviations = (
+        np.array([factor * getattr(line, each) for line in lines]) for each in (name, f'{name}_deviation')
+    )
+    return speed, load, values, deviations
+
+
+def _offset_fit(lines: Sequence[StrokeLine], with_load: bool) -> tuple[list[float], FloatArray]:
+    """Return A_1, A_2, A_3, s (per 100 N) of one direction, and their covariance."""
+    speed, load, a, deviation = _columns(lines, 'a', 1.0)
+    weight = 1.0 / np.hypot(_TYPICAL_A, deviation)
+
+    def residuals(unknowns: FloatArray) -> FloatArray:
+        level, gain, shift, rise = unknowns
+        factor = 1.0 + (0.01 * rise * load if with_load else 0.0)
+        return np.asarray(((level + gain * np.log(shift + speed)) * factor - a) * weight)
+
+    spread = max(float(a.mean()), 0.05)
+    values, covariance = _best(
+        residuals,
+        [[spread, 0.3 * spread, shift, rise] for shift in (0.1, 0.4, 1.5) for rise in (0.1, 0.4)],
+        [-5.0, 1e-4, 1e-3, 0.0],
+        [5.0, 5.0, 10.0, 0.9],
+    )
+    return [*values[:3], values[3] if with_load else 0.0], covariance
+
+
+def _slope_fit(lines: Sequence[StrokeLine], variant: str, loaded: bool) -> tuple[list[float], FloatArray]:
+    """Return b_offset, B_1, B_2, s_b (per 100 N), and their covariance."""
+    speed, load, b, deviation = _columns(lines, 'b', 1e-3)
+    weight = 1.0 / np.hypot(_TYPICAL_B_MM, deviation)
+    constant = variant == 'constant slope'
+
+    def residuals(unknowns: FloatArray) -> FloatArray:
+        offset, first, second, rise = unknowns
+        if constant:
+            return np.asarray((offset - b) * weight)
+        factor = 1.0 + (0.01 * rise * load if loaded else 0.0)
+        # without different loads b_offset and B_1 are one number
+        return np.asarray(((offset if loaded else 0.0) + (first + second * speed) * factor - b) * weight)
+
+    (offset, first, second, rise), covariance = _best(
+        residuals,
+        [[offset, -10.0, -1.0, rise] for offset in (10.0, -10.0) for rise in (0.2, 0.8)],
+        [-30.0, -100.0, -10.0, -2.0],
+        [30.0, 100.0, 10.0, 2.0],
+    )
+    if constant:
+        return [offset, 0.0, 0.0, 0.0], covariance
+    return [offset if loaded else 0.0, first, second, rise if loaded else 0.0], covariance
+
+
+def _best(
+    residuals: Callable[[FloatArray], FloatArray],
+    starts: list[list[float]],
+    low: list[float],
+    high: list[float],
+) -> tuple[list[float], FloatArray]:
+    """Return the best end of searches from all `starts`, and its covariance."""
+    ends = [least_squares(residuals, start, bounds=(low, high), x_scale='jac') for start in starts]
+    best = min(ends, key=lambda end: float(end.cost))
+    return best.x.tolist(), covariance_of(best) * np.outer(_PER_100_N, _PER_100_N)

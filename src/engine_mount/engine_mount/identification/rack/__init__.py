@@ -1,1 +1,0 @@
-"""Recordings of a rack as files: columns, units, samples."""
