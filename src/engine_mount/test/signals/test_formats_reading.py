@@ -7,6 +7,7 @@ import pytest
 from foreign_files import BEGIN, MAKERS
 
 from engine_mount.signals.formats.reading import headings, read
+from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
 
 N = 400
@@ -68,3 +69,17 @@ def test_a_column_that_is_not_there_is_refused_with_those_that_are(made):
     _, file = made
     with pytest.raises(SignalError, match=r"has no column 'yaw'; its columns are .*"):
         read(file.path, ['yaw'], file.stated)
+
+
+def test_signals_of_a_struct_have_the_times_of_the_nearest_one(tmp_path):
+    from scipy.io import savemat
+
+    structs = {
+        name: {'time': TIMES * step, 'signals': {'values': COLUMNS['az'][1], 'label': 'x'}}
+        for name, step in (('slow', 2.0), ('fast', 1.0))
+    }
+    savemat(tmp_path / 'out.mat', structs)
+    for name, rate in (('slow', 100.0), ('fast', 200.0)):
+        chosen = {'acceleration': f'{name}.signals.values:m/s^2'}
+        signal = select(tmp_path / 'out.mat', chosen).signals['acceleration']
+        assert signal.times[-1] == pytest.approx((N - 1) / rate)
