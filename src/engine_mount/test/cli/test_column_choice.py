@@ -6,7 +6,6 @@ import pytest
 from engine_mount.cli.calibration.given import rack_mapping
 from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
-from engine_mount.fleet.foreign import mapped_in, said_in
 from engine_mount.identification.friction.files import friction_mapping, read_recording
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.formats.content import Stated
@@ -45,10 +44,6 @@ def imported(file, mapping):
     )
 
 
-def fleet(file, mapping):
-    return read_files([str(file)], mapped_in(file, said_in([mapping])).mapping)[0].signals['force'].values
-
-
 def invert(file, mapping):
     scale = mapping_in_file(mapping).columns['acceleration'].scale
     said = with_options(Mapping(), ['acceleration=az'], scale=scale)
@@ -65,7 +60,7 @@ def calibrate(file, mapping):
 
 FAMILIES = [
     (drive, 'acceleration', GRAVITY, SHAKING), (invert, 'acceleration', GRAVITY, SHAKING),
-    (replay, 'displacement', 1e-3, WAY), (imported, 'displacement', 1e-3, WAY), (fleet, 'force', 1e3, FORCE),
+    (replay, 'displacement', 1e-3, WAY), (imported, 'displacement', 1e-3, WAY),
     (identify, 'displacement', 1e-3, WAY), (calibrate, 'force', 1e3, FORCE),
 ]  # fmt: skip
 
