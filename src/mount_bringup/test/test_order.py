@@ -40,6 +40,7 @@ OF_TWO = (
 def order(monkeypatch, tmp_path):
     """Return the function that orders a graph; a text with a colon as `config` is written to a file."""
     monkeypatch.setenv('ROS_DOMAIN_ID', '7')
+    monkeypatch.chdir(tmp_path)  # whatever a user has recorded in `bags` is none of the tests'
 
     def of_arguments(graph, config=None, **given):
         file = CONFIG / f'{graph}.yaml' if config is None else config

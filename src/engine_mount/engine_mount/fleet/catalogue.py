@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.fleet.job import Progress, Rows, TableJob
+from engine_mount.fleet.job import JobProgress, Rows, TableJob
 from engine_mount.fleet.motion import TRACE_COLUMNS, displacement_figures, trace_figures
 from engine_mount.fleet.places import Place, is_below, places
 from engine_mount.fleet.tables import Row
@@ -60,7 +60,7 @@ class Indexed(NamedTuple):
 def index(
     uris: Iterable[str | os.PathLike[str]],
     out: str | os.PathLike[str],
-    progress: Callable[[Progress], None] = lambda progress: None,
+    progress: Callable[[JobProgress], None] = lambda progress: None,
     **options: Any,
 ) -> Indexed:
     """Bring the catalogue in the folder `out` up to date with the recordings at and below `uris`.

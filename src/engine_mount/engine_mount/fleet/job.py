@@ -50,7 +50,7 @@ class Answer(NamedTuple):
     worker: str = ''
 
 
-class Progress(NamedTuple):
+class JobProgress(NamedTuple):
     """Recordings that are done of how many, and the rate (1/s) of those that this run reads."""
 
     done: int
@@ -93,7 +93,7 @@ class TableJob:
     def run(
         self,
         places: Sequence[Place],
-        progress: Callable[[Progress], None],
+        progress: Callable[[JobProgress], None],
         order: Mapping[str, Any] | None = None,
         stays: Callable[[str], bool] = lambda uri: False,
         **options: Any,
@@ -116,7 +116,7 @@ class TableJob:
             vanished, read = len(known.keys() - kept), []
             begin, starting = time.monotonic(), 0.0
             done = len(places) - len(left)
-            progress(Progress(done, len(places)))
+            progress(JobProgress(done, len(places)))
             for place, answer in self._answers(left, options):
                 starting = starting or time.monotonic() - begin
                 known[place.uri] = answer
@@ -126,7 +126,7 @@ class TableJob:
                         journal.write(_line(place.uri, answer))
                         journal.flush()
                 rate = len(read) / max(time.monotonic() - begin, 1e-9)
-                progress(Progress(done + len(read), len(places), rate))
+                progress(JobProgress(done + len(read), len(places), rate))
             answers = {uri: known[uri] for uri in sorted(kept)}
             return Finished(self._write_tables(answers), answers, read, vanished, starting)
 

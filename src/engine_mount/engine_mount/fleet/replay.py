@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import Progress, Rows, TableJob
+from engine_mount.fleet.job import JobProgress, Rows, TableJob
 from engine_mount.fleet.places import Place, root_of, select_recordings
 from engine_mount.fleet.runner import LOCAL, processes_for
 from engine_mount.fleet.setpoints import (
@@ -53,7 +53,7 @@ def replay_fleet(
     changes: Parameters,
     out: Path,
     closed_loop: bool = False,
-    progress: Callable[[Progress], None] = lambda progress: None,
+    progress: Callable[[JobProgress], None] = lambda progress: None,
     **options: Any,
 ) -> Replayed:
     """Replay the recordings of catalogues, URIs and paths into the folder `out`, as recorded and changed.
