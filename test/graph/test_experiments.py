@@ -30,9 +30,11 @@ def test_an_experiment_through_the_nodes_gives_the_setpoints_and_figures_of_the_
     for out in (core, lockstep):
         found[out] = json.loads(out.with_suffix('.json').read_text())
         assert found[out].pop('mode') == out.name
-        assert f'mode: {out.name}' in recorded_session(engine_mount.open(out / '20mm_friction' / 'recording'))
+        assert f'mode: {out.name}' in recorded_session(
+            engine_mount.open(out / '20_mm_friction' / 'recording')
+        )
     assert found[core] == found[lockstep]
-    for run in ('20mm_friction', '20mm_hydromount', '20mm_friction_0A'):
+    for run in ('20_mm_friction', '20_mm_hydromount', '20_mm_friction_0A'):
         assert _setpoints(core / run) == _setpoints(lockstep / run)
 
 

@@ -36,18 +36,22 @@ def draw_drive(subject: Subject, begin: float, title: str, *files: Path) -> None
 def draw_comparison(comparison: Comparison, a: Recording, b: Recording, file: Path) -> None:
     """Write displacement and current of `a` and `b` and B - A to `file` (PNG).
 
-    Left the whole time, right around the largest difference of the most important signal. Raises `ValueError`
-    where neither was recorded.
+    Left the whole time, right around the largest difference of the most important signal; of several mounts
+    the one that it belongs to. Raises `ValueError` where neither was recorded.
     """
+    important = [signal for signal in by_importance(comparison.signals) if signal.largest or signal.first]
+    mount = important[0].mount.strip('/') if important else ''
+    if len(a.mounts) > 1:
+        mount = mount or a.mounts[0]
+        a, b = a.of_mount(mount), b.of_mount(mount)
     subjects = subjects_of([a, b])
     subjects[1].comparison = comparison
     chart = traces(subjects).chart
     if chart is None:
         raise ValueError('neither displacement nor current was recorded: there is nothing to draw')
     views: dict[str, Limits | None] = {'': None}
-    moments = (signal.largest or signal.first for signal in by_importance(comparison.signals))
-    if (centre := next(filter(None, moments), None)) is not None:
+    if important and (centre := important[0].largest or important[0].first) is not None:
         views[f'around {centre.time:.3f} s'] = (centre.time - _AROUND, centre.time + _AROUND)
-    state = 'equal' if comparison.equal else 'different'
+    state = f'{mount} ' * bool(a.mount) + ('equal' if comparison.equal else 'different')
     title = f'A {comparison.name_a}, B {comparison.name_b}: {state}'
     draw_chart(replace(chart, title=title), file, views=views)
