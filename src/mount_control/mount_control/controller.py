@@ -18,6 +18,11 @@ from mount_control.settings import ControlSettings
 from mount_models.arithmetic.compiled import compiled, specialised
 from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
 
+FAULT_SENTENCE = (
+    'controller state became NaN or infinite: output 0 A, state reset; set friction.* and contact.* of '
+    'mount_control closer to their defaults'
+)
+"""The message about a controller that has found its memory spoiled."""
 FARTHEST_DISPLACEMENT = 1.0  # m, chosen: far beyond any range of a sensor, and far from an overflow
 _EXPONENT = 0x7FF0000000000000  # bits that are all set where a float64 is no finite number
 

@@ -6,14 +6,10 @@ from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
 from mount_control.control_loop import ControlLoop, SampleCounts
+from mount_control.controller import FAULT_SENTENCE
 from mount_control.plausibility import HOLD
 from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
-FAULT_SENTENCE = (
-    'controller state became NaN or infinite: output 0 A, state reset; set friction.* and contact.* of '
-    'mount_control closer to their defaults'
-)
-"""The message about a controller that has found its memory spoiled."""
 _LARGEST_BRIDGED = 0.001  # share of samples, chosen
 _LIMIT = f'limit: none in {WINDOW:g} s'
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 from mount_sim.loop import LoopFigures
 from mount_sim.plant.places import ALONE
-from mount_sim.plant.simulated_car import FARTHEST_DISPLACEMENT, Run
+from mount_sim.plant.simulated_car import Run, beyond_range_sentence
 
 DRIVING, FINISHED = 'driving', 'finished'
 _OF_EACH = ('answered', 'latency_median_s', 'latency_p99_s', 'beyond_range', 'first_beyond_range_s')
@@ -104,12 +104,3 @@ def _warnings(figures: LoopFigures, earlier: Counted, lockstep: bool) -> list[Fi
         )
         found.append(Finding(Level.WARN, 'late', sentence))
     return found
-
-
-def beyond_range_sentence(samples: int, first: float) -> str:
-    """Return what is to be told of displacements beyond the sensor's range, the first at `first` s."""
-    limit = 1e3 * FARTHEST_DISPLACEMENT
-    return (
-        f'the simulated mount moved beyond the {limit:g} mm of its displacement sensor in {samples} samples, '
-        f'first at {first:.3f} s; they were sent as not valid and answered with 0 A: excite it less'
-    )

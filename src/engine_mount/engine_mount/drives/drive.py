@@ -23,6 +23,7 @@ from engine_mount.signals.excitation import build_excitation
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.graph.nodes import RESTART_LIMIT, SIM, GraphSettings, Grouping
 from mount_bringup.settings import check_sample_rate, checked_settings
+from mount_control.controller import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import with_flattened
@@ -35,7 +36,7 @@ from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.check import checked_plant
 from mount_sim.plant.closing import checked_closing
-from mount_sim.plant.simulated_car import SimulatedCar, mount_parameters
+from mount_sim.plant.simulated_car import SimulatedCar, beyond_range_sentence, mount_parameters
 
 CORE, LOCKSTEP, REAL_TIME = 'core', 'lock-step', 'real time'
 _DEFAULT_SCENARIO = 'motorway'
@@ -172,12 +173,8 @@ def drive(
     beyond, first = figures.pop('beyond_range'), figures.pop('first_beyond_range')
     control_faults = figures.pop('control_faults')
     if control_faults:
-        from mount_control.diagnosis import FAULT_SENTENCE  # loads the middleware
-
         complaints.insert(0, f'{FAULT_SENTENCE} (times: {control_faults})')
     if beyond:
-        from mount_sim.diagnosis import beyond_range_sentence  # loads the middleware
-
         complaints.insert(0, beyond_range_sentence(beyond, first))
     return Drive(folder, scenario, mode, values, complaints=complaints, **figures)
 

@@ -261,3 +261,12 @@ class SimulatedCar:
 def mount_parameters(values: Mapping[str, Any], name: str = '') -> SimParameters:
     """Return the parameters of mount_sim as they hold for the mount `name`, or in general."""
     return with_flattened(SimParameters(), values_of_mount(values, name))
+
+
+def beyond_range_sentence(samples: int, first: float) -> str:
+    """Return what is to be told of displacements beyond the sensor's range, the first at `first` s."""
+    limit = 1e3 * FARTHEST_DISPLACEMENT
+    return (
+        f'the simulated mount moved beyond the {limit:g} mm of its displacement sensor in {samples} samples, '
+        f'first at {first:.3f} s; they were sent as not valid and answered with 0 A: excite it less'
+    )
