@@ -187,7 +187,8 @@ def drive(
     recorder = recorder_options(split or [], snapshot)
     if on_full != 'stop':
         recorder['on_full'] = on_full
-    parameters['mount_recorder'] = {**parameters.get('mount_recorder', {}), **recorder}
+    if recorder:
+        parameters.setdefault('mount_recorder', {}).update(recorder)
     console = terminal()
     excitation = None
     if road:
