@@ -26,7 +26,7 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, load_specimen
 from mount_ros import topics
 from mount_ros.data_path import DataPath
-from mount_ros.messages.cdr import deserialised, message_class
+from mount_ros.messages.cdr import deserialise, message_class
 from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
 from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import ScalarsLayout
@@ -440,7 +440,7 @@ def test_a_message_that_is_no_table_takes_the_old_one_away(configured, around):
     around.initialise()
     wait_until(lambda: control._activation.table is not None, 'the table')
     raw = table_message(ACTIVATION, [[0.47, 3.0], [0.0, 300.0]])
-    message = deserialised(raw, topics.CURRENT_FORCE_TABLE.type)
+    message = deserialise(raw, topics.CURRENT_FORCE_TABLE.type)
     message.layout.dim[1].label = 'of yesterday'
     around.send_raw_table(serialize_message(message))
     wait_until(lambda: control._activation.table is None, 'the message')

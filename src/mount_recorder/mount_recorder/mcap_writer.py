@@ -21,8 +21,6 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
-    Attachment,
-    AttachmentIndex,
     Channel,
     Chunk,
     ChunkIndex,
@@ -71,7 +69,6 @@ class McapWriter:
         self._channels: list[Channel] = []
         self._chunk_indexes: list[ChunkIndex] = []
         self._metadata_indexes: list[MetadataIndex] = []
-        self._attachment_indexes: list[AttachmentIndex] = []
         self._groups: dict[int, _FillingChunk] = {}
         self._chunk_of: dict[int, _FillingChunk] = {}  # by channel
         self._data_crc = 0
@@ -173,21 +170,6 @@ class McapWriter:
         self._append(record)
         self._metadata_indexes.append(index)
 
-    def add_attachment(self, attachment: Attachment) -> None:
-        """Write an attachment behind what is already in the file."""
-        record = _packed(attachment)
-        index = AttachmentIndex(
-            offset=self.file.size,
-            length=len(record),
-            log_time=attachment.log_time,
-            create_time=attachment.create_time,
-            data_size=len(attachment.data),
-            name=attachment.name,
-            media_type=attachment.media_type,
-        )
-        self._append(record)
-        self._attachment_indexes.append(index)
-
     def finish(self, records: Mapping[str, Mapping[str, str]]) -> None:
         """Write metadata records by name, summary and footer into the room held back, and close the file."""
         try:
@@ -244,7 +226,7 @@ class McapWriter:
 
     def _summary(self, start: int) -> bytes:
         statistics = Statistics(
-            attachment_count=len(self._attachment_indexes),
+            attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self.message_counts,
             chunk_count=len(self._chunk_indexes),
@@ -259,7 +241,6 @@ class McapWriter:
             Opcode.CHANNEL: self._channels,
             Opcode.STATISTICS: [statistics],
             Opcode.CHUNK_INDEX: self._chunk_indexes,
-            Opcode.ATTACHMENT_INDEX: self._attachment_indexes,
             Opcode.METADATA_INDEX: self._metadata_indexes,
         }
         data = offsets = b''

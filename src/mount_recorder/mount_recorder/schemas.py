@@ -39,9 +39,9 @@ def type_hash(type_name: str) -> str:
 @cache
 def _definition(type_name: str) -> tuple[str, str]:
     try:
+        text = _text_with_dependencies(type_name, set())
         hashes = json.loads(_installed(type_name, 'json'))['type_hashes']
-        own = next(entry['hash_string'] for entry in hashes if entry['type_name'] == type_name)
-        return _text_with_dependencies(type_name, set()), own
+        return text, next(entry['hash_string'] for entry in hashes if entry['type_name'] == type_name)
     except SchemaError:
         found = other_definitions(type_name) if other_definitions else None
         if found is None:

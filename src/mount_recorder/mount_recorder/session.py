@@ -10,7 +10,6 @@ from typing import Any
 import yaml
 
 from mount_recorder.versions import versions
-from mount_ros.messages.cdr import string_message
 
 
 def new_session(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -26,8 +25,3 @@ def time_text() -> str:
 def session_text(content: Mapping[str, Any]) -> str:
     """Return the text of the session message."""
     return yaml.safe_dump(dict(content), sort_keys=False)
-
-
-def session_message(text: str) -> bytes:
-    """Return the serialised message of a session text."""
-    return string_message(text)

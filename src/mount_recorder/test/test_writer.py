@@ -55,7 +55,7 @@ def test_schema_text_holds_each_dependency_once_depth_first():
     ('name', 'word'),
     [
         ('JointState', 'package/msg/Name'),
-        ('sensor_msgs/msg/NoSuchThing', 'NoSuchThing'),
+        ('sensor_msgs/msg/NoSuchThing', 'NoSuchThing.msg'),
         ('no_such_package/msg/Thing', 'no_such_package'),
     ],
 )

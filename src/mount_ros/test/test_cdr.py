@@ -59,3 +59,6 @@ def test_padding_is_zero_where_the_middleware_leaves_what_was_there():
 def test_a_temperature_comes_back_with_its_stamp():
     raw = OneNumberLayout(cdr.temperature).pack(5_123_456_789, -12.3)
     assert temperature_of(raw) == (5_123_456_789, -12.3)
+    message = deserialize_message(raw, Temperature)
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 123_456_789)
+    assert (message.temperature, message.variance) == (-12.3, 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mount_ros.messages.cdr import deserialised
+from mount_ros.messages.cdr import deserialise
 from mount_ros.messages.force_table import from_bytes, from_message, table_message
 from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import CURRENT_FORCE_TABLE
@@ -13,7 +13,7 @@ TABLE = np.array([[0.4725, 0.8, 1.6, 3.0], [0.0, 40.0, 200.0, 304.0]])
 
 
 def to_message(stamp, table):
-    return deserialised(table_message(stamp, table), CURRENT_FORCE_TABLE.type)
+    return deserialise(table_message(stamp, table), CURRENT_FORCE_TABLE.type)
 
 
 def test_table_and_activation_survive_serialisation():

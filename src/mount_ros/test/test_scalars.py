@@ -62,7 +62,7 @@ def test_a_reader_takes_names_from_messages_of_any_and_remembers_their_layout(mo
     named = (('current',), ('x', 'magnitude', 'current'))
     short, long = (ScalarsLayout(control_trace(names)) for names in named)
     assert reader.read(long.pack(STAMP, (1.0, 2.0, 3.0))) == (STAMP, [3.0, 2.0])
-    monkeypatch.setattr(scalars, 'deserialised', lambda *_: pytest.fail('decoded once more'))
+    monkeypatch.setattr(scalars, 'deserialise', lambda *_: pytest.fail('decoded once more'))
     assert reader.read(long.pack(STAMP + 1, (4.0, 5.0, 6.0))) == (STAMP + 1, [6.0, 5.0])
     monkeypatch.undo()
     stamp, (current, magnitude) = reader.read(short.pack(STAMP, (7.0,)))

@@ -10,8 +10,9 @@ from engine_mount.drives.core import OFF, ControlAnswers, Replayed
 from engine_mount.drives.inputs.input import ReplayInput
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
-from mount_recorder.session import session_message, session_text
+from mount_recorder.session import session_text
 from mount_ros import topics
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import Topic
 
@@ -58,7 +59,7 @@ def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: 
     try:
         for topic in _WRITTEN:
             writer.add_topic(prefix + topic.name, topic.type)
-        writer.write(prefix + topics.SESSION.name, session_message(session_text(session)), entries[0][0])
+        writer.write(prefix + topics.SESSION.name, string_message(session_text(session)), entries[0][0])
         for time, _, topic, raw in entries:
             writer.write(prefix + topic.name, raw, time)
     finally:

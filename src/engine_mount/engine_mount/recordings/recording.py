@@ -239,7 +239,7 @@ class Recording:
                 self.missing[name] = expected - present
 
     def latched(self, name: str) -> Any:
-        """Return the last message of a topic, deserialised; raises `ReadingError` if there is none."""
+        """Return the last message of a topic, deserialise; raises `ReadingError` if there is none."""
         series = self[name]
         if not len(series):
             raise ReadingError(f'{series.topic} has no message in {self.path}')

@@ -16,7 +16,8 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
 from mount_models.plain_yaml import YamlError, yaml_in_file
-from mount_recorder.session import session_message, session_text, time_text
+from mount_recorder.session import session_text, time_text
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import (
     AIR_GAP,
     COIL_RIPPLE,
@@ -141,7 +142,7 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
     if SESSION in parts:
         session = parts[SESSION].at(np.array([len(parts[SESSION]) - 1]))
         content = session_content(recorded_session(run) or recorded_session(before or run))
-        shortened = session_message(session_text(_shortened(content)))
+        shortened = string_message(session_text(_shortened(content)))
         parts[SESSION] = (
             session if _shortened(content) == content else replace(session, payloads=Payloads([[shortened]]))
         )

@@ -214,11 +214,11 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
     known = np.isfinite(column.values)
     bad = np.flatnonzero(~known if whole else np.isinf(column.values))
     if bad.size:
-        at = '' if base.told == _ROWS else f', at {base.times[bad[0]]:.4f} s'
-        raise SignalError(
-            f'{where}: value number {bad[0]} is {column.values[bad[0]]}{at} ({bad.size} such of '
-            f'{known.size}); repair it or cut it out'
-        )
+        place, value = bad[0], column.values[bad[0]]
+        said = f'value number {place} is {value}, at {base.times[place]:.4f} s'
+        if base.told == _ROWS:
+            said = f'row {place + 1} is {value}'
+        raise SignalError(f'{where}: {said} ({bad.size} such of {known.size}); repair it or cut it out')
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
     return known
 

@@ -169,7 +169,8 @@ def one_missing(table):
     [
         (
             {'force_n': None},
-            'has no column for force (its columns: gap [um], current_a',
+            'has no column for force (its columns: gap [um], current_a; read as comma, decimal point, '
+            'utf-8); name it as in --column force=',
         ),
         ({'force_n': in_kilonewton}, 'it could be kN, daN, kip, kgf: write --column force=force_n:kN'),
         ({'gap_um': lambda t: t['gap_um'] / 1e3}, 'it could be mm: write --column gap=gap:mm'),
@@ -183,7 +184,7 @@ def one_missing(table):
         ),
         ({'force_n': lambda t: 0.0 * t['current_a'] + 50.0}, 'force is constant (50 N in all 885 rows)'),
         ({'force_n': one_stuck}, 'force stayed at'),
-        ({'force_n': one_missing}, "column 'force_n': value number 7 is nan"),
+        ({'force_n': one_missing}, "column 'force_n': row 8 is nan (1 such of 885)"),
         ({'force_n': one_outlier}, '1 of 885 points are outliers'),
         ({'force_n': lambda t: -t['force_n']}, 'is the sign of the load cell right?'),
     ],

@@ -12,8 +12,9 @@ from engine_mount.recordings.session import (
     session_parameters,
 )
 from mount_recorder.bag_writer import BagWriter
-from mount_recorder.session import new_session, session_message, session_text
+from mount_recorder.session import new_session, session_text
 from mount_recorder.versions import versions
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import SESSION
 
 
@@ -21,7 +22,7 @@ def recorded(folder, *names: str):
     writer = BagWriter(folder)
     for name in names:
         writer.add_topic(name, SESSION.type, latched=True)
-        writer.write(name, session_message(session_text({'scenario': name})), 1)
+        writer.write(name, string_message(session_text({'scenario': name})), 1)
     writer.close()
     return open_recording(folder)
 

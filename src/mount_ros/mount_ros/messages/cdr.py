@@ -92,7 +92,7 @@ def message_class(name: str) -> type:
         raise ValueError(f'message type {name!r} is not installed; is its package missing?') from None
 
 
-def deserialised(raw: bytes, type_name: str) -> Any:
+def deserialise(raw: bytes, type_name: str) -> Any:
     """Return the message that the middleware reads in `raw`; what it raises is the caller's."""
     from rclpy.serialization import deserialize_message  # readers of recordings do without the middleware
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mount_models.sampling import HIGHEST_CURRENT
-from mount_ros.messages.cdr import CdrWriter, deserialised
+from mount_ros.messages.cdr import CdrWriter, deserialise
 from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import CURRENT_FORCE_TABLE
 
@@ -69,7 +69,7 @@ def from_message(message: Any) -> ForceTable:
 
 def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
-    return from_message(deserialised(raw, CURRENT_FORCE_TABLE.type))
+    return from_message(deserialise(raw, CURRENT_FORCE_TABLE.type))
 
 
 def _check(rows: FloatArray) -> None:

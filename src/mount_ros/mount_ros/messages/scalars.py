@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_ros.messages.cdr import deserialised, joint_state
+from mount_ros.messages.cdr import deserialise, joint_state
 from mount_ros.topics import COIL_TEMPERATURE, JOINT_STATE, Topic, control_trace
 
 _STAMP = struct.Struct('<iI')
@@ -175,12 +175,12 @@ class OneNumberLayout(_Layout):
 
 def temperature_of(raw: bytes) -> tuple[int, float]:
     """Return stamp (ns) and temperature (degC) of a serialised message."""
-    return stamp_of(raw), float(deserialised(raw, COIL_TEMPERATURE.type).temperature)
+    return stamp_of(raw), float(deserialise(raw, COIL_TEMPERATURE.type).temperature)
 
 
 def _decoded(raw: bytes) -> Any:
     try:
-        return deserialised(raw, JOINT_STATE)
+        return deserialise(raw, JOINT_STATE)
     except (RuntimeError, ValueError) as error:  # of the middleware; of a name that is no UTF-8
         raise MessageError(f'a message of {len(raw)} bytes is no JointState ({error})') from None
 

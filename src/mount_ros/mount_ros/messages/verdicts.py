@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from mount_ros.messages.cdr import deserialised
+from mount_ros.messages.cdr import deserialise
 from mount_ros.topics import DIAGNOSTICS
 
 
@@ -53,7 +53,7 @@ class NodeVerdict(NamedTuple):
 
 def verdicts_of(raw: bytes) -> list[NodeVerdict]:
     """Return the verdicts in a serialised `DiagnosticArray`."""
-    return verdicts_in(deserialised(raw, DIAGNOSTICS.type))
+    return verdicts_in(deserialise(raw, DIAGNOSTICS.type))
 
 
 def verdicts_in(report: Any) -> list[NodeVerdict]:

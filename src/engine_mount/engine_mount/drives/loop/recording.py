@@ -12,7 +12,7 @@ from engine_mount.drives.loop.run import CoreOutcome, run_core_into
 from engine_mount.settings.chosen import Parameters
 from mount_recorder.bag_writer import WHOLE, BagWriter, SplitRule
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
-from mount_recorder.session import session_message
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.plant.places import ALONE
@@ -48,7 +48,7 @@ def record_core(
                     latched = topic.delivery is Delivery.LATCHED
                     writer.add_topic(own.names[topic.name], topic.type, latched=latched)
             declared |= set(own.names.values())
-            own.write(SESSION, session_message(sessions[mount]), 0)
+            own.write(SESSION, string_message(sessions[mount]), 0)
             sinks[mount] = CoreMessages(sim, own.write, own.write_columns, mount)
         return run_core_into(sinks, parameters, progress, excitation)
     finally:

@@ -9,8 +9,8 @@ from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
-from mount_recorder.session import new_session, session_message, session_text
-from mount_ros.messages.cdr import wrench
+from mount_recorder.session import new_session, session_text
+from mount_ros.messages.cdr import string_message, wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import (
     DISPLACEMENT,
@@ -42,7 +42,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     try:
         for topic in _TOPICS:
             writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
-        writer.write(f'/{SESSION.name}', session_message(session_text(new_session(session))), begin)
+        writer.write(f'/{SESSION.name}', string_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(wrench)
         rows = zip(measured.displacement, measured.friction_force, measured.normal_force, strict=True)

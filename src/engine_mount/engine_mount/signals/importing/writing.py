@@ -10,7 +10,8 @@ from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.importing.channels import PREFIX, Channel
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
-from mount_recorder.session import session_message, session_text
+from mount_recorder.session import session_text
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import SESSION
 
 _BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for each topic
@@ -30,7 +31,7 @@ def write_channels(
             # of topics that every command takes the registry tells the unit
             units = {channel.place.field: channel.unit} if topic.name.startswith(PREFIX) else {}
             writer.add_topic(f'/{topic.name}', topic.type, details=units_text(units))
-        writer.write(f'/{SESSION.name}', session_message(session_text(session)), begin)
+        writer.write(f'/{SESSION.name}', string_message(session_text(session)), begin)
         for first in range(begin, end + 1, _BLOCK):
             _write_block(writer, channels, first, first + _BLOCK)
             progress(min(1.0, (first + _BLOCK - begin) / (end + 1 - begin)))

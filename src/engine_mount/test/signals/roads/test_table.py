@@ -93,7 +93,7 @@ def test_distances_that_go_back_have_gaps_or_are_no_numbers_are_refused(table):
     )
     none = PLACES.copy()
     none[7] = np.nan
-    assert 'value number 7 is nan' in refusal(table(x=('m', none), z=('m', HEIGHTS)))
+    assert "column 'x': row 8 is nan (1 such of 1200)" in refusal(table(x=('m', none), z=('m', HEIGHTS)))
     assert 'is the unit of the distance another one?' in refusal(
         table(x=('m', PLACES / 1000.0), z=('m', HEIGHTS))
     )
