@@ -14,7 +14,7 @@ from engine_mount.cli.command import app
 from mount_bringup.graph.nodes import SIMULATED
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_models.actuator.law import ForceLaw
+from mount_models.actuator import ForceLaw
 from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mount_init.estimate import contact_gap, rest_gap
+from mount_models.actuator import contact_force, current_force_table
 from mount_models.coil.crossing import find_crossing
-from mount_models.force_table import contact_force, current_force_table
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.closing import contact_force as true_contact_force

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.law import (
+from mount_models.actuator import (
     TABLE_1,
     check_force_law,
     checked_current_for_force,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.arithmetic.averages import mean, standard_deviation
+from mount_models.arithmetic.sums import mean, standard_deviation
 
 VALUES = np.random.default_rng(3).normal(20e-3, 1e-4, 501)
 

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.law import force
-from mount_models.arithmetic.interpolation import interpolated
-from mount_models.force_table import (
+from mount_models.actuator import (
     ForceTableError,
     checked_table,
     contact_force,
     current_force_table,
+    force,
     offset_current,
 )
+from mount_models.arithmetic.sums import interpolated
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import default_specimen
 

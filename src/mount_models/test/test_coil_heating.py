@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mount_models.coil.heating import CoilHeating, check_heating, highest_current, warmed
+from mount_models.coil.copper import CoilHeating, check_heating, highest_current, warmed
 from mount_models.plain_yaml import yaml_in_file
 from mount_models.quantity import ParameterError
 from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, specimen_from_mapping

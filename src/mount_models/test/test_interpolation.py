@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.arithmetic.interpolation import each_interpolated, interpolated
+from mount_models.arithmetic.sums import each_interpolated, interpolated
 
 X, Y = np.array([0.0, 1.0, 1.5, 4.0]), np.array([2.0, 5.0, -1.0, 0.0])
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mount_models.arithmetic.least_squares import combination_std, least_squares
+from mount_models.arithmetic.sums import combination_std, least_squares
 
 
 @given(st.integers(1, 5), st.integers(0, 40), st.integers(0, 2**32 - 1))

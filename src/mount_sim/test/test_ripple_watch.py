@@ -7,7 +7,7 @@ import pytest
 
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_models.coil.heating import CoilHeating
+from mount_models.coil.copper import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator

@@ -90,7 +90,7 @@ def inductance(
     """
     from engine_mount.identification.coil.inductance import calibrate_inductance
     from engine_mount.identification.rack import FileValues, read_ripple
-    from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
+    from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT
     from mount_models.specimen import chosen_specimen
 
     starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]

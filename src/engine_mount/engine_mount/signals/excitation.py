@@ -15,8 +15,8 @@ from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.resampling import resampled
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import check_size
-from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.series import StreamedSeries
+from mount_models.arithmetic.sums import mean
 from mount_models.quantity import flattened
 from mount_sim.excitation import building
 from mount_sim.excitation.array_file import write_excitation

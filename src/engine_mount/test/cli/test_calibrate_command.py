@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from engine_mount.cli.command import main
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.specimen import load_specimen
 from mount_sim.plant.reluctance import force

@@ -12,7 +12,7 @@ from engine_mount.cli.command import main
 from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.mapping import ColumnChoice, Mapping
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen

@@ -22,7 +22,7 @@ from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.settings.chosen import chosen_control, policy_of
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact

@@ -1,7 +1,7 @@
 """How the simulated actuator closes: magnet against spring and pads, quasi-static, with snap-through.
 
-It belongs to the plant: the magnet is `actuator.reluctance`. The controller's estimate of the same
-forces is `force_table`.
+It belongs to the plant: the magnet is `reluctance`. The controller's estimate of the same
+forces is `mount_models.actuator`.
 """
 
 import math
