@@ -1,4 +1,4 @@
-"""The electromagnet as the controller knows it: current-force law (Eqs 3, 4, Table 1), its inverse, its check.
+"""The electromagnet as the controller knows it: force law (Eqs 3, 4, Table 1), its inverse and its check.
 
 With gap estimates it becomes contact force, offset current and current-force table.
 """

@@ -84,9 +84,12 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
         ('friction', [1.0], 'friction must be a mapping'),
         ('friction', {'a_p1': 'high'}, 'friction.a_p1 must be a finite number'),
         ('provenance', 'bench', 'provenance must be a mapping'),
+        ('provenance.parts', 3, r'provenance\.parts must be a mapping'),
+        ('provenance.parts.friction', 'by hand', r'provenance\.parts\.friction must be a mapping'),
+        ('provenance.parts.friction.specimen', '', r'parts\.friction\.specimen must be a text'),
         ('schema_version', 1, r'schema_version \(1\) must be 2; .* calibrate again'),
         ('schema_version', None, r'schema_version \(None\) must be 2'),
-        ('friction', {'mu': 0.3}, 'friction.mu is unknown; known are b_offset'),
+        ('friction', {'mu': 0.3}, "'mu' is no parameter of friction; known are b_offset"),
         ('friction', {'a_p2': -1.0}, r'friction.a_p2 \(-1 1\) must lie within'),
         ('temperature', 20.0, 'temperature must be a mapping'),
         ('temperature.reference_celsius', None, 'reference_celsius is missing'),
@@ -174,8 +177,8 @@ def test_what_changes_the_meaning_of_a_file_is_refused_with_its_line(tmp_path, a
 
 def test_the_default_specimen_is_chosen_without_a_file():
     assert chosen_specimen('') == chosen_specimen('', 'default') == DEFAULT
-    with pytest.raises(SpecimenError, match=r"specimen \('a/left.yaml'\) must be a name; .* parameters_file"):
-        chosen_specimen('', 'a/left.yaml')
+    with pytest.raises(SpecimenError, match="is for the specimen 'default', 'left' is asked for"):
+        chosen_specimen('', 'left')
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path):
@@ -197,7 +200,7 @@ def test_friction_parameters_pass_through():
         ({'a_p2': 5.0}, r'coefficient of friction .* must lie within 0\.05 \.\. 5'),
         ({'lowest_normal_force': 200.0}, r'lowest_normal_force \(200 N\) must not exceed'),
         ({'contact_stiffness': 1.0}, r'friction\.contact_stiffness \(1 N/m\) must lie within'),
-        ({'a_q1': 1.0}, r'friction\.a_q1 is unknown'),
+        ({'a_q1': 1.0}, "'a_q1' is no parameter of friction; did you mean a_"),
     ],
 )
 def test_friction_that_is_none_is_refused(friction, sentence):

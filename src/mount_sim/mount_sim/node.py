@@ -27,11 +27,11 @@ from mount_ros.nodes.real_time import RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.faults.schedule import injected_faults, texts_of_mount
+from mount_sim.electronics.faults import injected_faults
 from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
-from mount_sim.plant.places import ALONE, general_name, mount_names, values_of_mount
+from mount_sim.plant.mounts import ALONE, general_name, mount_names, texts_of_mount, values_of_mount
 from mount_sim.plant.simulated_car import DivergedError, SimulatedCar, mount_parameters
 
 INJECT = 'inject'

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +12,6 @@ from mount_sim.plant.reluctance import (
     ReluctanceActuator,
     core_field,
     differential_permeability,
-    mean_incremental_inductance,
 )
 from mount_sim.plant.ripple import (
     RippleCoil,
@@ -60,19 +58,6 @@ def test_the_20_millihenry_current_meets_the_published_table(gap_um, expected):
     assert crossing(gap_um) == pytest.approx(expected, abs=0.00011)
 
 
-@pytest.mark.parametrize(
-    ('gap_um', 'expected'), list(zip(GAPS_UM, (33.05, 34.68, 35.39, 35.57, 35.42, 35.13, 34.61), strict=True))
-)
-def test_inductance_at_0_8_amperes_meets_the_published_table(gap_um, expected):
-    assert inductance_mh(0.8, gap_um) == pytest.approx(expected, abs=0.0051)
-
-
-def test_at_rest_the_inductance_tells_the_gap_and_so_does_the_crossing_current():
-    gaps_um = np.arange(250, 551, 10)
-    assert (np.diff([inductance_mh(0.2, gap) for gap in gaps_um]) < 0.0).all()
-    assert (np.diff([crossing(gap) for gap in gaps_um]) > 0.0).all()
-
-
 @settings(deadline=None, max_examples=200)
 @given(current=st.floats(0.0, 3.0), gap_um=st.floats(250, 550))
 def test_the_quick_skin_factor_agrees_with_the_long_series(current, gap_um):
@@ -80,27 +65,6 @@ def test_the_quick_skin_factor_agrees_with_the_long_series(current, gap_um):
     assert skin_factor(COIL, time, share) == pytest.approx(
         skin_factor_series(COIL, time, share, MANY_TERMS), rel=1e-4
     )
-
-
-@pytest.mark.parametrize(('gap_um', 'current'), [(250, 0.2), (349, 1.0), (349, 2.2), (550, 3.0)])
-def test_the_series_is_that_of_diffusion_in_a_plate(gap_um, current):
-    time, off = diffusion_time(COIL, permeability(current, gap_um)), 1.0 - duty(COIL, current)
-    rates = (np.arange(1, MANY_TERMS + 1) * math.pi) ** 2 / time
-    fading = np.exp(-rates * COIL.sample_delay)
-    switched = (1 - np.exp(-rates * off * COIL.pwm_period)) / (1 - np.exp(-rates * COIL.pwm_period))
-    expected = 1.0 + 2.0 / off * np.sum(fading * switched)
-    assert skin_factor_series(COIL, time, duty(COIL, current), MANY_TERMS) == pytest.approx(
-        expected, rel=1e-6
-    )
-
-
-def test_slow_sampling_of_thin_plates_sees_the_whole_core():
-    coil = with_values(COIL, plate_half_thickness=2e-5)
-    assert skin_factor(coil, diffusion_time(coil, permeability(0.2, 349)), 0.52) == pytest.approx(
-        1.0, abs=1e-6
-    )
-    slow = mean_incremental_inductance(MAGNET, 0.2, 349e-6)
-    assert incremental_inductance(coil, MAGNET, 0.2, 349e-6) == pytest.approx(slow, rel=1e-6)
 
 
 @settings(deadline=None)

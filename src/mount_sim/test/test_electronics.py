@@ -85,12 +85,3 @@ def test_jitter_scatters_the_displacement_of_a_moving_mount():
     assert np.std(moving[:, 0]) == pytest.approx(0.1 * 3e-4, rel=0.03)
     assert np.mean(moving[:, 0]) == pytest.approx(1e-3, rel=1e-3)
     assert (resting[:, 0] == 1e-3).all()
-
-
-@pytest.mark.parametrize('sigma', [0.01, 0.03])
-def test_ripple_noise_is_the_scatter_of_the_inductance(sigma):
-    readings = _readings(ripple_noise=sigma)
-    inductance = readings[:, 3] / readings[:, 2]
-    assert np.std(inductance) / np.mean(inductance) == pytest.approx(sigma, rel=0.03)
-    for slope in (readings[:, 2], readings[:, 3]):
-        assert np.std(slope) / np.mean(slope) == pytest.approx(sigma * math.sqrt(0.5), rel=0.03)

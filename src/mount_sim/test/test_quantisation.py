@@ -81,14 +81,6 @@ def test_a_coil_temperature_is_quantised_as_over_can(value):
     assert same_bits(quantisation.quantised_coil_temperature(value), expected)
 
 
-@settings(max_examples=200, deadline=None)
-@given(st.floats(-0.05, 0.05))
-def test_quantising_twice_changes_nothing(value):
-    once = quantisation.quantised_displacement(value)
-    assert same_bits(quantisation.quantised_displacement(once), once)
-    assert abs(once - value) <= 0.500001e-7
-
-
 @pytest.mark.parametrize(
     ('scaling', 'steps', 'limit'),
     [

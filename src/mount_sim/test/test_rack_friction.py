@@ -5,7 +5,7 @@ import pytest
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_sim.rack.friction import move, sawtooth_corners, with_noise
+from mount_sim.rack import move, sawtooth_corners
 
 CONTACT, COEFFICIENTS = FrictionContact(), FrictionCoefficients()
 
@@ -24,20 +24,3 @@ def test_a_motor_that_gives_way_leaves_its_share_of_the_way():
     assert stiff.displacement[-1] == pytest.approx(1e-6, rel=1e-12)
     assert soft.friction_force[-1] == pytest.approx(2e6 * (1e-6 - soft.displacement[-1]), rel=1e-9)
     assert soft.friction_force[-1] < 0.6 * stiff.friction_force[-1]
-
-
-def test_samples_stand_a_millisecond_apart_whatever_the_step():
-    moved = [move(CONTACT, COEFFICIENTS, [0.0, 0.1], [0.0, 1e-3], 100.0, substeps=steps) for steps in (5, 10)]
-    for each in moved:
-        assert each.time == pytest.approx(np.arange(100) * 1e-3)
-        assert each.displacement == pytest.approx(1e-2 * each.time)
-        assert each.desired_displacement == pytest.approx(each.displacement)
-    assert moved[0].friction_force == pytest.approx(moved[1].friction_force, abs=1.0)
-
-
-def test_each_instrument_has_its_own_noise():
-    rack = move(CONTACT, COEFFICIENTS, [0.0, 2.0], [0.0, 1e-3], 100.0)
-    noisy = with_noise(rack, force_noise=0.5, displacement_noise=2e-8, seed=3)
-    assert np.std(noisy.friction_force - rack.friction_force) == pytest.approx(0.5, rel=0.1)
-    assert np.std(noisy.displacement - rack.displacement) == pytest.approx(2e-8, rel=0.1)
-    assert np.array_equal(noisy.normal_force, rack.normal_force)

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mount_models.arithmetic.series import series_of
-from mount_sim.excitation.array_file import write_excitation
-from mount_sim.excitation.building import build_excitation
+from mount_sim.excitation.building import build_excitation, write_excitation
 from mount_sim.excitation.excitation import LONG_BLOCK, SHORT_BLOCK, Excitation, Seat, Shaking
 from mount_sim.excitation.scenario import STEP_TIME
 

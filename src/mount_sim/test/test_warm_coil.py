@@ -11,10 +11,6 @@ from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
 COIL = RippleCoil()
 
 
-def test_at_20_degrees_nothing_changes_by_a_bit():
-    assert coil_at(COIL, TemperatureCoefficients(core=0.01, copper=0.009), 20.0) == COIL
-
-
 def test_core_and_copper_follow_their_own_coefficients():
     warm = coil_at(COIL, TemperatureCoefficients(core=0.002, copper=0.004), 70.0)
     assert warm.conductivity == pytest.approx(COIL.conductivity / 1.1)

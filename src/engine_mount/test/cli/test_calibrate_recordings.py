@@ -22,7 +22,7 @@ from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
-from mount_sim.rack.coil import drawn_rack, record_ripple
+from mount_sim.rack import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)

@@ -30,8 +30,7 @@ from mount_models.quantity import flattened
 from mount_models.specimen import DEFAULT_SPECIMEN, load_specimen
 from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.plant.ripple import current_rate, flux_rate
-from mount_sim.rack.coil import drawn_rack
-from mount_sim.rack.friction import drawn_friction
+from mount_sim.rack import drawn_friction, drawn_rack
 
 pytestmark = pytest.mark.slow
 

@@ -21,6 +21,11 @@ def record_type(fields: Sequence[Field]) -> np.dtype:
     return np.dtype((np.record, list(fields)))
 
 
+def number_record(*names: str) -> np.dtype:
+    """Return the type of a record of float64 numbers."""
+    return record_type([(name, 'f8') for name in names])
+
+
 @functools.cache
 def record_dtype(kind: type[NamedTuple]) -> np.dtype:
     """Return the record type of a named tuple of numbers, or of such tuples, from its annotations."""
