@@ -241,7 +241,7 @@ def _points_in(path: Path) -> tuple[FloatArray, FloatArray]:
             line for line in text_of_file(path).splitlines() if line.strip() and not line.startswith('#')
         ]
         header = [name.strip() for name in lines[0].split(',')] if lines else []
-        columns = np.loadtxt(lines[1:], delimiter=',', ndmin=2).T
+        columns = np.loadtxt(lines[1:], delimiter=',', ndmin=2).T if lines[1:] else ()
         return _checked_points(dict(zip(header, columns, strict=False)))
     except YamlError as error:
         raise ParameterError(f'damper file {path} {error}') from None

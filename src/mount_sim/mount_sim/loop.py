@@ -205,7 +205,7 @@ class CarLoop:
 
     def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float, sample_rate: float):
         self._sample_rate = sample_rate
-        self._loops = list(loops.items())
+        self._loops, self._names = list(loops.values()), list(loops)
         self._clock_drift = clock_drift
         self._turn = 0  # lock-step: whose sample comes next
 
@@ -220,24 +220,24 @@ class CarLoop:
         # processor of their own; with two of them the simulator would take one from the graph.
         longest, begin = period, time.monotonic()
         for number, _ in enumerate(until_ending(ending, self._discharged), 1):
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.send_sample()
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.wait_for_answer(begin + number * period - _RESERVE * longest)
             answered = time.monotonic()
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.go_on()
             now = time.monotonic()
             longest = max(now - answered, (1.0 - _FORGOTTEN) * longest)
             remaining = begin + number * period - now
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.figures.wall_time = now - begin
                 loop.figures.overruns += remaining <= 0.0  # the next samples follow at once: none is skipped
             if remaining > 0.0:
                 time.sleep(remaining)
 
     def _discharged(self) -> bool:
-        return all(loop.discharged() for _, loop in self._loops)
+        return all(loop.discharged() for loop in self._loops)
 
     def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
         """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""
@@ -249,7 +249,7 @@ class CarLoop:
 
         A mount alone has no name; of several the name of the mount leads an error.
         """
-        name, loop = self._loops[self._turn]
+        name, loop = self._names[self._turn], self._loops[self._turn]
         try:
             taken = loop.step_in_lockstep(patience, wait)
         except NoAnswerError as error:
@@ -261,4 +261,4 @@ class CarLoop:
     @property
     def finished(self) -> bool:
         """Whether the run is over, in lock-step with all last samples answered."""
-        return all(loop.finished for _, loop in self._loops)
+        return all(loop.finished for loop in self._loops)

@@ -78,7 +78,8 @@ class MountSim(SafeLifecycleNode):
         rate, drift = self._settings.sample_rate, self._settings.electronics.clock_drift
         self._loops = {}
         for name, mount in self._mounts.items():
-            can_end = CanEnd(self._open_bus(interface, name), rate)
+            own = values_of_mount(self._values, name)
+            can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate)
             self._can_ends.append(can_end)
             electronics = mount_parameters(self._values, name).electronics
             self._loops[name] = ElectronicsLoop(mount, can_end, electronics, partial(self._publish, name))
@@ -135,21 +136,6 @@ class MountSim(SafeLifecycleNode):
         except ParameterError as error:
             response.message = str(error)
         return response
-
-    def _open_bus(self, interface: str, name: str) -> can.BusABC:
-        """Return the bus of a mount; no two mounts may have the same."""
-        buses = {}
-        for other in self._names:
-            own = values_of_mount(self._values, other)
-            buses[other] = own['channel'], own['port']
-        channel, port = buses.pop(name)
-        for other, bus in buses.items():
-            if bus == (channel, port):
-                raise ParameterError(
-                    f'the mounts {other} and {name} have one CAN bus (channel {channel}, port {port}): give '
-                    f'each its own, as in mount_{name}.port'
-                )
-        return open_bus(interface, channel, port=port)
 
     def _prepare_mounts(self) -> None:
         self._mounts = SimulatedCar(self._values, self._excitation).mounts

@@ -1,20 +1,21 @@
 """The simulated rack: force and coil ripple at held gaps, friction on ramps and sawtooths (Figs. 7, 8).
 
 What comes out is what a real rack gives: points and samples with noise in CSV files, and no truth. For
-friction the rack is what the authors describe: a linear motor under proportional control, the spring p of Fig. 6,
-moves the contact, a load cell measures the friction force, another one the clamping force. The contact is
-the full model; nothing else acts.
+friction the rack is what the authors describe: a linear motor under proportional control, the spring p of
+Fig. 6, moves the contact, a load cell measures the friction force, another one the clamping force. The
+contact is the full model; nothing else acts.
 """
 
 import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -31,7 +32,7 @@ from mount_sim.plant.ripple import (
     flux_rate,
 )
 
-FloatArray = NDArray[np.float64]
+FloatArray = npt.NDArray[np.float64]
 
 GAPS = np.linspace(270e-6, 550e-6, 15)
 """Gaps held one after the other while the force is taken, m (chosen)."""
@@ -108,10 +109,7 @@ def drawn_rack(seed: int, noise: float = 0.01) -> Rack:
     """Return a rack with another actuator, drawn around the default one (chosen: 10 %, joints 25 %)."""
     random = np.random.default_rng([seed, 3])
     actuator, coil = ReluctanceActuator(), RippleCoil()
-
-    def drawn(value: float, spread: float = 0.1) -> float:
-        return float(value * (1.0 + spread * random.uniform(-1.0, 1.0)))
-
+    drawn = partial(_drawn, random)
     return Rack(
         with_values(
             actuator,
@@ -160,8 +158,6 @@ def write_columns(
             writer.writerow([f'{value:.9g}' for value in row])
     return file
 
-
-FloatArray = npt.NDArray[np.float64]
 
 MACHINE_STIFFNESS = 2e6
 """p in N/m (chosen): the proportional position control of the linear motor."""
@@ -271,13 +267,8 @@ def ramp_and_hold(
     times, positions = [0.0, _REST, _REST + _RAMP_TIME, duration], [0.0, 0.0, _RAMP_HEIGHT, _RAMP_HEIGHT]
     rack = move(contact, coefs, times, positions, 100.0, machine_stiffness=MACHINE_STIFFNESS)
     random = np.random.default_rng(noise.seed)
-    return RackRecording(
-        rack.time,
-        _noisy(rack.displacement, noise.relative, random),
-        _noisy(rack.desired_displacement, noise.relative, random),
-        _noisy(rack.friction_force, noise.relative, random),
-        _noisy(rack.normal_force, noise.relative, random),
-    )
+    measured = rack.displacement, rack.desired_displacement, rack.friction_force, rack.normal_force
+    return RackRecording(rack.time, *(_noisy(values, noise.relative, random) for values in measured))
 
 
 def sawtooth(
@@ -303,14 +294,10 @@ def sawtooth(
 
 def drawn_friction(seed: int) -> tuple[FrictionContact, FrictionCoefficients]:
     """Return other pads, drawn around the default ones (chosen: springs 30 %, coefficients 10 %)."""
-    random = np.random.default_rng([seed, 4])
-
-    def drawn(value: float, spread: float) -> float:
-        return float(value * (1.0 + spread * random.uniform(-1.0, 1.0)))
-
+    drawn = partial(_drawn, np.random.default_rng([seed, 4]))
     return (
         FrictionContact(*(drawn(value, 0.3) for value in _CONTACT)),
-        _COEFFICIENTS._replace(**{name: drawn(getattr(_COEFFICIENTS, name), 0.1) for name in _DRAWN}),
+        _COEFFICIENTS._replace(**{name: drawn(getattr(_COEFFICIENTS, name)) for name in _DRAWN}),
     )
 
 
@@ -346,3 +333,7 @@ def write_csv(recording: RackRecording, file: Path, *, with_desired: bool = Fals
 def _noisy(values: FloatArray, relative: float, random: np.random.Generator) -> FloatArray:
     rms = float(np.sqrt(np.mean(values**2)))
     return np.asarray(values + relative * rms * random.standard_normal(values.size))
+
+
+def _drawn(random: np.random.Generator, value: float, spread: float = 0.1) -> float:
+    return float(value * (1.0 + spread * random.uniform(-1.0, 1.0)))

@@ -1,13 +1,17 @@
-"""The simulated ripple inductance: published figures, the diffusion series, and where it tells no gap."""
+"""The simulated ripple: published figures, the quick skin factor, where it gives no gap, warm coils."""
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from mount_models.quantity import with_values
+from mount_sim.electronics.electronics import ElectronicsParameters, Noise
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.plant import Plant, PlantSimulation
 from mount_sim.plant.reluctance import (
     ReluctanceActuator,
     core_field,
@@ -15,6 +19,8 @@ from mount_sim.plant.reluctance import (
 )
 from mount_sim.plant.ripple import (
     RippleCoil,
+    TemperatureCoefficients,
+    coil_at,
     current_rate,
     diffusion_time,
     duty,
@@ -85,3 +91,23 @@ def test_a_sample_after_the_end_of_its_phase_is_unknown():
     late = with_values(COIL, sample_delay=150e-6)
     assert math.isnan(skin_factor(late, 0.01, 0.6))
     assert math.isfinite(skin_factor(late, 0.01, 0.8))
+
+
+COIL = RippleCoil()
+
+
+def test_core_and_copper_follow_their_own_coefficients():
+    warm = coil_at(COIL, TemperatureCoefficients(core=0.002, copper=0.004), 70.0)
+    assert warm.conductivity == pytest.approx(COIL.conductivity / 1.1)
+    assert warm.resistance == pytest.approx(COIL.resistance * 1.2)
+    assert warm._replace(conductivity=COIL.conductivity, resistance=COIL.resistance) == COIL
+
+
+def test_the_plant_reads_its_ripple_at_its_temperature():
+    def slope(**changes):
+        plant = Plant(electronics=ElectronicsParameters(coil_temperature=70.0), **changes)
+        return PlantSimulation(plant, Seat.BENCH, 1e-4).read(np.zeros(Noise.NUMBERS))[2]
+
+    told = slope(temperature=TemperatureCoefficients(core=0.002, copper=0.0))
+    more = slope(temperature=TemperatureCoefficients(core=0.004, copper=0.0))
+    assert more < told  # a core that conducts less has more inductance

@@ -92,7 +92,7 @@ def test_default_engine_has_heave_pitch_and_roll_between_7_and_11_hz():
 
 
 def test_the_energy_of_an_engine_on_several_mounts_is_kept_where_nothing_damps():
-    """Of motion between the times of the step, as in `energy.py`: then exactly."""
+    """Of motion between the times of the step: forces and energies then balance exactly."""
     vehicle, engine = VEHICLE._replace(suspension_damping=0.0), ENGINE._replace(rod=SPRING)
     supports = [Support(x, y, VEHICLE._replace(elastomer=SPRING, chassis_damping=0.0)) for x, y in PLACES]
     records, beside = np.concatenate([record(each) for each in supports]), np.zeros(len(supports))

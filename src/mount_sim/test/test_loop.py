@@ -332,22 +332,6 @@ def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_th
     )
 
 
-def test_an_answer_of_the_past_changes_nothing_while_a_good_one_holds(ends, make_mount):
-    end, host = ends
-    mount, setpoints = make_mount(timeline__duration=1.0), []
-    loop = _loop(mount, end)
-    for number in range(60):
-        if number == 30:
-            host.send(Setpoint(1.0, 29))
-        if number == 35:
-            host.send(Setpoint(2.0, 5))
-        loop.send_sample()
-        loop.go_on()
-        setpoints.append(mount.truth['current_setpoint'])
-    assert setpoints == [0.0] * 31 + [1.0] * 20 + [0.0] * 9
-    assert loop.figures.answered == 1
-
-
 # Faults and real time
 
 

@@ -3,28 +3,17 @@
 import numpy as np
 import pytest
 
-from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
-from mount_sim.excitation.building import build_excitation, write_excitation
-from mount_sim.excitation.excitation import Excitation, Seat
-from mount_sim.excitation.scenario import STEP_TIME
+from mount_sim.excitation.building import build_excitation
 from mount_sim.plant.mounts import MOUNTS, seated_mount
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 PERIOD = 125  # samples of 8 Hz
-CHASSIS = {'scenario': 'recorded', 'timeline__duration': 1.0}
 
 
 def closed(number):
     """A setpoint that presses the pads."""
     return 1.0
-
-
-@pytest.fixture
-def shaken_chassis(tmp_path):
-    values = series_of(2.0 * np.sin(2 * np.pi * 6.0 * STEP_TIME * np.arange(50_000)))
-    shaken = Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, 0.0)
-    return {**CHASSIS, 'recorded__file': str(write_excitation(tmp_path / 'z.npy', shaken))}
 
 
 def harmonics(truth):
@@ -60,17 +49,6 @@ def test_the_driver_of_friction_off_opens_when_the_excitation_begins(make_mount,
     assert (truth['current_setpoint'][201:] == 0.0).all()
     assert (truth['coil_current'][260:] == 0.0).all()
     assert (truth['friction_force'][260:] == 0.0).all()
-
-
-@pytest.mark.parametrize('seat', ['motorway', 'recorded'])
-def test_each_mount_moves_the_engine_in_its_own_way(make_mount, drive, shaken_chassis, seat):
-    chosen = shaken_chassis if seat == 'recorded' else {'scenario': 'motorway', 'timeline__duration': 1.0}
-    peaks = {
-        mount: np.abs(drive(make_mount(**chosen, mount=mount), closed)[1]['displacement']).max()
-        for mount in ('friction', 'friction_off', 'hydro', 'elastomer')
-    }
-    assert peaks['friction'] < peaks['hydro'] < peaks['elastomer']
-    assert peaks['friction_off'] == pytest.approx(peaks['elastomer'], rel=0.02)
 
 
 def test_road_and_idle_force_move_the_vehicle_as_its_law_alone_says(make_mount, drive, parameters):

@@ -177,13 +177,6 @@ def test_readings_that_are_wild_or_missing_now_and_then_are_no_fault(learnt, eve
     assert fed(learnt, samples) is None
 
 
-@pytest.mark.parametrize('celsius', [-40.0, 122.0])
-def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
-    other = coil_at(celsius)
-    assert fed(learnt, readings(DAMPING[:100], other), begin=10_000) is None
-    assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
-
-
 def test_a_deviation_that_goes_is_no_fault(learnt):
     missing = MECHANICS._replace(contact_gap=20e-6)
     for begin in range(10_000, 20_000, 1000):

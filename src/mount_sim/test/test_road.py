@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from mount_models.quantity import ParameterError
 from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
 from mount_sim.excitation.scenario import SweepScenario
 
@@ -56,19 +55,3 @@ def test_sweep_begins_level_and_then_has_its_formula():
     assert sweep_road([7.0], sweep)[0] == pytest.approx(
         -0.2 / (2.0 * np.pi * 8.0) * np.cos(2.0 * np.pi * (7.0 + 24.5)), rel=1e-9
     )
-
-
-@pytest.mark.parametrize(
-    ('call', 'error', 'sentence'),
-    [
-        (lambda: random_road([0.0], RandomRoad(speed=0.0)), ParameterError, r'speed \(0 m/s\)'),
-        (
-            lambda: random_road([0.0], RandomRoad(lowest_frequency=5.0)),
-            ParameterError,
-            r'highest_frequency \(3 cycles/m\) must lie above lowest_frequency \(5 cycles/m\)',
-        ),
-    ],
-)
-def test_nonsense_is_refused_with_a_sentence(call, error, sentence):
-    with pytest.raises(error, match=sentence):
-        call()

@@ -8,21 +8,6 @@ from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import Plant, PlantSimulation
 
 
-@pytest.mark.parametrize('scenario', ['bench', 'motorway'])
-def test_behind_the_end_of_the_run_nothing_shakes_the_mount(make_mount, drive, scenario):
-    mount = make_mount(
-        scenario=scenario, timeline__duration=0.33, motorway__gap_depth=0.0, idle__amplitude=0.0
-    )
-    _, truth = drive(mount)
-    road = truth['road_height'][-1]
-    for _ in range(3000):
-        mount.advance(None)
-        mount.measure()
-    assert mount.sample == 3330
-    assert mount.truth['road_height'] == pytest.approx(road, abs=1e-4)
-    assert abs(mount.truth['velocity']) < 1e-5
-
-
 def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mount):
     """As on the bus: the answer to sample k is there when sample k+1 is taken, and acts from then on."""
     mount, answer, currents = make_mount(), None, []
@@ -60,15 +45,6 @@ def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
         currents.append(mount.truth['current_setpoint'])
         mount.advance(1.0 if number == 10 else None, 15)
     assert [number for number, current in enumerate(currents) if current > 0.0] == list(range(11, 16))
-
-
-def test_friction_needs_a_closed_actuator_and_opposes_the_motion(make_mount, drive):
-    _, truth = drive(make_mount(timeline__duration=1.0), lambda number: 1.0)
-    assert truth['normal_force'][-500:].min() > 60.0
-    work = np.sum(truth['friction_force'] * truth['velocity']) * 1e-3
-    assert work > 3.0  # J: it takes energy out
-    _, open_truth = drive(make_mount(timeline__duration=1.0), lambda number: 0.3)
-    assert (open_truth['friction_force'] == 0.0).all()
 
 
 def test_equal_seeds_give_equal_readings_to_the_bit(make_mount, drive):

@@ -27,10 +27,6 @@ class StreamedSeries:
         """Return its first numbers, at most `count`."""
         return StreamedSeries(min(count, self._count), self._make)
 
-    def plus(self, other: 'StreamedSeries') -> 'StreamedSeries':
-        """Return the sums of its numbers and those of a series of the same length."""
-        return StreamedSeries(self._count, lambda first, behind: self[first:behind] + other[first:behind])
-
 
 def series_of(values: NDArray[np.float64]) -> StreamedSeries:
     """Return `values` (n,), which are in memory, as a series."""

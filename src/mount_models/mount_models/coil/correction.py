@@ -70,13 +70,10 @@ def inductance_at_calibration(
     share = _checked_share(compensation, celsius)
     if share == 0.0:
         return inductance
-
     curve, shift = curves.inductance_of_gap, compensation.reluctance_shift
-
-    def reluctance(gap: float) -> float:
-        return 1.0 / float(evaluate(curve, gap))
-
-    return 1.0 / _without_shift(1.0 / inductance, reluctance, share, shift, curve)
+    return 1.0 / _without_shift(
+        1.0 / inductance, lambda gap: 1.0 / float(evaluate(curve, gap)), share, shift, curve
+    )
 
 
 def crossing_at_calibration(
@@ -89,13 +86,8 @@ def crossing_at_calibration(
     share = _checked_share(compensation, celsius)
     if share == 0.0:
         return current
-
     curve, shift = curves.crossing_current_of_gap, compensation.crossing_shift
-
-    def crossing(gap: float) -> float:
-        return float(evaluate(curve, gap))
-
-    return _without_shift(current, crossing, share, shift, curve)
+    return _without_shift(current, lambda gap: float(evaluate(curve, gap)), share, shift, curve)
 
 
 def check_compensation(compensation: TemperatureCompensation, curves: GapCurves) -> None:
@@ -156,25 +148,22 @@ def _without_shift(
     shift: ScaledPolynomial,
     curve: ScaledPolynomial,
 ) -> float:
-    """Return `value` less the share of the shift at the gap at which it is what is measured."""
-    gap = _gap_at(lambda gap: calibrated(gap) + share * _shift(shift, gap), value, curve)
-    return value - share * _shift(shift, gap)
+    """Return `value` less the share of the shift at the gap (m) at which it is what is measured.
+
+    Where the curve does not reach it, the nearer end counts.
+    """
+    low, high = curve.low, curve.high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if calibrated(middle) + share * _shift(shift, middle) < value:
+            low = middle
+        else:
+            high = middle
+    return value - share * _shift(shift, 0.5 * (low + high))
 
 
 def _shift(shift: ScaledPolynomial, gap: float) -> float:
     return float(evaluate(shift, min(max(gap, shift.low), shift.high)))
-
-
-def _gap_at(rising: Callable[[float], float], value: float, curve: ScaledPolynomial) -> float:
-    """Return the gap (m) of the curve at which a `rising` function reaches `value`, or the nearer end."""
-    low, high = curve.low, curve.high
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if rising(middle) < value:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
 
 
 FloatArray = npt.NDArray[np.float64]

@@ -7,21 +7,19 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from mount_driver.bus import Frame
 from mount_driver.can_library import can
-from mount_driver.protocol import MountCodec, Status
+from mount_driver.protocol import MountCodec
 from mount_models.quantity import ParameterError
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
-from mount_sim.electronics.electronics import Reading
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
 
-if TYPE_CHECKING:
-    from mount_sim.plant.plant import Plant
-
 Frames = list[can.Message]
+Change = Callable[['Fault', Any], Any] | None
+"""What becomes of a value while a fault is present."""
 
 
 class Kind(NamedTuple):
@@ -34,12 +32,12 @@ class Kind(NamedTuple):
     """
 
     meaning: str
-    reading: 'Callable[[Fault, Reading], Reading] | None' = None
-    counters: 'Callable[[Fault, tuple[int, int]], tuple[int, int]] | None' = None
-    frames: 'Callable[[Fault, Frames], Frames] | None' = None
-    status: 'Callable[[Fault, Status], Status] | None' = None
-    current: 'Callable[[Fault, float], float] | None' = None
-    plant: 'Callable[[Fault, Plant], Plant] | None' = None
+    reading: Change = None
+    counters: Change = None
+    frames: Change = None
+    status: Change = None
+    current: Change = None
+    plant: Change = None
     deaf: bool = False
     """Setpoints are not received."""
     duration: float = math.inf
@@ -123,12 +121,7 @@ _WIDTH_SAMPLE, _WIDTH_MICROSECOND = 1 << 16, 1 << 32
 _US = 1e6  # us per s
 
 
-def _none_sent(fault: Fault, frames: Frames) -> Frames:
-    """Send no frame."""
-    return []
-
-
-def _bus_off(fault: Fault, frames: Frames) -> Frames:
+def _bus_off(fault, frames):
     """Send the error frame of a controller that is bus off, then nothing.
 
     An error frame is local to a controller and no bus carries it. SocketCAN shows the controller's own to the
@@ -139,32 +132,27 @@ def _bus_off(fault: Fault, frames: Frames) -> Frames:
     return [error] if fault.count == 1 else []
 
 
-def _lost(share: float) -> Callable[[Fault, Frames], Frames]:
+def _lost(share):
     """Lose this share of the frames, at random."""
 
-    def some(fault: Fault, frames: Frames) -> Frames:
+    def some(fault, frames):
         arriving = fault.random.uniform(len(frames)) >= share
         return [frame for frame, arrives in zip(frames, arriving, strict=True) if arrives]
 
     return some
 
 
-def _delayed(samples: int) -> Callable[[Fault, Frames], Frames]:
+def _delayed(samples):
     """Delay frames by some samples; those under way when the fault ends are lost."""
 
-    def late(fault: Fault, frames: Frames) -> Frames:
+    def late(fault, frames):
         fault.past.append(_copies(frames))
         return fault.past.popleft() if len(fault.past) > samples else []
 
     return late
 
 
-def _duplicated(fault: Fault, frames: Frames) -> Frames:
-    """Send each frame twice."""
-    return [frame for frame in frames for _ in range(2)]
-
-
-def _reordered(fault: Fault, frames: Frames) -> Frames:
+def _reordered(fault, frames):
     """Send the frames of every tenth sample after those of the next."""
     fault.count += 1
     if fault.count % _REORDERED == 0:
@@ -173,7 +161,7 @@ def _reordered(fault: Fault, frames: Frames) -> Frames:
     return frames + fault.past.popleft() if fault.past else frames
 
 
-def _frozen_counter(fault: Fault, frames: Frames) -> Frames:
+def _frozen_counter(fault, frames):
     """Give all measurements the same alive counter, with a check sum that is right."""
     for frame in frames:
         if frame.arbitration_id == _CODEC.measurement.frame_id:
@@ -182,10 +170,10 @@ def _frozen_counter(fault: Fault, frames: Frames) -> Frames:
     return frames
 
 
-def _damaged(damage: Callable[[can.Message], None]) -> Callable[[Fault, Frames], Frames]:
+def _damaged(damage):
     """Damage the frames of every third sample."""
 
-    def some(fault: Fault, frames: Frames) -> Frames:
+    def some(fault, frames):
         fault.count += 1
         if fault.count % _EVERY == 1:
             for frame in frames:
@@ -195,37 +183,36 @@ def _damaged(damage: Callable[[can.Message], None]) -> Callable[[Fault, Frames],
     return some
 
 
-def _change_byte(frame: can.Message) -> None:
-    """Change the last byte."""
+def _change_last_byte(frame):
     frame.data[-1] ^= 0xFF
 
 
-def _shorten(frame: can.Message) -> None:
+def _shorten(frame):
     """Remove the last bytes."""
     frame.data = frame.data[:-_LENGTH_LESS]
     frame.dlc = len(frame.data)
 
 
-def _replayed(fault: Fault, frames: Frames) -> Frames:
+def _replayed(fault, frames):
     """Send after each frame one of 100 samples ago once more, as it was."""
     fault.past.append(_copies(frames))
     return frames + fault.past.popleft() if len(fault.past) > _REPLAYED else frames
 
 
-def _babbling(fault: Fault, frames: Frames) -> Frames:
+def _babbling(fault, frames):
     """Add frames of another node, with identifiers that are none of this mount's."""
     numbers = fault.random.uniform(_BABBLED)
     foreign = (Frame(_FOREIGN[int(number * len(_FOREIGN))], number.tobytes()) for number in numbers)
     return [*frames, *foreign]
 
 
-def _drifting_clock(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _drifting_clock(fault, counters):
     """Let the microsecond counter run 1000 ppm too fast."""
     sample, microseconds = counters
     return sample, microseconds + round(_CLOCK_DRIFT * (microseconds - round(fault.begin * _US)))
 
 
-def _wrapping_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _wrapping_counters(fault, counters):
     """Let both counters go through their highest value to 0 when the fault begins."""
     sample, microseconds = counters
     wrap = round(fault.begin * fault.sample_rate)
@@ -235,7 +222,7 @@ def _wrapping_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, in
     )
 
 
-def _reset_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _reset_counters(fault, counters):
     """Start both counters from 0 when the power is back; until then no setpoint is received."""
     back = round(fault.end * fault.sample_rate)
     after = counters[0] - back
@@ -243,7 +230,7 @@ def _reset_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
     return counters if fault.deaf else (after, round(after / fault.sample_rate * _US))
 
 
-def _copies(frames: Frames) -> Frames:
+def _copies(frames):
     """Return the frames as they are now, which no later change of the given ones changes."""
     return [Frame(frame.arbitration_id, bytearray(frame.data)) for frame in frames]
 
@@ -252,27 +239,27 @@ def _copies(frames: Frames) -> Frames:
 
 
 def _displacement(meaning: str, change: Callable[[Fault, float], float]) -> Kind:
-    def reading(fault: Fault, reading: Reading) -> Reading:
+    def reading(fault, reading):
         return reading._replace(displacement=change(fault, reading.displacement))
 
     return Kind(meaning, reading=reading)
 
 
-def _noisy(fault: Fault, displacement: float) -> float:
+def _noisy(fault, displacement):
     return displacement + _NOISE * float(fault.random.normal(1, 1)[0, 0])
 
 
-def _flipped(fault: Fault, displacement: float) -> float:
+def _flipped(fault, displacement):
     fault.count += abs(displacement) > _FAR
     return -displacement if fault.count else displacement
 
 
-def _drifting(fault: Fault, displacement: float) -> float:
+def _drifting(fault, displacement):
     fault.drift += _DRIFT / fault.sample_rate
     return displacement + fault.drift
 
 
-def _ripple_noisy(fault: Fault, reading: Reading) -> Reading:
+def _ripple_noisy(fault, reading):
     current, flux = 1.0 + _RIPPLE_NOISE * math.sqrt(0.5) * fault.random.normal(1, 2)[0]
     return reading._replace(
         current_rate=float(current) * reading.current_rate, flux_rate=float(flux) * reading.flux_rate
@@ -286,13 +273,13 @@ def _reported(meaning: str, **status: Any) -> Kind:
 def _supply(meaning: str, volts: float) -> Kind:
     """The status reports the voltage and the current loop has it."""
 
-    def plant(fault: Fault, plant: 'Plant') -> 'Plant':
+    def plant(fault, plant):
         return plant._replace(coil=plant.coil._replace(link_voltage=max(volts, _DEAD_SUPPLY)))
 
     return Kind(meaning, status=lambda _, sound: sound._replace(supply_voltage=volts), plant=plant)
 
 
-def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
+def _coil_shorted(fault, plant):
     """Half of the resistance, a quarter of the inductance and of the force."""
     return plant._replace(
         coil=plant.coil._replace(resistance=_SOUND_TURNS * plant.coil.resistance),
@@ -300,7 +287,7 @@ def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
     )
 
 
-def _coil_hot(fault: Fault, plant: 'Plant') -> 'Plant':
+def _coil_hot(fault, plant):
     celsius = REFERENCE_CELSIUS + _HOTTER / (plant.temperature.copper or TemperatureCoefficients().copper)
     return plant._replace(electronics=plant.electronics._replace(coil_temperature=fault.keep(celsius)))
 
@@ -308,7 +295,7 @@ def _coil_hot(fault: Fault, plant: 'Plant') -> 'Plant':
 def _mechanics(meaning: str, *, scale: float | None = None, **changes: float) -> Kind:
     """The closing mechanics have other values, and the friction another scale."""
 
-    def plant(fault: Fault, plant: 'Plant') -> 'Plant':
+    def plant(fault, plant):
         friction = plant.friction if scale is None else plant.friction._replace(scale=scale)
         return plant._replace(mechanics=plant.mechanics._replace(**changes), friction=friction)
 
@@ -320,17 +307,19 @@ def _bus(meaning: str, change: Any = None, **options: Any) -> Kind:
 
 
 FAULTS: dict[str, Kind] = {
-    'can_silent': _bus('no frames are sent', _none_sent),
+    'can_silent': _bus('no frames are sent', lambda *_: []),
     'bus_off': _bus('an error frame tells of bus off, then no frame passes either way', _bus_off, deaf=True),
     'lost_1': _bus('1 % of the frames are lost, at random', _lost(0.01)),
     'lost_5': _bus('5 % of the frames are lost, at random', _lost(0.05)),
     'lost_50': _bus('50 % of the frames are lost, at random', _lost(0.5)),
     'delayed': _bus('frames arrive 5 ms late', _delayed(5)),
     'delayed_50': _bus('frames arrive 50 ms late', _delayed(50)),  # later than the setpoint timeout
-    'duplicated': _bus('each frame arrives twice', _duplicated),
+    'duplicated': _bus(
+        'each frame arrives twice', lambda _, sent: [frame for frame in sent for _ in range(2)]
+    ),
     'reordered': _bus('the frames of every tenth sample arrive behind those of the next', _reordered),
     'frozen_counter': _bus('all measurements carry the same alive counter', _frozen_counter),
-    'wrong_crc': _bus('the frames of every third sample are damaged', _damaged(_change_byte)),
+    'wrong_crc': _bus('the frames of every third sample are damaged', _damaged(_change_last_byte)),
     'wrong_length': _bus('the frames of every third sample are 4 bytes too short', _damaged(_shorten)),
     'replayed': _bus('behind each frame comes one of 100 samples ago once more', _replayed),
     'babbling': _bus('5 frames with foreign identifiers in each sample', _babbling),

@@ -6,8 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mount_models.arithmetic.elementary import sines
-from mount_models.arithmetic.series import StreamedSeries, series_over_time
+from mount_models.arithmetic.series import StreamedSeries
 from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 
@@ -46,18 +45,6 @@ class Excitation:
     def duration(self) -> float:
         """Length in s."""
         return len(self.values) * self.step_time
-
-
-def idle_force(
-    amplitude: float, frequency: float, second_share: float, count: int, step_time: float
-) -> StreamedSeries:
-    """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
-
-    def force(time: NDArray[np.float64]) -> NDArray[np.float64]:
-        turns = frequency * time
-        return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))
-
-    return series_over_time(count, step_time, force)
 
 
 def steps_of_sample(sample_rate: float, step_time: float) -> int:

@@ -94,11 +94,6 @@ class PlantSimulation:
         self.truth = self._truth.view(TRUTH)[0]
         """The truth at the last `read`."""
 
-    @property
-    def truth_bytes(self) -> bytes:
-        """The truth at the last `read` as little-endian float64 numbers."""
-        return self._truth.tobytes()
-
     def read(self, noise: NDArray[np.float64]) -> tuple[float, float, float, float]:
         """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
         return read(self.memory.plant, self.memory.state, self._truth, noise)

@@ -89,6 +89,8 @@ class SimulatedMount:
         self._shaking, self._move, self._noise = shaking, move, noise
         self.run = Run(shaking.samples, shaking.start, shaking.sample_rate)
         self._sound_plant, self._plant = plant, simulation
+        self.truth = simulation.truth
+        """What no sensor saw at the last `measure`."""
         self.sample_rate = shaking.sample_rate
         """Hz"""
         self.sample_time = sample_time_ns(self.sample_rate)
@@ -123,14 +125,9 @@ class SimulatedMount:
         return self.enabled and not self._driver_open
 
     @property
-    def truth(self) -> np.void:
-        """What no sensor saw at the last `measure`."""
-        return self._plant.truth
-
-    @property
     def truth_bytes(self) -> bytes:
         """The same as little-endian float64 numbers in the order of `sim/truth`."""
-        return self._plant.truth_bytes
+        return self.truth.tobytes()
 
     def measure(self) -> Reading:
         """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
