@@ -11,10 +11,9 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import atan
+from mount_models.arrays import FloatArray
 from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
 from mount_models.sampling import HIGHEST_CURRENT
-
-FloatArray = npt.NDArray[np.float64]
 
 LOWEST_SHARE = 1.0 / 60.0
 """Of the highest current, chosen: 0.05 A of 3 A."""

@@ -19,10 +19,9 @@ import yaml
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.sums import each_interpolated
+from mount_models.arrays import FloatArray
 from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
 from mount_models.quantity import ParameterError, Quantity, check_name, checked
-
-FloatArray = npt.NDArray[np.float64]
 
 SMALLEST_DEAD_ZONE = 0.0001
 """A dead zone is none at all or at least this wide (m/s, chosen), because it sets the grid of the table."""

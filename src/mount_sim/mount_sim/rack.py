@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike
 
+from mount_models.arrays import FloatArray
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError, with_values
@@ -31,8 +32,6 @@ from mount_sim.plant.ripple import (
     current_rate,
     flux_rate,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 GAPS = np.linspace(270e-6, 550e-6, 15)
 """Gaps held one after the other while the force is taken, m (chosen)."""

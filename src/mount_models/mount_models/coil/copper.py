@@ -17,9 +17,9 @@ import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_models.arithmetic.sums import least_squares, mean
+from mount_models.arrays import FloatArray
 from mount_models.quantity import ParameterError, Quantity
 
 COPPER_COEFFICIENT = 0.00393
@@ -27,8 +27,6 @@ COPPER_COEFFICIENT = 0.00393
 
 REFERENCE_CELSIUS = 20.0
 """Temperature at which the resistance of a coil is given, degC."""
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class CoilResistance(NamedTuple):

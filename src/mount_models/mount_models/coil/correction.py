@@ -17,6 +17,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_models.arrays import FloatArray
 from mount_models.coil.copper import resistance_at
 from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
 from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
@@ -164,9 +165,6 @@ def _without_shift(
 
 def _shift(shift: ScaledPolynomial, gap: float) -> float:
     return float(evaluate(shift, min(max(gap, shift.low), shift.high)))
-
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Bridge(NamedTuple):

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.sums import combination_std, least_squares
-
-FloatArray = npt.NDArray[np.float64]
+from mount_models.arrays import FloatArray
 
 
 class CrossingError(ValueError):

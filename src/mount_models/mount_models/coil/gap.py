@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_models.arrays import FloatArray
 from mount_models.quantity import LawRefusedError, OutsideLawError
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class ScaledPolynomial(NamedTuple):

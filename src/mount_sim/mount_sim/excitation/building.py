@@ -12,10 +12,10 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_of, series_over_time
+from mount_models.arrays import FloatArray
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
@@ -62,8 +62,6 @@ def read_excitation(file: str, seat: Seat) -> StreamedSeries:
             )
     return series_of(values)
 
-
-FloatArray = NDArray[np.float64]
 
 _DEFAULT_DURATION = 15.0  # s, chosen
 

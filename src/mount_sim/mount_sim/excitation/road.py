@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import cosines, exp, log, sine_and_cosine, sines
+from mount_models.arrays import FloatArray
 from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.random_numbers import RandomNumbers
 
-FloatArray = npt.NDArray[np.float64]
 REFERENCE_FREQUENCY = 0.1
 """n0 of ISO 8608 in cycles/m."""
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arrays import ByteArray, FloatArray
 from mount_models.friction.contact import check_friction
 from mount_models.quantity import ParameterError, flattened
 from mount_sim.excitation.excitation import Seat
@@ -51,8 +51,6 @@ _DISPLACEMENT = STATE.fields['displacement'][1] // 8
 _NUMBERS = STATE.itemsize // 8
 _NOTHING = np.zeros(1)
 
-FloatArray = NDArray[np.float64]
-
 
 class CarLaw(NamedTuple):
     """What the mounts share."""
@@ -67,12 +65,12 @@ _CAR = record_dtype(CarLaw)
 class CarMemory(NamedTuple):
     """Parameters and state as bytes of records, those of the mounts one behind the other."""
 
-    law: NDArray[np.uint8]  # `CarLaw`
-    plants: NDArray[np.uint8]  # `PLANT`
-    states: NDArray[np.uint8]  # `STATE`
-    supports: NDArray[np.uint8]  # `SUPPORT`
-    body: NDArray[np.uint8]  # `BODY_STATE`
-    motions: NDArray[np.uint8]  # `SUPPORT_STATE`
+    law: ByteArray  # `CarLaw`
+    plants: ByteArray  # `PLANT`
+    states: ByteArray  # `STATE`
+    supports: ByteArray  # `SUPPORT`
+    body: ByteArray  # `BODY_STATE`
+    motions: ByteArray  # `SUPPORT_STATE`
 
 
 @compiled

@@ -22,14 +22,12 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import number_record, record_dtype
+from mount_models.arrays import FloatArray
 from mount_models.quantity import ParameterError, Quantity
 from mount_sim.plant.vehicle import BRANCHES, Elastomer, Vehicle, elastomer_force, stretch_branches
-
-FloatArray = npt.NDArray[np.float64]
 
 _LOWEST_MODE = 0.5  # Hz, chosen: below it the engine is held by nothing
 

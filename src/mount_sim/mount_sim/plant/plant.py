@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import number_record, record_bytes, record_dtype, record_type
+from mount_models.arrays import ByteArray, FloatArray
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked
@@ -73,8 +73,8 @@ TRUTH = number_record(*SIM_TRUTH.names)
 class Memory(NamedTuple):
     """Bytes of parameters and state, the seat's number, step of the plant in s."""
 
-    plant: NDArray[np.uint8]
-    state: NDArray[np.uint8]
+    plant: ByteArray
+    state: ByteArray
     seat: int
     step_time: float
 
@@ -94,13 +94,11 @@ class PlantSimulation:
         self.truth = self._truth.view(TRUTH)[0]
         """The truth at the last `read`."""
 
-    def read(self, noise: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    def read(self, noise: FloatArray) -> tuple[float, float, float, float]:
         """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
         return read(self.memory.plant, self.memory.state, self._truth, noise)
 
-    def advance(
-        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
-    ) -> None:
+    def advance(self, values: FloatArray, engine_forces: FloatArray, wanted_current: float) -> None:
         """Advance by one step for each of the excitation's `values`, with a current setpoint in A.
 
         `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.

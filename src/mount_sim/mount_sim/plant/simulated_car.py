@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.record import record_bytes
+from mount_models.arrays import FloatArray
 from mount_models.quantity import checked, with_flattened
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
@@ -61,10 +61,10 @@ class Ahead(NamedTuple):
     """
 
     memory: Memory
-    values: NDArray[np.float64]
-    engine_forces: NDArray[np.float64]
+    values: FloatArray
+    engine_forces: FloatArray
     driver_open: bool
-    noise: NDArray[np.float64]
+    noise: FloatArray
 
 
 class SimulatedMount:
