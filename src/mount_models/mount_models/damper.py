@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.sums import each_interpolated
 from mount_models.arrays import FloatArray
-from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, Quantity, check_name, checked
 
 SMALLEST_DEAD_ZONE = 0.0001
@@ -30,8 +29,7 @@ LONGEST_VELOCITY_STEP = 0.0005
 STEP_OF_POINTS = 0.0001
 """Grid of the table of an own characteristic (m/s, chosen), whose corners lie anywhere."""
 COLUMNS = ('velocity', 'force')
-"""Names of the columns, m/s and N, in a file and in a mapping."""
-FILE_ENDING = '.csv'
+"""Names of the columns, m/s and N."""
 HIGHEST_VELOCITY = 1.0
 """A characteristic ends here (m/s, chosen): twenty times the peak velocity of 8 Hz with 1 mm."""
 HIGHEST_FORCE = 1e4
@@ -134,15 +132,15 @@ DAMPERS: dict[str, Any] = {
 """The characteristics with a name of their own."""
 
 _KNOWN = (
-    f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, points '
-    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}, or a file of points ({FILE_ENDING})'
+    f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, or points '
+    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}'
 )
 
 
 def damper_curve(choice: Any) -> DamperCurve:
     """Return the curve of a text, a law, or a mapping: of a law and its parameters, or of points.
 
-    A text is a name in `DAMPERS`, `viscous_<N s/m>`, a mapping in YAML, or the path of a file of points.
+    A text is a name in `DAMPERS`, `viscous_<N s/m>`, or a mapping in YAML.
     A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default; or
     {'velocity': [...], 'force': [...]} in m/s and N, joined by straight lines and constant behind the last.
     Raises `ParameterError` if it is unknown or unusable, `ParameterError` for a value outside its range.
@@ -157,10 +155,7 @@ def damper_curve(choice: Any) -> DamperCurve:
 
 
 def damper_text(choice: str | Mapping[str, Any]) -> str:
-    """Return a text that means what `choice` means, also where a file that it names is not there."""
-    if isinstance(choice, str) and choice.endswith(FILE_ENDING):
-        velocity, force = _points_in(Path(choice).expanduser())
-        choice = {'velocity': velocity.tolist(), 'force': force.tolist()}
+    """Return the text, in one line, that means what `choice` means."""
     if isinstance(choice, Mapping):
         return yaml.safe_dump(dict(choice), default_flow_style=True, sort_keys=False, width=1 << 30).strip()
     return choice
@@ -171,9 +166,6 @@ def _curve_of_text(text: str) -> DamperCurve:
         return _tabulated(text, DAMPERS[text])
     if viscous_text := _VISCOUS.fullmatch(text):
         return _tabulated(text, ViscousDamper(float(viscous_text[1])))
-    if text.endswith(FILE_ENDING):
-        path = Path(text).expanduser()
-        return _curve_of_points(path.stem, *_points_in(path))
     try:
         mapping = plain_yaml(text)
     except YamlError as error:
@@ -231,21 +223,6 @@ def _velocity_step(dead_zone: float) -> float:
     if dead_zone == 0.0:
         return LONGEST_VELOCITY_STEP
     return dead_zone / math.ceil(dead_zone / LONGEST_VELOCITY_STEP)
-
-
-def _points_in(path: Path) -> tuple[FloatArray, FloatArray]:
-    """Return velocities (m/s) and forces (N) of a CSV file; raises `ParameterError`."""
-    try:
-        lines = [
-            line for line in text_of_file(path).splitlines() if line.strip() and not line.startswith('#')
-        ]
-        header = [name.strip() for name in lines[0].split(',')] if lines else []
-        columns = np.loadtxt(lines[1:], delimiter=',', ndmin=2).T if lines[1:] else ()
-        return _checked_points(dict(zip(header, columns, strict=False)))
-    except YamlError as error:
-        raise ParameterError(f'damper file {path} {error}') from None
-    except ValueError as error:
-        raise ParameterError(f'damper file {path}: {error}') from None
 
 
 def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:

@@ -93,42 +93,6 @@ def test_points_are_joined_by_straight_lines_and_constant_behind_the_last():
     assert curve.force(-0.05) == pytest.approx(-90.0)
 
 
-@pytest.mark.parametrize(
-    ('name', 'text'),
-    [
-        ('own.csv', '# measured\nvelocity, force\n0, 0\n0.004, 0\n0.05, 90\n\n0.2, 150\n'),
-        ('own.csv', '\ufeffforce,velocity\r\n0,0\r\n0,0.004\r\n90,0.05\r\n150,0.2\r\n'),
-    ],
-)
-def test_a_file_holds_the_same_points(tmp_path, name, text):
-    file = tmp_path / name
-    file.write_text(text, encoding='utf-8')
-    curve = damper_curve(str(file))
-    assert np.array_equal(curve.table, damper_curve(POINTS).table)
-    assert curve.name == 'own'
-    kept = damper_text(str(file))
-    file.unlink()
-    assert np.array_equal(damper_curve(kept).table, curve.table)
-
-
-@pytest.mark.parametrize(
-    ('name', 'text', 'reason'),
-    [
-        ('own.csv', '', 'must have the columns velocity and force, m/s and N'),
-        ('own.csv', 'v,F\n0,0\n', 'must have the columns velocity and force, m/s and N'),
-        ('own.csv', 'velocity,force\n0,0\n0.1,ten\n', "could not convert string 'ten' to float"),
-        ('own.csv', 'velocity,force\n0,0\n0.1\n', 'number of columns changed'),
-        ('own.csv', 'velocity,force\n0,0\n0.1,nan\n', 'force must be a list of finite numbers'),
-    ],
-)
-def test_a_file_that_holds_no_points_is_refused_and_named(tmp_path, name, text, reason):
-    file = tmp_path / name
-    file.write_text(text)
-    with pytest.raises(ParameterError, match=reason) as refused:
-        damper_curve(str(file))
-    assert f'damper file {file}' in str(refused.value)
-
-
 def test_unknown_velocity_gives_unknown_force():
     curve = damper_curve('viscous_2000')
     assert np.isnan(damper_force(curve.table, curve.velocity_step, np.nan))
@@ -140,7 +104,7 @@ def test_unknown_velocity_gives_unknown_force():
         ('soft', "no damper curve is called 'soft'; known are viscous_1000"),
         (
             'viscous_5x',
-            'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file',
+            'known are .* viscous_<N s/m>, a law such as .*, or points',
         ),
         (
             '{law: viscous',
@@ -166,10 +130,6 @@ def test_unknown_velocity_gives_unknown_force():
         ({'velocity': [0, 1], 'force': [5, 9]}, r'force \(5 N at first.* must begin at 0 N'),
         ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, 'friction only opposes motion'),
         ({'velocity': [0, 1], 'force': [0, 0]}, 'must be greater than 0 N somewhere'),
-        (
-            'nowhere.csv',
-            r'damper file nowhere.csv cannot be read \(No such file or directory\)',
-        ),
         ({'law': 'magic'}, "no damper law is called 'magic'; known are viscous"),
         ({'law': 'viscous', 'slope': 5.0}, "'slope' is no parameter of the viscous damper"),
         (ViscousDamper(-5.0), r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),

@@ -18,7 +18,6 @@ from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 _DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
-_LOCKSTEP_WAIT = 0.1  # s: how often a loop in lock-step looks whether it shall end
 _DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
 _FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
 _RESERVE = 1.5  # chosen: times the work's longest time are kept for it
@@ -86,14 +85,14 @@ class ElectronicsLoop:
         self._mount.advance(*self._taken)
         self.figures.samples += 1
 
-    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
-        """Take the next sample if the last one is answered within `wait` s; return whether it was.
+    def step_in_lockstep(self, patience: float) -> bool:
+        """Take the next sample if the last one is answered; return whether it was.
 
         Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
         activation of the node that answers it.
         """
         if self._asked is not None:
-            answer = self._can_end.wait_for_answer(self._asked, wait)
+            answer = self._can_end.answer_to(self._asked)
             if answer is None:
                 self._check_patience(self._asked, patience)
                 return False
@@ -239,19 +238,14 @@ class CarLoop:
     def _discharged(self) -> bool:
         return all(loop.discharged() for loop in self._loops)
 
-    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
-        """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""
-        while not self.finished and not ending.is_set():
-            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
-
-    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+    def step_in_lockstep(self, patience: float) -> bool:
         """Take the next sample of the mount whose turn it is; as `ElectronicsLoop.step_in_lockstep`.
 
         A mount alone has no name; of several the name of the mount leads an error.
         """
         name, loop = self._names[self._turn], self._loops[self._turn]
         try:
-            taken = loop.step_in_lockstep(patience, wait)
+            taken = loop.step_in_lockstep(patience)
         except NoAnswerError as error:
             raise NoAnswerError(f'{name}: {error}' if name else str(error)) from None
         if taken or loop.finished:

@@ -59,6 +59,12 @@ class MountSim(SafeLifecycleNode):
         self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
 
     def configure(self) -> None:
+        interface = self.get_parameter('interface').value
+        if self.lockstep and interface != 'virtual':
+            raise ParameterError(
+                f'lock-step needs the virtual bus of one process; interface is {interface}: set it to '
+                'virtual, or drive with engine-mount drive --lockstep'
+            )
         self._settings = read(self, SimParameters())
         other = {name: self.get_parameter(name).value for name in ('channel', 'port', *self._own)}
         self._values = flattened(self._settings) | other
@@ -88,7 +94,7 @@ class MountSim(SafeLifecycleNode):
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
-        if self.lockstep and interface == 'virtual':
+        if self.lockstep:
             # Both ends of the bus are in this process: the answering node works in the data thread.
             self._path.add_poll(self._step)
         else:
@@ -146,10 +152,7 @@ class MountSim(SafeLifecycleNode):
     def _run(self) -> None:
         assert self._loop is not None
         try:
-            if self.lockstep:
-                self._loop.run_in_lockstep(self._ending, self._patience)
-            else:
-                self._loop.run_in_real_time(self._ending)
+            self._loop.run_in_real_time(self._ending)
         except Exception as error:  # the border of the thread, whatever the reason
             self._fail(error)
 

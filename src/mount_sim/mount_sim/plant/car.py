@@ -21,7 +21,6 @@ from mount_sim.plant.engine_body import (
     SUPPORT,
     SUPPORT_STATE,
     RigidEngine,
-    accelerated_engine_step,
     car_step,
 )
 from mount_sim.plant.hydromount import HYDROMOUNT_STATE
@@ -43,7 +42,7 @@ QUARTERS = 2.0
 GROWTH_ALLOWED = 1e-6
 """Of a motion in one step, chosen: far above rounding, 2 % in a second."""
 
-_BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+_BENCH = int(Seat.BENCH)
 _SHIFT, _SHIFT_OF_CAR = 1e-6, 1e-9  # SI, chosen: small for heights, angles and forces of branches
 _SHIFTS = {'volume': 1e-12, 'flow': 1e-9}  # m^3, m^3/s (chosen): within one piece of the hydromount's laws
 _MOVING = [*VEHICLE_STATE.names, *ENGINE_STATE.names, *HYDROMOUNT_STATE.names]  # first in `STATE`
@@ -95,23 +94,19 @@ def advance_car(law, plants, states, supports, body, motions, seat, values, engi
                 beside[k] = force_beside_elastomer(laws[k], nows[k], nows[k].displacement, dt)
         if seat == _BENCH:
             continue
-        if seat == _ACCELERATED_CHASSIS:
-            accelerated_engine_step(car.engine, places, moved, moves, value, force, beside, dt)
-        else:
-            car_step(car.vehicle, QUARTERS, car.engine, places, moved, moves, value, force, beside, dt)
+        car_step(car.vehicle, QUARTERS, car.engine, places, moved, moves, value, force, beside, dt)
         for k in range(len(places)):
-            _take_motion_of(laws[k], nows[k], moves[k], moved, seat, value, dt)
+            _take_motion_of(laws[k], nows[k], moves[k], moved, value, dt)
 
 
 @compiled
-def _take_motion_of(law, now, motion, body, seat, value, dt):
+def _take_motion_of(law, now, motion, body, value, dt):
     moved = MountMotion(motion.displacement, motion.velocity, motion.mount_force, motion.chassis_acceleration)
     take_motion(law, now, moved, dt)
-    if seat != _ACCELERATED_CHASSIS:
-        now.road_height = value
-        now.vehicle.wheel_height = body.wheel_height
-        now.vehicle.chassis_height = motion.chassis_height
-        now.vehicle.engine_height = motion.engine_height
+    now.road_height = value
+    now.vehicle.wheel_height = body.wheel_height
+    now.vehicle.chassis_height = motion.chassis_height
+    now.vehicle.engine_height = motion.engine_height
 
 
 def checked_plant(plant: Plant, seat: Seat, step_time: float) -> Plant:

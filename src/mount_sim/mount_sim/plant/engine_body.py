@@ -1,4 +1,4 @@
-"""The engine as a rigid body on several mounts: heave, roll and pitch; below it a vehicle or a moved chassis.
+"""The engine as a rigid body on several mounts: heave, roll and pitch; below it a vehicle.
 
     m z'' = F_z - sum F_i
     I_x phi'' = -sum y_i F_i
@@ -14,8 +14,7 @@ local chassis at each mount:
 
     m_u z_u'' = k_t (z_r - z_u) - F_s,  q m_b z_b'' = q F_s - sum F_ci,  m_ci z_ci'' = F_ci + F_i
 
-or a chassis whose acceleration is given; heave is relative to it then. The step is that of
-`mount_sim.plant.vehicle`: semi-implicit Euler.
+The step is that of `mount_sim.plant.vehicle`: semi-implicit Euler.
 """
 
 from collections.abc import Mapping, Sequence
@@ -106,19 +105,7 @@ def car_step(vehicle, quarters, engine, supports, body, states, road_height, eng
     body.body_velocity += dt * (quarters * suspension - carriers) / (quarters * vehicle.body_mass)
     body.wheel_height += dt * body.wheel_velocity
     body.body_height += dt * body.body_velocity
-    _move_engine(engine, supports, body, states, engine_force, 0.0, dt)
-
-
-@compiled
-def accelerated_engine_step(engine, supports, body, states, acceleration, engine_force, beside, dt):
-    """Advance the engine by `dt` seconds on a chassis with `acceleration` (m/s^2, up); others as `car_step`.
-
-    The heave is relative to the chassis, which does not move in its own frame.
-    """
-    for k in range(len(supports)):
-        _note_force(supports[k], states[k], beside[k])
-        states[k].chassis_acceleration = acceleration
-    _move_engine(engine, supports, body, states, engine_force, acceleration, dt)
+    _move_engine(engine, supports, body, states, engine_force, dt)
 
 
 @compiled
@@ -127,7 +114,7 @@ def _note_force(support, state, beside):
 
 
 @compiled
-def _move_engine(engine, supports, body, states, engine_force, acceleration, dt):
+def _move_engine(engine, supports, body, states, engine_force, dt):
     """Move the engine by the forces noted in `states`, then the mounts with it."""
     lift, rolling, pitching = engine_force, 0.0, 0.0
     for k in range(len(supports)):
@@ -136,7 +123,7 @@ def _move_engine(engine, supports, body, states, engine_force, acceleration, dt)
         rolling -= supports[k].y * force
         pitching += supports[k].x * force
     pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, body)
-    body.engine_velocity += dt * (lift / engine.mass - acceleration)
+    body.engine_velocity += dt * (lift / engine.mass)
     body.roll_rate += dt * rolling / engine.roll_inertia
     body.pitch_rate += dt * pitching / engine.pitch_inertia
     body.engine_height += dt * body.engine_velocity

@@ -10,7 +10,7 @@ import numpy as np
 
 from mount_models.arithmetic.record import record_bytes
 from mount_models.arrays import FloatArray
-from mount_models.quantity import checked, with_flattened
+from mount_models.quantity import ParameterError, checked, with_flattened
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults import Faults
@@ -204,6 +204,11 @@ class SimulatedCar:
             checked_plant(each.plant, seat, step_time)
         self._memory: CarMemory | None = None
         if ALONE not in chosen:
+            if seat is Seat.ACCELERATED_CHASSIS:
+                raise ParameterError(
+                    f'scenario recorded moves one mount alone; leave out mounts ({general.mounts}), '
+                    'or choose another scenario'
+                )
             supports = {
                 name: Support(*getattr(general.places, name), each.vehicle) for name, each in chosen.items()
             }
