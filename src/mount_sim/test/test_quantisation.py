@@ -29,7 +29,7 @@ def over_can(name, value):
         data = CODEC.encode_measurement(SAMPLE._replace(**{name: value}), 0)
     except ParameterError:
         return math.nan
-    return getattr(CODEC.decode_measurement(data)[1], name)
+    return getattr(CODEC.measurement.decode(data)[1], name)
 
 
 def same_bits(left, right):
@@ -59,7 +59,7 @@ def test_a_reading_is_quantised_as_over_can(name):
 @example(3.0)
 def test_a_setpoint_is_quantised_as_over_can(value):
     try:
-        expected = CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
+        expected = CODEC.setpoint.decode(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
     except ParameterError:
         expected = math.nan
     assert same_bits(quantisation.quantised_setpoint_current(value), expected)
@@ -73,7 +73,7 @@ def test_a_setpoint_is_quantised_as_over_can(value):
 @example(math.nextafter(250.0, math.inf))
 def test_a_coil_temperature_is_quantised_as_over_can(value):
     try:
-        expected = CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0))[
+        expected = CODEC.status.decode(CODEC.encode_status(Status(14.0, value), 0))[
             1
         ].coil_temperature_celsius
     except ParameterError:
