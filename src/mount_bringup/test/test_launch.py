@@ -68,15 +68,6 @@ def test_the_supervisor_ends_with_launch_and_is_not_killed_while_a_recorder_writ
     assert min(float(process[name]) for name in ('sigterm_timeout', 'sigkill_timeout')) >= 3600.0
 
 
-def test_the_real_time_priority_that_launch_runs_at_is_the_loops_and_not_that_of_the_start(
-    launch, monkeypatch
-):
-    monkeypatch.setattr(launch, 'drop_real_time', lambda: 20)
-    assert 'priority:=20' in Launched(launch, 'sim', recording='bags/none').command
-    assert 'priority 20, now ordinary' in launch.LogInfo.call_args.kwargs['msg']
-    assert 'priority:=10' in Launched(launch, 'sim', recording='bags/none', priority='10').command
-
-
 def test_launch_ends_as_the_supervisor_does(launch):
     on_exit = Launched(launch, 'sim', recording='bags/none').process['on_exit']
     for code in (0, -2):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
 
@@ -21,7 +21,6 @@ from mount_bringup.graph.processes import QUIET_START
 from mount_bringup.graph.run import SUPERVISOR
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.process import environment_of_children
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 _PATIENCE = '86400'  # s, chosen: the supervisor has limits of its own, and a recorder may write for long
 
@@ -48,9 +47,6 @@ def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEnt
     if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
         texts_of([word for word in sys.argv if ':=' in word], graph)
     launch_order(graph, given)
-    inherited = drop_real_time()
-    if inherited and given['priority'] == '0':
-        given['priority'] = str(inherited)
     process = ExecuteProcess(
         cmd=[
             *(sys.executable, '-c', f'{QUIET_START}from mount_bringup.graph.run import main; main()', graph),
@@ -63,8 +59,7 @@ def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEnt
         output='both',
         on_exit=_on_exit,
     )
-    notes = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
-    return [*notes, process]
+    return [process]
 
 
 def _on_exit(event: ProcessExited, _: LaunchContext) -> EmitEvent:

@@ -18,8 +18,7 @@ from mount_bringup.graph.reports import SILENCE_LIMIT
 from mount_bringup.settings import settings_of_mount
 from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.process import Starter
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shutdown import remove_abandoned
+from mount_ros.nodes.shutdown import end_after, remove_abandoned
 
 Parameters = dict[str, dict[str, object]]
 
@@ -57,8 +56,6 @@ class Supervisor(Graph):
         remove_abandoned()
         self.open()
         report('starting the nodes')
-        if inherited := drop_real_time():
-            self.notes.append(started_in_real_time(inherited))
         of_processes = groups(self.nodes, self.settings.grouping)
         for group in of_processes:
             self.processes.append(NodeProcess(group, self.settings, self._folder))
@@ -104,9 +101,9 @@ class Supervisor(Graph):
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        self.deadline.set(LONGEST_HANG)
+        end_after(LONGEST_HANG)
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
-        self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
+        end_after(0.0)  # what follows has limits of its own, and its sentences must be reported
         complaints = end_processes(self.processes, at_once=all(resting))
         for reasons in self.repeats.values():
             times = f', the last of {len(reasons)} times' if len(reasons) > 1 else ''
