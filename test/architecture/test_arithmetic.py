@@ -46,7 +46,6 @@ ALLOWED = {
     ('mount_sim.plant.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
-    ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.times', 'np.interp'): 'times told to people',
     ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',
