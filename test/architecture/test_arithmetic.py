@@ -52,7 +52,6 @@ ALLOWED = {
     ('engine_mount.recordings.times', '**'): 'rates of topics, for the eye',
     ('engine_mount.recordings.times', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
-    ('engine_mount.signals.formats.arrays', 'math.prod'): 'whole numbers',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',
     ('mount_ros.timing', 'math.log10'): 'bins of latency, for the eye',
     ('mount_ros.timing', '**'): 'bins of latency, for the eye',

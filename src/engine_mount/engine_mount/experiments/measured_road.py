@@ -45,7 +45,6 @@ class MeasuredRoadParameters(NamedTuple):
     road: str = ''
     column: str = ''
     distance: str = ''
-    lateral: Annotated[float, Quantity('m', 'track of an OpenCRG file', -50.0, 50.0)] = 0.0
     contact_length: Annotated[
         float, Quantity('m', 'on so much of the road the tyre stands', 0.0, 0.5, 'chosen')
     ] = CONTACT_LENGTH
@@ -61,11 +60,10 @@ def run(order: Order) -> Findings:
     own = order.parameters
     if not own.road:
         raise ExperimentError(
-            f'{NAME} needs a measured road, height over distance (CSV or OpenCRG): give --set '
-            f'{NAME}.road=FILE'
+            f'{NAME} needs a measured road, a table of height over distance: give --set {NAME}.road=FILE'
         )
     speeds = numbers_of(order, 'speeds', 3.6 * SLOWEST, 3.6 * FASTEST)
-    profile = road_profile(own.road, lateral=own.lateral, column=own.column, distance=own.distance)
+    profile = road_profile(own.road, column=own.column, distance=own.distance)
     contact = 0.0 if profile.effective else own.contact_length
     cases = {}
     for speed in speeds:
@@ -80,7 +78,6 @@ def run(order: Order) -> Findings:
     road = unevenness(profile)
     figures = {
         'source': Path(own.road).name,
-        'lateral_m': own.lateral,
         'sha256': profile.provenance.sha256,
         'length_m': profile.length,
         'spacing_m': profile.spacing,
@@ -131,7 +128,6 @@ def _on_acceleration(figures):
 def page_of(figures: Values) -> str:
     """Return the page."""
     road = '. '.join(sentence[0].upper() + sentence[1:] for sentence in figures['road'])
-    lateral = f' --set measured_road.lateral={figures["lateral_m"]:g}' if figures['lateral_m'] else ''
     speeds, words = '', ''
     for speed, runs in figures['runs'].items():
         rows = [
@@ -162,7 +158,7 @@ rms in m/s²:
 `engine-mount experiment measured_road` writes this page from its numbers; nobody edits it. The blocks are
 those of [drive a measured road](../how-to/drive_a_measured_road.md).
 
-`engine-mount experiment measured_road --set measured_road.road={figures['source']}{lateral}`
+`engine-mount experiment measured_road --set measured_road.road={figures['source']}`
 
 Driven: `{figures['source']}`, {figures['length_m']:.0f} m, a height every {1e3 * figures['spacing_m']:.3g} \
 mm. {road}.
