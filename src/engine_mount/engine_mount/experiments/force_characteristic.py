@@ -17,7 +17,6 @@ from engine_mount.experiments.harness.experiment import (
 )
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.experiments.registry import NAMES
 from mount_models.actuator.law import TABLE_1, ForceLaw, check_gap, checked_force
 from mount_models.quantity import OutsideLawError, Quantity
 from mount_models.sampling import HIGHEST_CURRENT
@@ -166,7 +165,6 @@ def draw_forces(measured: RigMeasurements, law: ForceLaw) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The gap of the simulated actuator is held, the current stepped, the force measured with a noisy
     load cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a
     calibration at 10 um steps without noise; dashed ones are Table 1. Errors are taken against the

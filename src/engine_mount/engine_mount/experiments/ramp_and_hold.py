@@ -20,7 +20,6 @@ from engine_mount.experiments.harness.rack_recording import (
     ForceNoise,
     record_friction_rack,
 )
-from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.ramp_hold import (
     Relaxation,
@@ -236,7 +235,6 @@ def draw_relaxation(
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds.
     Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the
     last second, p from the force over what the motor gives way, T and the amplitude from an

@@ -8,11 +8,8 @@ import matplotlib
 
 matplotlib.use('Agg')
 
-import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from PIL import Image
 
 from engine_mount.reports.drawing.style import (
     COLOURS,
@@ -31,7 +28,6 @@ OFF_LINE = {'color': UNDAMPED_COLOUR, 'linestyle': ':'}
 _WIDTH = 10.0  # inches
 _DPI = 100
 _LAYOUT: Literal['constrained'] | None = 'constrained'
-_COLOURS = 256  # the most that a palette holds
 
 
 def new_panels(title: str, rows: int = 1, columns: int = 1, height: float = 5.0, **more: Any) -> Any:
@@ -90,10 +86,6 @@ def finish(figure: Any, file: Path) -> Path:
         if not axes.images:
             axes.grid(alpha=0.25)
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.set_dpi(_DPI)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # once; savefig draws twice
-    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
-    # a palette halves the file; nothing of date or program in it: the same figures give the same bytes
-    picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    # nothing of date or program in it: the same figures give the same bytes
+    figure.savefig(file, dpi=_DPI, metadata={'Software': None})
     return file
