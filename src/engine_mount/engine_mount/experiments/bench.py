@@ -79,7 +79,6 @@ def run(order: Order) -> Findings:
         pairs = zip(runs[name]['harmonics_n'], runs[HYDRO]['harmonics_n'], strict=True)
         runs[name]['lower_than_hydromount'] = [k for k, (ours, its) in enumerate(pairs, 1) if ours < its]
     figures = {
-        **{key: runs[own.damper][key] for key in ('harmonics_n', 'thd', 'loss_energy_j', 'peak_force_n')},
         **{'damper': own.damper, 'frequency_hz': own.frequency, 'amplitude_m': own.amplitude},
         'sine_steepest_share': 2.0 * math.sin(math.pi * own.frequency * SAMPLE_TIME),
         'runs': runs,

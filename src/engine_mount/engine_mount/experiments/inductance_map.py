@@ -67,7 +67,6 @@ class Ramp(NamedTuple):
 def run(order: Order) -> Findings:
     """Measure held gaps on the rig, record the ramp of the assembled actuator, and compare."""
     own, specimen = order.parameters, default_specimen()
-    order.progress(0.05, 'held gaps on the rig')
     noise = {'ratio_noise': own.ripple_noise / _AVERAGED**0.5, 'seed': own.seed}
     held = measure_actuator(own.actuator, own.coil, 1e-6 * np.array(_GAPS_UM), **noise)
     sim: Values = {
@@ -79,7 +78,6 @@ def run(order: Order) -> Findings:
         'electronics.ripple_noise': own.ripple_noise,
         **{name: value for name, value in flattened(own).items() if '.' in name},
     }
-    order.progress(0.2, 'ramp of the actuator')
     recording = drive(core=True, parameters={'mount_sim': sim}, out=order.out / NAME).recording
     ramp = read_ramp(open_recording(recording), specimen)
     figures = figures_of(held, ramp, specimen, own)

@@ -1,7 +1,6 @@
 """Policies side by side: sweep, gap, rack, roads, other engines, idle, wear; and what no policy can beat."""
 
 import math
-from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
@@ -84,7 +83,6 @@ def run(order: Order) -> Findings:
         numbers_of(order, 'idle_forces', 1.0, 2000.0),
     )
     found = run_cases(order, cases_of(order, axes))
-    order.progress(0.95, 'bounds and pictures')
     figures = figures_of(found, order.parameters, axes)
     pictures = {}
     shown = {
@@ -113,9 +111,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             return {number(1e3 * d): [over(what, 'gap', who, d, seed) for seed in seeds] for d in axes.depths}
 
         return {who: by_depth(who) for who in _SUPPORTED}
-
-    def of_rack(what: str, mounts: Iterable[str]) -> Values:
-        return {who: {number(f): found['rack', who, f][what] for f in axes.frequencies} for who in mounts}
 
     def high(who: str, level: float, force: float) -> float:
         """Return the rms of the acceleration in the bands above 14 Hz together."""
@@ -147,8 +142,10 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         },
         'gap_peak_ratio': of_gaps('peak_m'),
         'gap_first_extremum_ratio': of_gaps('first_m'),
-        'thd': of_rack('thd', (*POLICIES, HYDRO)),
-        'tracking': of_rack('tracking', POLICIES),
+        'thd': {
+            who: {number(f): found['rack', who, f]['thd'] for f in axes.frequencies}
+            for who in (*POLICIES, HYDRO)
+        },
         'high_frequency_ratio': high_ratio(0.0),
         'high_frequency_ratio_idling': high_ratio(idle),
         'roads': roads,
@@ -161,7 +158,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         },
         'limits': limits_of(found, axes),
         'idle_amplitude_n': idle,
-        'energy_j_per_km': {who: roads['random'][who]['j_per_km'] for who in POLICIES},
     }
     if not own.thorough:
         return figures

@@ -15,13 +15,11 @@ from engine_mount.experiments.harness.experiment import Order, Values, Workers
 from engine_mount.experiments.harness.measures import (
     first_extremum,
     peak_and_rms,
-    rms,
     rms_in_bands,
     sweep_parameters,
 )
 from engine_mount.reports.drive.signals import Truth
 from engine_mount.reports.sections.periodic import distortion, harmonics, whole_periods
-from mount_control.policy import continuous_viscous
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
@@ -111,11 +109,8 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         shown = seed == 1 and depth == _SHOWN_DEPTH
         figures = partial(with_displacement, of_gap) if shown else of_gap
         add(('gap', who, depth, seed), _gap(depth, 2e-6, seed), figures)
-    law = continuous_viscous.Parameters()
-    dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (law.damping_coefficient, law.rounding_velocity)}
     for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
-        figures = partial(of_rack, *dampers.get(who, (0.0, 0.0)))
-        add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, figures)
+        add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, of_rack)
     for idle, who in product(idles, COMPARED):
         for road, roughness in ROADS.items():
             add(('road', who, road, idle), _road(roughness, _ROAD_SECONDS, idle), of_road)
@@ -186,17 +181,11 @@ def of_gap(truth: Truth, sim: SimParameters) -> Values:
     return {'peak_m': float(np.max(np.abs(behind))), 'first_m': first_extremum(behind)}
 
 
-def of_rack(damping: float, dead: float, truth: Truth, sim: SimParameters) -> Values:
-    """Return distortion (%), and how far friction lies from a damper (N s/m) with a dead zone (m/s)."""
+def of_rack(truth: Truth, sim: SimParameters) -> Values:
+    """Return the harmonic distortion (%) of the mount force."""
     frequency = sim.bench.frequency
     part, _ = whole_periods(truth.time, frequency, _PERIODS)
-    velocity, force = truth.velocity[part], truth.mount_force[part]
-    wanted = np.sign(velocity) * damping * np.maximum(np.abs(velocity) - dead, 0.0)
-    error = rms(truth.friction_force[part] - wanted)
-    return {
-        'thd': 100.0 * distortion(harmonics(truth.time[part], force, frequency)),
-        'tracking': 100.0 * float(error / np.abs(wanted).max()) if damping else None,
-    }
+    return {'thd': 100.0 * distortion(harmonics(truth.time[part], truth.mount_force[part], frequency))}
 
 
 def of_road(truth: Truth, sim: SimParameters) -> Values:

@@ -85,9 +85,6 @@ A sine of 1 mm: total harmonic distortion of \
 the mount force, %, by frequency in Hz:
 
 {by_name('policy', figures['thd'])}
-Friction force against what the damper asks for, rms of the error over the peak, %:
-
-{by_name('policy', figures['tracking'], '.1f')}
 ## Roads
 
 The law was tuned on random roads with other seeds; the figures of the sweeps were seen while it was \

@@ -64,7 +64,6 @@ class RampParameters(NamedTuple):
 def run(order: Order) -> Findings:
     """Pull the sticking pads, record it, and take the linear parameters from the recording."""
     own = order.parameters
-    order.progress(0.1, 'ramp and hold')
     corners = np.cumsum([0.0, own.rest_time, own.ramp_time, own.hold_time])
     ways = [0.0, 0.0, own.way, own.way]
     pulled = move(
@@ -79,7 +78,6 @@ def run(order: Order) -> Findings:
     measured = with_noise(pulled, own.force_noise, own.displacement_noise, own.seed)
     session = {'scenario': NAME, 'mode': 'rack', 'parameters': {NAME: flattened(own)}}
     recording = record_friction_rack(order.out / NAME, measured, session)
-    order.progress(0.7, 'evaluation')
     rack = read_recording(recording)
     time = rack.time - own.rest_time
     # the wanted displacement x_d (m), which the motor's control knows, less the measured one

@@ -104,18 +104,13 @@ def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | 
     return found
 
 
-def near(active: BoolArray, margin: float) -> BoolArray:
-    """Return where damping is `active` (n,) at 1 kHz, and `margin` (s) before and behind."""
-    count = round(margin / SAMPLE_TIME)
-    return np.convolve(active, np.ones(2 * count + 1), 'same') > 0.5
-
-
 def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
     """Return rms of displacement and force: of all, by band, at the moments of damping and else."""
     own, control = order.parameters, paper_policy(order)
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     active = np.interp(truth.time, seen.time, seen.damping_active.astype(float)) > 0.5
-    events = near(active, 1.0 / control.eigenfrequency)
+    margin = round(1.0 / (control.eigenfrequency * SAMPLE_TIME))  # samples, before and behind
+    events = np.convolve(active, np.ones(2 * margin + 1), 'same') > 0.5
     changes = switching(seen)
     runs: dict[str, Values] = {name: {} for name in drives}
     for name, drive in drives.items():
@@ -133,17 +128,14 @@ def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
         'column': own.column,
         'scale': own.scale,
         'duration_s': float(truth.time[-1] - truth.time[0] + SAMPLE_TIME),
-        'acceleration_rms_m_s2': rms(truth.chassis_acceleration),
         'acceleration_band_rms_m_s2': rms_in_bands(truth.chassis_acceleration, BANDS),
         'damper': own.damper,
         'switch_on_level_m': control.switch_on_level,
-        'switch_off_level_m': control.switch_off_level,
         'times_on': len(changes.on),
         'switched_on_s': list(changes.on),
         'damping_active_share': float(np.mean(active)),
         'events_share': float(np.mean(events)),
         'events_margin_s': 1.0 / control.eigenfrequency,
-        'bands_hz': [list(band) for band in BANDS],
         'runs': runs,
     }
 

@@ -151,8 +151,6 @@ def figures_of(racks: list[Rack], shown: Rack, own: SawtoothParameters) -> Value
         return rms(model[where] - measured[where]) / rms(measured) if where.any() else None
 
     return {
-        'normal_forces_n': sorted({round(s.normal_force, 6) for s in strokes}),
-        'speeds_m_per_s': sorted({round(_speed(s), 5) for s in strokes}),
         'strokes': len(strokes),
         'strokes_with_falling_coefficient': sum(s.b < 0.0 for s in strokes),
         'rising_up_to_n': max((s.normal_force for s in strokes if s.b >= 0.0), default=None),

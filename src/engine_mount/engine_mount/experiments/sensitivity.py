@@ -67,8 +67,8 @@ class Maps(NamedTuple):
 
     `peak` (level, resistance, asymmetry, idle): largest displacement from 3 to 14 Hz. `rms` (band, level,
     resistance, asymmetry, idle): chassis acceleration; NaN where the sweep ends before. `friction_peak`
-    (level, idle) in m. Of each (resistance, asymmetry) on the rack, `hydro_harmonics` are those of the
-    hydromount in N, `below` the orders in which the friction mount is lower.
+    (level, idle) in m. `below` are the harmonics on the rack in which the friction mount is lower, of each
+    (resistance, asymmetry).
     """
 
     axes: Axes
@@ -76,7 +76,6 @@ class Maps(NamedTuple):
     rms: FloatArray
     friction_peak: FloatArray
     below: dict[tuple[float, float], list[int]]
-    hydro_harmonics: dict[tuple[float, float], list[float]]
 
 
 def run(order: Order) -> Findings:
@@ -163,7 +162,6 @@ def maps_of(axes: Axes, found: dict[tuple[Any, ...], Values]) -> Maps:
         np.moveaxis(ratio('rms'), -1, 0),
         grid('peak_m', 'friction', axes.levels, axes.idle_forces),
         {key: [k + 1 for k in range(ORDERS) if friction[k] < each[k]] for key, each in hydro.items()},
-        hydro,
     )
 
 
@@ -272,11 +270,6 @@ def page_of(maps: Maps, own: SensitivityParameters, runs: int) -> str:
         (f'{resistance:.0e}', *(_orders(maps.below[resistance, each]) for each in axes.asymmetries))
         for resistance in axes.resistances
     ]
-    even = []
-    for value in axes.asymmetries:
-        found = (each for key, each in maps.hydro_harmonics.items() if key[1] == value)
-        largest = max(max(each[1::2]) for each in found)
-        even.append(f'{largest:.2f} N with asymmetry {value:g}')
     said = {'Displacement': displacement, 'Acceleration': acceleration, 'Harmonics': force_harmonics}
     in_short = '\n'.join(f'- **{name}.** {in_one_line(judge(maps)[1])}' for name, judge in said.items())
     return f"""# Friction mount or hydromount: what the answer depends on
@@ -323,8 +316,8 @@ the ratio.
 Harmonics in which the friction mount is lower.
 
 {table(('R_d (Pa s/m^3)', *(f'asymmetry {value:g}' for value in axes.asymmetries)), lower_ones)}
-The largest even harmonic of the hydromount is {', '.join(even)}. The asymmetry was put into its model so \
-that there are even harmonics; an advantage in them is therefore no finding.
+The asymmetry was put into the model of the hydromount so that there are even harmonics; an advantage in \
+them is therefore no finding.
 
 ## Limits
 

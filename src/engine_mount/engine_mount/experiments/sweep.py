@@ -64,8 +64,6 @@ def run(order: Order) -> Findings:
         'road_level_m_per_s': own.velocity_amplitude,
         'damper': own.damper,
         'switch_on_level_m': level,
-        'resonance_band_hz': list(RESONANCE),
-        'isolation_bands_hz': [list(band) for band in ISOLATION_BANDS],
         'runs': runs,
     }
     pictures = {'sweep': draw_sweep(drives), 'sweep_peaks': draw_peaks(drives)}
@@ -88,7 +86,6 @@ def figures_of(drive: DriveSignals, level: float) -> Values:
         'highest_peak_m': peak_in(frequency, truth.displacement, BELOW_ISOLATION),
         'defined_peak': defined_peak(middles, peaks, level),
         'isolation_rms': [rms_in(frequency, truth.chassis_acceleration, band) for band in ISOLATION_BANDS],
-        'resonance_rms': rms_in(frequency, truth.chassis_acceleration, RESONANCE),
         'switched_on_hz': [FIRST_FREQUENCY + RATE * time for time in changes.on],
         'switched_off_hz': [FIRST_FREQUENCY + RATE * time for time in changes.off],
     }

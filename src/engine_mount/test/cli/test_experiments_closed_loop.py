@@ -51,9 +51,7 @@ def gaps(tmp_path_factory):
 def test_the_rack_writes_recordings_pictures_and_plain_figures(rack):
     check(rack)
     assert len(rack.recordings) == 6
-    assert len(rack.figures['harmonics_n']) == 8
-    chosen = rack.figures['runs'][rack.figures['damper']]
-    assert all(rack.figures[key] == chosen[key] for key in ('harmonics_n', 'thd', 'loss_energy_j'))
+    assert len(rack.figures['runs'][rack.figures['damper']]['harmonics_n']) == 8
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def compared(tmp_path_factory):
 @pytest.mark.slow
 def test_figures_are_plain_and_hold_what_is_promised(compared):
     figures = json.loads(json.dumps(compared.figures, allow_nan=False))
-    for key in ('sweep_ratio', 'gap_peak_ratio', 'thd', 'energy_j_per_km'):
+    for key in ('sweep_ratio', 'gap_peak_ratio', 'thd'):
         assert set(POLICIES) <= set(figures[key])
     assert list(figures['sweep_ratio'][CONTINUOUS]) == ['0.06']
     assert len(figures['gap_peak_ratio'][CONTINUOUS]['20']) == 1

@@ -3,7 +3,6 @@
 import importlib.resources
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -60,8 +59,7 @@ class Limit(NamedTuple):
     common: bool
 
 
-@dataclass(frozen=True)
-class Manoeuvre:
+class Manoeuvre(NamedTuple):
     """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on."""
 
     name: str

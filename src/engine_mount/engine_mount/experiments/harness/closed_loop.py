@@ -53,7 +53,6 @@ def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSig
         sim = {'damper': order.parameters.damper, **case}
         control = {'policy': PAPER, 'damper': sim.pop('damper')}
         drives[name] = _drive(order, name, settings_of_run(order, sim, control))
-    order.progress(0.95, 'pictures')
     return drives
 
 

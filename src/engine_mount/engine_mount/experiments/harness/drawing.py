@@ -8,6 +8,7 @@ import matplotlib
 
 matplotlib.use('Agg')
 
+import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
@@ -50,7 +51,7 @@ def _empty(title: str, height: float) -> Figure:
 
 def family(count: int) -> Sequence[Any]:
     """Return `count` colours in an order that is seen as one, also in grey print."""
-    return [colormaps['viridis'](0.9 * k / max(count - 1, 1)) for k in range(count)]
+    return list(colormaps['viridis'](np.linspace(0.0, 0.9, count)))
 
 
 def legend_below(figure: Any, axes: Any, columns: int, **more: Any) -> None:
@@ -76,8 +77,8 @@ def shade_damping(axes: Any, seen: Seen, within: Any, alpha: float) -> None:
 
 def draw_level(axes: Any, level: float, label: str, dash: str, width: float) -> None:
     """Draw a level of the displacement (m) on both sides, in mm."""
-    axes.axhline(1e3 * level, color=RED, linestyle=dash, linewidth=width, label=label)
-    axes.axhline(-1e3 * level, color=RED, linestyle=dash, linewidth=width)
+    for name, value in ((label, level), (None, -level)):
+        axes.axhline(1e3 * value, color=RED, linestyle=dash, linewidth=width, label=name)
 
 
 def finish(figure: Any, file: Path) -> Path:

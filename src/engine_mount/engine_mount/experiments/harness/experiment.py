@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 from mount_models.damper import damper_curve
@@ -103,8 +104,7 @@ class Order:
         return replace(self, progress=lambda share, what: bar(share, f'{self.experiment}: {what}'))
 
 
-@dataclass(frozen=True)
-class Findings:
+class Findings(NamedTuple):
     """What a procedure returns; `figures` is what `--json` writes: plain numbers, texts, lists, mappings.
 
     `pictures` are {name: figure of matplotlib, or the file where one is written}; `pages` are {file name:
@@ -114,7 +114,7 @@ class Findings:
     figures: Values
     pictures: Mapping[str, Any]
     recordings: Sequence[Path] = ()
-    pages: Mapping[str, str] = field(default_factory=dict)
+    pages: Mapping[str, str] = MappingProxyType({})
     judged: Any = None
 
 
