@@ -81,11 +81,6 @@ def test_what_the_car_loads_and_rosdep_cannot_install_is_in_the_file_that_the_re
     assert 'python3 -m pip install -r requirements-car.txt' in lines_for_the_car()
 
 
-def test_the_readme_installs_the_reader_of_recordings_as_long_as_the_car_loads_it():
-    reader = [file for file in files_behind(BEGIN) if 'engine_mount' in file.parts]
-    assert ('python3 -m pip install --no-deps src/engine_mount' in lines_for_the_car()) == bool(reader)
-
-
 def test_rosdep_is_given_the_packages_of_the_car_and_they_name_no_library_of_the_desk():
     (rosdep,) = [line for line in lines_for_the_car() if line.startswith('rosdep install')]
     words = subprocess.check_output(['bash', '-c', f'echo {rosdep}'], text=True).split()
