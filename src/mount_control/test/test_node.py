@@ -341,17 +341,12 @@ def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_am
     assert _answers(around, 403)[-1] == (403.0, 0.0)
 
 
-@pytest.mark.parametrize(
-    ('lockstep', 'awaited', 'fatal'), [(True, False, True), (True, True, False), (False, False, False)]
-)
-def test_another_writer_ends_a_graph_in_lock_step_alone_and_when_its_name_had_time_to_come(
-    active, monkeypatch, lockstep, awaited, fatal
-):
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_another_writer_ends_a_graph_in_lock_step_alone(active, lockstep):
     control = active(lockstep=lockstep)
     control.loop.foreign = '10 samples were repeated: end one'
-    monkeypatch.setattr(control._nameless, 'is_awaited', lambda nameless: awaited)
     verdict = control.judge()
-    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, fatal)
+    assert (verdict.level, verdict.figures['fatal']) == (Level.ERROR, lockstep)
     assert verdict.sentence.startswith('0 A: 10 samples were repeated')
 
 

@@ -47,8 +47,7 @@ class RampSupply(NamedTuple):
     """Lowest and highest voltage of the bridge in the ramp (V), and what that tells of the resistance.
 
     `whole` is that of a voltage which stays the same. Where it changed, `parts` holds those of the way up and
-    down, none of a part in which it changed too unevenly to tell. `carried`: the inductances were carried to
-    the voltage of the gap curves.
+    down, none of a part in which it changed too unevenly to tell.
     """
 
     lowest: float
@@ -56,7 +55,6 @@ class RampSupply(NamedTuple):
     steady: bool
     whole: CoilResistance
     parts: tuple[DriftingResistance, ...]
-    carried: bool
 
 
 def inductance_at_supply_of_curves(
@@ -87,7 +85,7 @@ def inductance_at_supply_of_curves(
         voltage = _smooth(volts + resistance * current, driven, parameters)
     lowest, highest = float(voltage[driven].min()), float(voltage[driven].max())
     parts = () if steady else _parts(specimen, ramp, readings, lowest)
-    supply = RampSupply(lowest, highest, steady, whole, parts, carried=False)
+    supply = RampSupply(lowest, highest, steady, whole, parts)
     bridge, name, compensation = specimen.bridge, specimen.name, specimen.temperature
     _check_range(
         supply,
@@ -129,7 +127,7 @@ def inductance_at_supply_of_curves(
         with contextlib.suppress(OutsideLawError):
             found = crossing_at_curves(specimen, found, celsius)
         carry(moved, _within(curves.gap_of_crossing_current, found))
-    return result, supply._replace(carried=True)
+    return result, supply
 
 
 def inductance_crossing(

@@ -49,7 +49,7 @@ class MountSim(SafeLifecycleNode):
         declare(self, SimParameters())
         declare(self, DriverParameters(), only=('interface', 'channel', 'port'))
         declare(self, NodeParameters())
-        self.create_service(SetBool, '~/inject_fault', self._inject, callback_group=self.transitions)
+        self.create_service(SetBool, '~/inject_fault', self._inject)
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None

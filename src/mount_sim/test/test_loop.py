@@ -58,9 +58,9 @@ class Host:
         frame = self.bus.recv(LIMIT)
         assert frame is not None
         if frame.arbitration_id == CODEC.status.frame_id:
-            self.statuses.append(CODEC.decode_status(frame.data)[1])
+            self.statuses.append(CODEC.status.decode(frame.data)[1])
             return None
-        self.samples.append(CODEC.decode_measurement(frame.data)[1])
+        self.samples.append(CODEC.measurement.decode(frame.data)[1])
         return self.samples[-1]
 
 

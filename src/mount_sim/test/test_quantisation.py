@@ -18,17 +18,17 @@ SAMPLE = Measurement(0, 0, 0.0, 0.0, 0.0, 0.0)
 
 def measured(name):
     def through(value):
-        return CODEC.decode_measurement(CODEC.encode_measurement(SAMPLE._replace(**{name: value}), 0))[1]
+        return CODEC.measurement.decode(CODEC.encode_measurement(SAMPLE._replace(**{name: value}), 0))[1]
 
     return lambda value: getattr(through(value), name)
 
 
 def setpoint(value):
-    return CODEC.decode_setpoint(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
+    return CODEC.setpoint.decode(CODEC.encode_setpoint(Setpoint(value, 0), 0))[1].current
 
 
 def temperature(value):
-    return CODEC.decode_status(CODEC.encode_status(Status(14.0, value), 0))[1].coil_temperature_celsius
+    return CODEC.status.decode(CODEC.encode_status(Status(14.0, value), 0))[1].coil_temperature_celsius
 
 
 QUANTITIES = {

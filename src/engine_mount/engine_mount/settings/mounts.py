@@ -26,7 +26,4 @@ def mounts_of(settings: Known) -> tuple[str, ...]:
 
 def settings_of_mounts(settings: Known) -> dict[str, dict[str, dict[str, Any]]]:
     """Return {mount: settings}; a mount alone has the name ''."""
-    names = mounts_of(settings)
-    return {name: settings_of_mount(settings, name) for name in names} or {
-        '': {node: dict(values) for node, values in settings.items()}
-    }
+    return {name: settings_of_mount(settings, name) for name in mounts_of(settings) or ('',)}

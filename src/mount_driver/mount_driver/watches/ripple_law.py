@@ -19,9 +19,9 @@ DUTY_STEP = 1.0 / 256.0
 class RippleLaw(NamedTuple):
     """Inductance at rest and crossing current at the calibrated gaps, and what the temperature does; SI.
 
-    `crossing` holds the crossing currents (A) at the lowest, the middle and the highest calibrated gap. The
-    inductance rises by the share `warm_rise` from `calibration_celsius` to `reference_celsius`. The curves
-    hold at `bridge.link_voltage`; `gap_reluctance` (1/H) is the share of the middle gap in 1 / L_i.
+    The crossing currents (A) are those at the lowest and the highest calibrated gap. The inductance rises
+    by the share `warm_rise` from `calibration_celsius` to `reference_celsius`. The curves hold at
+    `bridge.link_voltage`; `gap_reluctance` (1/H) is the share of the middle gap in 1 / L_i.
     """
 
     turns_area: float = 0.11808
@@ -31,7 +31,8 @@ class RippleLaw(NamedTuple):
     rest_inductance_high: float = 0.05226015296166296
     gap_low: float = 0.00025000000000000006
     gap_high: float = 0.0005500000000000001
-    crossing: tuple[float, float, float] = (1.169341254762723, 1.500349166592128, 1.754917203805684)
+    crossing_low: float = 1.169341254762723
+    crossing_high: float = 1.754917203805684
     calibration_celsius: float = 20.0
     reference_celsius: float = 80.0
     conductivity_coefficient: float = 0.0043
@@ -46,7 +47,7 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
     calibrated = curves.crossing_current_of_gap
     low, high = calibrated.low, calibrated.high
     middle = 0.5 * (low + high)
-    crossing = [float(evaluate(calibrated, gap)) for gap in (low, middle, high)]
+    cold = float(evaluate(curves.inductance_of_gap, middle))
     law = RippleLaw(
         turns_area=specimen.turns_area,
         rest_current=specimen.rest_current,
@@ -55,14 +56,14 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
         rest_inductance_high=curves.gap_of_inductance.high,
         gap_low=low,
         gap_high=high,
-        crossing=(crossing[0], crossing[1], crossing[2]),
+        crossing_low=float(evaluate(calibrated, low)),
+        crossing_high=float(evaluate(calibrated, high)),
         warm_rise=0.0,
         bridge=specimen.bridge,
-        gap_reluctance=_HALF / float(evaluate(curves.inductance_of_gap, middle)),
+        gap_reluctance=_HALF / cold,
     )
     if temperature is None:
         return law
-    cold = float(evaluate(curves.inductance_of_gap, middle))
     shift = float(evaluate(temperature.reluctance_shift, middle))
     return law._replace(
         calibration_celsius=temperature.calibration_celsius,
@@ -92,22 +93,12 @@ def skin_table(law: RippleLaw) -> list[float]:
     return skin_shape(law.bridge, [0.5 + k * DUTY_STEP for k in range(_DUTIES)]).tolist()
 
 
-def gap_of_crossing(law: RippleLaw, current: float) -> float:
-    """Return the gap (m) at the crossing current (A): the parabola through the three that are known."""
-    low, middle, high = law.crossing
-    step = 0.5 * (law.gap_high - law.gap_low)
-    first, second = step / (middle - low), step / (high - middle)
-    return law.gap_low + (current - low) * (first + (current - middle) * (second - first) / (high - low))
-
-
 def crossing_per_gap(law: RippleLaw) -> float:
     """Return how far the crossing current moves with the gap, A/m, on the mean over the calibrated gaps."""
-    return (law.crossing[2] - law.crossing[0]) / (law.gap_high - law.gap_low)
+    return (law.crossing_high - law.crossing_low) / (law.gap_high - law.gap_low)
 
 
-_HALF = (
-    0.5  # 1, chosen: without a second temperature, of the reluctance at rest; 0.49 of the shipped actuator
-)
+_HALF = 0.5  # 1, chosen: of the reluctance at rest, without a second temperature; 0.49 of the shipped one
 _DUTIES = 128  # from 0.5 on: the table ends before 1
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mount_driver.bus import Frame, Reception, may_have_frames
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, E2EReceiver, Measurement, MountCodec, Setpoint, Status
-from mount_driver.watches.message_watches import SenderLimits, SenderWatch
+from mount_driver.watches.message_watches import SenderWatch
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Reading
 
@@ -51,8 +51,8 @@ class CanEnd:
         """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
-        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.setpoint, self._codec.setpoint_of)
-        self._hosts = SenderWatch(SenderLimits(), self._codec.setpoint.name, 'one host only may send it')
+        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.setpoint)
+        self._hosts = SenderWatch(self._codec.setpoint.name, 'one host only may send it')
         self._now = 0  # ns, by the samples
         self._off_until = 0
 

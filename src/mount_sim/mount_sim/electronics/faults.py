@@ -165,7 +165,7 @@ def _frozen_counter(fault, frames):
     """Give all measurements the same alive counter, with a check sum that is right."""
     for frame in frames:
         if frame.arbitration_id == _CODEC.measurement.frame_id:
-            alive, measurement = _CODEC.decode_measurement(frame.data)
+            alive, measurement = _CODEC.measurement.decode(frame.data)
             frame.data = _CODEC.encode_measurement(measurement, int(fault.keep(alive)))
     return frames
 
