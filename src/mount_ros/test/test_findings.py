@@ -41,15 +41,6 @@ def test_a_burst_counts_for_as_long_as_the_window_lasts_and_is_told_in_the_same_
     assert told[-1] == (Level.OK, 'well')
 
 
-def test_a_window_forgets_however_rarely_it_is_looked_at():
-    window = SlidingWindow(0)
-    assert [window.earlier(time, count) for time, count in ((0.0, 1), (WINDOW, 2), (3 * WINDOW, 3))] == [
-        0,
-        1,
-        2,
-    ]
-
-
 def test_a_finding_that_came_back_is_told_afresh():
     standing = ActiveFindings()
     said = [

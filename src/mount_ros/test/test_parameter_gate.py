@@ -39,12 +39,6 @@ def _set(node, **values):
     return node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
 
 
-def test_before_configure_everything_can_be_set_and_nothing_is_told(subject):
-    results = _set(subject, lower=5.0, upper=4.0, name='second', lockstep=True)
-    assert all(result.successful for result in results)
-    assert subject.taken == []
-
-
 @pytest.mark.parametrize('activated', [False, True])
 def test_once_configured_run_time_parameters_are_checked_set_and_told(subject, activated):
     subject.trigger_configure()

@@ -19,13 +19,6 @@ def histogram_of(durations):
     return histogram
 
 
-def test_nothing_counted_is_unknown_and_not_zero():
-    histogram = LatencyHistogram()
-    assert histogram.count == 0
-    assert math.isnan(histogram.quantile(0.5))
-    assert math.isnan(histogram.highest)
-
-
 @given(
     durations=st.lists(st.floats(1e-6, 9.9), min_size=1, max_size=60),
     share=st.sampled_from([0.01, 0.5, 0.9, 0.99, 1.0]),
