@@ -200,24 +200,6 @@ def test_the_end_of_the_thread_is_told_and_nobody_waits_for_it(context, make_end
     assert _outcome(end.path.stop) is None
 
 
-@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
-def test_who_waits_when_the_thread_ends_gets_the_reason(pair):
-    receiver, _ = pair
-    blocked, release = threading.Event(), threading.Event()
-
-    def collapse_late():
-        blocked.set()
-        release.wait(LIMIT)
-        _collapse()
-
-    receiver.path.add_poll(collapse_late)
-    assert blocked.wait(LIMIT)
-    threading.Timer(0.1, release.set).start()
-    refusal = _outcome(receiver.path.add_poll, lambda: False)
-    assert isinstance(refusal, DataThreadEndedError)
-    assert 'CollapseError: out of order' in str(refusal)
-
-
 def test_a_thread_that_does_not_answer_is_not_waited_for_for_ever(pair, monkeypatch):
     receiver, _ = pair
     blocked, release = threading.Event(), threading.Event()

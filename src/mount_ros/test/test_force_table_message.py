@@ -22,14 +22,6 @@ def test_table_and_activation_survive_serialisation():
     assert np.array_equal([received.current, received.normal_force], TABLE)
 
 
-def test_layout_names_rows_sizes_strides_and_the_activation():
-    message = to_message(STAMP, TABLE)
-    rows, columns = message.layout.dim
-    assert (rows.label, rows.size, rows.stride) == ('rows: current (A), normal_force (N)', 2, 8)
-    assert (columns.label, columns.size, columns.stride) == (f'activation {STAMP}', 4, 4)
-    assert list(message.data[:4]) == TABLE[0].tolist()
-
-
 @pytest.mark.parametrize(
     ('table', 'sentence'),
     [

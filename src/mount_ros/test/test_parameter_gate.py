@@ -55,13 +55,6 @@ def test_once_configured_run_time_parameters_are_checked_set_and_told(subject, a
     assert subject.taken[1:] == [({'lower': Change(1.5, 1.6)}, 1.6)]
 
 
-def test_what_goes_only_together_can_be_set_together(subject):
-    subject.trigger_configure()
-    both = [Parameter('lower', value=8.0), Parameter('upper', value=9.0)]
-    assert subject.set_parameters_atomically(both).successful
-    assert subject.taken == [({'lower': Change(1.0, 8.0), 'upper': Change(2.0, 9.0)}, 8.0)]
-
-
 @pytest.mark.parametrize(('name', 'value'), [('name', 'second'), ('lockstep', True)])
 def test_all_others_are_refused_until_cleanup(subject, name, value):
     subject.trigger_configure()

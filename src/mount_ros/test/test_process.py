@@ -80,14 +80,13 @@ class Process:
             limit.cancel()
         pytest.fail(f'{wanted - set(self.lines)} not said; {self._process.stderr.read()}')
 
-    def end(self, number=None, times=1, until_the_end=False):
+    def end(self, number=None, until_the_end=False):
         """Return exit code and errors after a signal, or after nothing if it ends on its own."""
         while until_the_end and self._process.poll() is None:
             self._process.send_signal(number)
             time.sleep(0.001)
         if number is not None:
-            for _ in range(times):
-                self._process.send_signal(number)
+            self._process.send_signal(number)
         out, errors = self._process.communicate(timeout=LIMIT)
         self.lines += out.splitlines()
         errors = ''.join(line for line in errors.splitlines(keepends=True) if not line.startswith('[INFO]'))

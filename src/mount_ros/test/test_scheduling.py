@@ -35,11 +35,6 @@ def test_the_middleware_names_its_threads_as_those_that_carry_the_data_are_told_
     assert not any(map(by_locks.fullmatch, names)), 'data is taken by shared memory, which has locks'
 
 
-def test_threads_of_python_are_found_by_their_own_names():
-    threads = Threads()
-    assert threads.names()[threads.own] == 'MainThread'
-
-
 SPINNING = """
 import os, threading
 from mount_ros.nodes.lifecycle import SafeLifecycleNode

@@ -26,12 +26,6 @@ leave_middleware(functools.partial(keeping.sleep, 600), last=0.3)
 """
 
 
-def test_taking_down_within_the_limit_is_told():
-    steps = []
-    assert leave_middleware(lambda: steps.append('down'))
-    assert steps == ['down']
-
-
 def test_what_goes_wrong_while_taking_down_is_not_swallowed():
     def fail():
         raise RuntimeError('no context')
