@@ -11,7 +11,7 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
-from mount_models.coil.heating import check_heating
+from mount_models.coil.copper import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.messages.cdr import temperature

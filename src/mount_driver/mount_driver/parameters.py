@@ -7,7 +7,7 @@ from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
 from mount_driver.watches.coil_watch import CoilWatchParameters
 from mount_driver.watches.message_watches import StatusLimits
 from mount_driver.watches.ripple_watch import RippleWatchParameters
-from mount_models.coil.heating import CoilHeating
+from mount_models.coil.copper import CoilHeating
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_RATE, SampleRate
 

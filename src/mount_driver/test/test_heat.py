@@ -15,7 +15,7 @@ from mount_driver.node import MountDriver
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import Setpoint
 from mount_driver.watches.heat_watch import HeatWatch
-from mount_models.coil.heating import CoilHeating, warmed
+from mount_models.coil.copper import CoilHeating, warmed
 from mount_ros.nodes.diagnostics import Level
 
 QUICK = CoilHeating(time_constant=5.0)  # all of it 120 times as quick, the steps of the current too

@@ -13,7 +13,7 @@ from ros_testing import wait_until
 from mount_driver.link import Refusal
 from mount_driver.node import MountDriver
 from mount_driver.protocol import Setpoint, Status
-from mount_models.coil.heating import CoilHeating
+from mount_models.coil.copper import CoilHeating
 from mount_models.specimen import DEFAULT_SPECIMEN
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class

@@ -7,7 +7,7 @@ import pytest
 
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_models.coil.heating import CoilHeating
+from mount_models.coil.copper import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
@@ -96,12 +96,6 @@ def test_no_temperature_and_no_supply_makes_a_sound_coil_look_faulty(before, aft
     assert fed(found, readings(drive, coil_at(*after), seed=2), after[1], after[0]) is None
 
 
-def test_the_supply_may_change_within_a_status(learnt):
-    low = readings(READY[:100], coil_at(20.0, 9.0))
-    assert fed(learnt, low, 14.0) is None  # the status comes with the next samples
-    assert fed(learnt, readings(READY, coil_at(20.0, 9.0)), 9.0) is None
-
-
 @pytest.mark.parametrize(
     ('currents', 'mechanics', 'within', 'places'),
     [
@@ -171,17 +165,6 @@ def test_readings_that_are_wild_or_missing_now_and_then_are_no_fault(learnt, eve
     assert fed(learnt, samples) is None
 
 
-def test_a_bridge_that_is_off_has_no_ripple(learnt):
-    assert fed(learnt, changed(readings(READY), rate=math.nan), enabled=False) is None
-
-
-@pytest.mark.parametrize('celsius', [-40.0, 122.0])
-def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
-    other = coil_at(celsius)
-    assert fed(learnt, readings(DAMPING[:100], other), begin=10_000) is None
-    assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
-
-
 def test_a_deviation_that_goes_is_no_fault(learnt):
     missing = MECHANICS._replace(contact_gap=20e-6)
     for begin in range(10_000, 20_000, 1000):
@@ -204,14 +187,6 @@ def test_an_unknown_supply_is_no_fault_and_the_gap_is_watched_on(learnt):
     assert (
         fed(learnt, readings(DAMPING, mechanics=MECHANICS._replace(contact_gap=20e-6)), math.nan) is not None
     )
-
-
-@pytest.mark.parametrize('celsius', [-40.0, 20.0, 119.0])
-def test_an_unknown_temperature_only_makes_the_limits_wider(celsius):
-    found, coil = watch(), coil_at(celsius)
-    assert fed(found, readings(RAMP, coil), 14.0, math.nan) is None
-    assert fed(found, readings(DAMPING, coil), 14.0, math.nan) is None
-    assert not math.isnan(found.noise)
 
 
 def test_what_ends_before_its_peak_is_no_ramp(learnt):
@@ -250,6 +225,9 @@ def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
     for samples, found in ((still, False), (moving, True)):
         samples[1][:], samples[2][:] = frozen
         assert (fed(learnt, samples, begin=10_000 * (1 + found)) is not None) is found
+
+
+"""Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
 
 
 ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 125)) ** 2, READY])

@@ -13,7 +13,7 @@ to spare from its begin on: the ramp warms the coil by less than 1 K.
 
 from math import nan
 
-from mount_models.coil.heating import CoilHeating, highest_current, hottest_by_current, warmed
+from mount_models.coil.copper import CoilHeating, highest_current, hottest_by_current, warmed
 from mount_models.sampling import HIGHEST_CURRENT
 
 _LONGEST_STEP = 2.0  # s, chosen: of a longer pause nothing is known, so the coil has not cooled

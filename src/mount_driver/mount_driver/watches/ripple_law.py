@@ -6,7 +6,7 @@ The defaults are those of the shipped specimen: to read its file would cost ever
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from mount_models.coil.duty import Bridge, gap_reluctance, skin_shape
+from mount_models.coil.correction import Bridge, gap_reluctance, skin_shape
 from mount_models.coil.gap import evaluate
 
 if TYPE_CHECKING:  # to load it takes a second
@@ -79,7 +79,7 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
 def warmth(law: RippleLaw, celsius: float) -> float:
     """Return by which factor the inductance exceeds that at the calibration; 1 at an unknown temperature.
 
-    One factor for all gaps and currents, with the depth of the skin as in `mount_models.coil.temperature`: of
+    One factor for all gaps and currents, with the depth of the skin as in `mount_models.coil.correction`: of
     the simulated coil up to 1.6 A it is right to 2 % from -40 to 122 degC.
     """
     if celsius != celsius:
@@ -89,7 +89,7 @@ def warmth(law: RippleLaw, celsius: float) -> float:
 
 
 def skin_table(law: RippleLaw) -> list[float]:
-    """Return `mount_models.coil.duty.skin_shape` from a duty of 0.5 on, in steps of `DUTY_STEP`."""
+    """Return `mount_models.coil.correction.skin_shape` from a duty of 0.5 on, in steps of `DUTY_STEP`."""
     return skin_shape(law.bridge, [0.5 + k * DUTY_STEP for k in range(_DUTIES)]).tolist()
 
 

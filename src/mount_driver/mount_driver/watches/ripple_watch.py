@@ -29,7 +29,7 @@ from typing import Annotated, NamedTuple
 
 from mount_driver.watches.ripple_law import DUTY_STEP, RippleLaw, skin_table, warmth
 from mount_driver.watches.ripple_sweep import NODE, Reference, Sweep, objection
-from mount_models.coil.heating import COPPER_CELSIUS, CoilHeating
+from mount_models.coil.copper import REFERENCE_CELSIUS, CoilHeating
 from mount_models.quantity import Quantity
 
 _SHARE = 1.0 / 16.0  # of a new reading in the means of voltage, validity and inductance, chosen
@@ -95,7 +95,7 @@ class RippleWatch:
         """Take supply (V) and coil temperature (degC) as reported; NaN where not known."""
         self._supply, heating = supply, self._heating
         known = celsius == celsius
-        warmer = celsius - COPPER_CELSIUS if known else 0.0
+        warmer = celsius - REFERENCE_CELSIUS if known else 0.0
         self._resistance = heating.resistance * (1.0 + heating.copper * warmer)
         self._unknown_resistance = 0.0 if known else _UNKNOWN_RESISTANCE * heating.resistance
         self._wider = 0.0 if known else _UNKNOWN_CELSIUS
@@ -139,7 +139,7 @@ class RippleWatch:
         return self._judge_inductance(current, flux_volts / current_rate, now)
 
     def _judge_inductance(self, current: float, inductance: float, now: int) -> str:
-        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.duty` does.
+        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.correction` does.
         held, volts, skin = self._resistance * current, self._link_voltage, []
         if 0.0 <= held < self.voltage and held < volts:
             for supply in (volts, self.voltage):
