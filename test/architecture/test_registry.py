@@ -14,7 +14,7 @@ from engine_mount.cli.command import app
 from mount_bringup.graph.nodes import SIMULATED
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_models.actuator.law import ForceLaw
+from mount_models.actuator import ForceLaw
 from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -30,7 +30,6 @@ from mount_ros.topics import (
     Delivery,
     Topic,
 )
-from mount_sim.excitation.road import RandomRoad
 from mount_sim.plant.closing import ClosingMechanics
 from mount_sim.plant.hydromount import Hydromount
 from mount_sim.plant.reluctance import ReluctanceActuator
@@ -52,7 +51,7 @@ PARAMETER_SETS = {
         ForceLaw, FrictionCoefficients, FrictionContact, ViscousDamper, DegressiveDamper, ProgressiveDamper,
     ),
     ('src/mount_sim/README.md', 'Parameters of the laws'): (
-        ReluctanceActuator, RippleCoil, ClosingMechanics, Elastomer, Hydromount, Vehicle, RandomRoad,
+        ReluctanceActuator, RippleCoil, ClosingMechanics, Elastomer, Hydromount, Vehicle,
     ),
 }  # fmt: skip
 

@@ -70,7 +70,7 @@ def general_name_of(node: str, name: str) -> str:
     """Return the parameter behind that of one mount, as in mount_sim.mount_left.friction.scale."""
     if node != 'mount_sim' or not name.startswith('mount_'):
         return name
-    from mount_sim.plant.places import general_name
+    from mount_sim.plant.mounts import general_name
 
     return general_name(name)
 
@@ -117,7 +117,7 @@ def settings_of_mount(settings: Known, mount: str) -> dict[str, dict[str, Any]]:
         if own := settings.get(f'{mount}/{node}'):
             found[node] = {**found.get(node, {}), **own}
     if 'mount_sim' in found:
-        from mount_sim.plant.places import values_of_mount
+        from mount_sim.plant.mounts import values_of_mount
 
         found['mount_sim'] = values_of_mount(found['mount_sim'], mount)
     return found

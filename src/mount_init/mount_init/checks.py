@@ -13,8 +13,8 @@ from mount_init.estimate import ContactGap, RestGap
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
 from mount_init.supply import RampSupply
-from mount_models.actuator.law import checked_force
-from mount_models.coil.resistance import resistance_at
+from mount_models.actuator import checked_force
+from mount_models.coil.copper import resistance_at
 from mount_models.specimen import Specimen
 
 _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses in a ramp

@@ -19,15 +19,14 @@ from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray
 from mount_init.supply import crossing_at_curves, inductance_at_curves
-from mount_models.actuator.law import checked_force
-from mount_models.arithmetic.averages import mean, standard_deviation
+from mount_models.actuator import checked_force, zero_current_rest_gap
+from mount_models.arithmetic.sums import mean, standard_deviation
 from mount_models.coil.gap import (
     gap_from_crossing_current,
     gap_per_crossing_current,
     gap_per_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.force_table import zero_current_rest_gap
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 

@@ -40,10 +40,16 @@ from mount_init.supply import (
     inductance_crossing,
     saturated,
 )
-from mount_models.actuator.law import checked_current_for_force, checked_force
-from mount_models.arithmetic.averages import mean, standard_deviation
+from mount_models.actuator import (
+    ForceTableError,
+    checked_current_for_force,
+    checked_force,
+    contact_force,
+    current_force_table,
+    offset_current,
+)
+from mount_models.arithmetic.sums import mean, standard_deviation
 from mount_models.coil.crossing import CrossingError, find_crossing
-from mount_models.force_table import ForceTableError, contact_force, current_force_table, offset_current
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 

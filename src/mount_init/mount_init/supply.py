@@ -14,17 +14,23 @@ import numpy as np
 from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
-from mount_models.coil.crossing import Crossing, find_crossing
-from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
-from mount_models.coil.gap import ScaledPolynomial, evaluate
-from mount_models.coil.resistance import (
+from mount_models.coil.copper import (
     CoilResistance,
     DriftingResistance,
     measured_resistance,
     resistance_at,
     resistance_beside_drift,
 )
-from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
+from mount_models.coil.correction import (
+    at_calibrated_duty,
+    crossing_at_calibration,
+    duty,
+    gap_reluctance,
+    inductance_at_calibration,
+    skin_ratio,
+)
+from mount_models.coil.crossing import Crossing, find_crossing
+from mount_models.coil.gap import ScaledPolynomial, evaluate
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 

@@ -18,7 +18,7 @@ from engine_mount.experiments.harness.experiment import (
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
 from engine_mount.experiments.harness.measures import rms
 from engine_mount.experiments.registry import NAMES
-from mount_models.actuator.law import TABLE_1, ForceLaw, check_gap, checked_force
+from mount_models.actuator import TABLE_1, ForceLaw, check_gap, checked_force
 from mount_models.quantity import OutsideLawError, Quantity
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import default_specimen

@@ -29,7 +29,7 @@ from engine_mount.signals.sources.uris import inside, is_local, local_path
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
-from mount_sim.mount_choice import simulated_mounts
+from mount_sim.plant.mounts import simulated_mounts
 
 _COUNTS = {
     'lost_samples': 'samples lost',

@@ -31,8 +31,8 @@ from mount_bringup.graph.nodes import (
 from mount_bringup.graph.shutdown import Interrupted
 from mount_ros.messages.event import Mark, read_mark
 from mount_ros.messages.verdicts import Level, flags_of, verdicts_in
-from mount_ros.nodes.shutdown import Deadline, leave_middleware
-from mount_ros.qos import publisher_qos, recording_qos
+from mount_ros.nodes.shutdown import end_after, leave_middleware
+from mount_ros.qos import publisher_qos
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 
 FRESH_DIAGNOSTICS = 1.5
@@ -80,7 +80,6 @@ class Graph:
         """Sentences for the user about what was not as it should be."""
         self.repeats: dict[str, str] = {}
         """The last reason why a node was activated again."""
-        self.deadline = Deadline(code=1)
         self._interrupted = False  # no lock: a second signal may come during the first
         self._context = Context()
         self._clients: dict[str, Client] = {}
@@ -97,10 +96,10 @@ class Graph:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         subscribe = self.node.create_subscription
-        subscribe(DiagnosticArray, DIAGNOSTICS.name, self._take_report, recording_qos(DIAGNOSTICS))
+        subscribe(DiagnosticArray, DIAGNOSTICS.name, self._take_report, publisher_qos(DIAGNOSTICS))
         for mount in dict.fromkeys(['', *self.mounts]):  # the recorder of several mounts marks for all
             take = partial(self._take_event, mount)
-            subscribe(String, name_in(mount, EVENT.name), take, recording_qos(EVENT))
+            subscribe(String, name_in(mount, EVENT.name), take, publisher_qos(EVENT))
         self._sessions = {
             mount: self.node.create_publisher(String, name_in(mount, SESSION.name), publisher_qos(SESSION))
             for mount in self.mounts
@@ -108,7 +107,7 @@ class Graph:
 
     def close(self) -> None:
         """Leave the middleware."""
-        self.deadline.close()
+        end_after(0.0)
         if self._context.ok():
             leave_middleware(self._take_down)
 
@@ -126,13 +125,13 @@ class Graph:
         begin = time.monotonic()
         try:
             while not condition():
-                self.deadline.set(LONGEST_HANG)
+                end_after(LONGEST_HANG)
                 self.check()
                 if time.monotonic() - begin > limit:
                     raise GraphError(f'{what} did not happen within {limit:g} s: read the logs')
                 self.serve_once()
         finally:
-            self.deadline.set(0.0)
+            end_after(0.0)
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""

@@ -164,8 +164,7 @@ def launch_order(command: Sequence[str]) -> LaunchOrder:
     mounts, known = _mount_names(given['mounts']), _known_parameters(nodes)
     given['mounts'] = ','.join(mounts)
     if SIM in nodes:  # not in the car
-        from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
-        from mount_sim.plant.places import mount_names
+        from mount_sim.plant.mounts import check_control_of_mount, mount_names, with_control_of_mount
 
         mount_names(given['mounts'])
     settings: dict[str, dict[str, Any]] = {}

@@ -16,8 +16,7 @@ from mount_bringup.settings import settings_of_mount
 from mount_ros.environment import loopback_refusal
 from mount_ros.messages.verdicts import flags_of
 from mount_ros.nodes.process import Starter
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shutdown import remove_abandoned
+from mount_ros.nodes.shutdown import end_after, remove_abandoned
 
 Parameters = dict[str, dict[str, object]]
 
@@ -53,8 +52,6 @@ class Supervisor(Graph):
         remove_abandoned()
         self.open()
         report('starting the nodes')
-        if inherited := drop_real_time():
-            self.notes.append(started_in_real_time(inherited))
         of_processes = groups(self.nodes, self.settings.grouping)
         for group in of_processes:
             self.processes.append(NodeProcess(group, self.settings, self._folder))
@@ -94,9 +91,9 @@ class Supervisor(Graph):
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        self.deadline.set(LONGEST_HANG)
+        end_after(LONGEST_HANG)
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
-        self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
+        end_after(0.0)  # what follows has limits of its own, and its sentences must be reported
         complaints = end_processes(self.processes, at_once=all(resting))
         self.notes += [f'{reason}; it was activated again' for reason in self.repeats.values()]
         self.close()

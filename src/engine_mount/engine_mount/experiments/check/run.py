@@ -27,9 +27,8 @@ from mount_bringup.graph.nodes import GraphError
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_RATE, SAMPLE_TIME
-from mount_sim.mount_choice import seat_of, with_control_of_mount
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, with_control_of_mount, without_friction
 
 CORE, LOCKSTEP, GRAPH = 'core', 'lockstep', 'graph'
 MODES = {CORE: 'core', LOCKSTEP: 'lock-step', GRAPH: 'real time'}

@@ -18,7 +18,7 @@ from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.driving import BAND, STEP_TIME, Speed
 from engine_mount.signals.roads.table import EFFECTIVE
 from engine_mount.signals.signal import FloatArray, Signal, SignalError
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 from mount_sim.excitation.scenario import STEP_TIME as PLANT_STEP
 from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
