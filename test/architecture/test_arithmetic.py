@@ -42,11 +42,10 @@ METHODS = {'mean', 'std', 'var', 'dot'}
 ALLOWED = {
     ('mount_sim.random_numbers', 'np.random'): 'whole numbers of PCG64',
     ('mount_models.arithmetic.elementary', '**'): 'powers of whole numbers and fractions',
-    ('mount_sim.plant.check', 'np.linalg'): 'whether parameters are refused, no number of a run',
+    ('mount_sim.plant.car', 'np.linalg'): 'whether parameters are refused, no number of a run',
     ('mount_sim.plant.engine_body', 'np.linalg'): 'natural frequencies, by which parameters are refused',
     ('mount_models.coil.crossing', 'np.cumsum'): 'whole numbers',
     ('mount_init.ramp', 'np.cumsum'): 'whole numbers',
-    ('mount_init.estimate', 'np.sum'): 'whole numbers',
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.times', 'np.interp'): 'times told to people',
     ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',

@@ -8,7 +8,7 @@ from typing import Any
 
 from mount_bringup.settings import OF_EACH, Known, settings_of_mount
 from mount_models.quantity import ParameterError
-from mount_sim.plant.places import mount_names
+from mount_sim.plant.mounts import mount_names
 
 
 def mounts_of(settings: Known) -> tuple[str, ...]:

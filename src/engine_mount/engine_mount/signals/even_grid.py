@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
-from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.sums import mean
 
 ON_THE_LINE = 1e-3
 """Share of a period, chosen: so late a sample of a sine of 0.15 of the rate is wrong by a thousandth."""

@@ -10,7 +10,7 @@ from engine_mount.signals.mapping import ColumnChoice
 from engine_mount.signals.quantities import Quantity
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.units import STANDARD_GRAVITY, Unit, is_unit, unit_of, units_of
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 
 GRAVITY_WITHIN = 0.06
 """Share of standard gravity, chosen: a tilt of 20 degrees, or the error of a common sensor."""

@@ -26,7 +26,7 @@ from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, Sign
 from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, unit_of
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once

@@ -1,6 +1,5 @@
 """Measured roads from the command line: Belgian blocks, driven by the whole vehicle."""
 
-import json
 import shutil
 
 import numpy as np
@@ -11,7 +10,6 @@ from engine_mount.cli.command import main
 from engine_mount.recordings.place import recording_hash
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session
-from mount_control.policy.registry import POLICIES
 from mount_sim.excitation.road import RandomRoad, random_road
 
 pytestmark = pytest.mark.slow
@@ -46,33 +44,6 @@ def command(*words, code=0):
 
 def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
-
-
-def test_belgian_blocks_are_driven_at_three_speeds_by_each_policy_and_the_hydromount(blocks, tmp_path):
-    figures = tmp_path / 'figures.json'
-    own = (f'measured_road.road={blocks}', 'measured_road.speeds=30,60,120', 'measured_road.workers=1')
-    words = [word for setting in own for word in ('--set', setting)]
-    command(
-        'experiment',
-        'measured_road',
-        *words,
-        '--out',
-        tmp_path / 'runs',
-        '--page',
-        tmp_path / 'p.md',
-        '--json',
-        figures,
-    )
-    told = json.loads(figures.read_text())
-    told = told.get('measured_road', told)
-    assert tuple(told['runs']) == SPEEDS
-    for speed, runs in told['runs'].items():
-        assert set(runs) == {*POLICIES, 'no current', 'hydromount'}
-        assert runs['no current']['friction_power_w'] < 1e-6 < runs['continuous_viscous']['friction_power_w']
-        assert runs['continuous_viscous']['displacement_rms_m'] < runs['no current']['displacement_rms_m']
-        assert runs['hydromount']['seconds'] == pytest.approx(109.99 * 3.6 / float(speed) - 1.0, abs=0.05)
-    page = (tmp_path / 'p.md').read_text()
-    assert all(f'## {speed} km/h' in page for speed in SPEEDS)
 
 
 def test_a_drive_over_a_road_tells_its_origin_and_rolls_over_its_stones(blocks, tmp_path):

@@ -28,16 +28,6 @@ def test_a_damper_is_given_to_core_and_nodes_in_one_text(option, damper):
     assert np.array_equal(damper_curve(text).table, damper_curve(damper).table)
 
 
-def test_the_points_of_a_file_are_in_the_settings_so_that_a_session_keeps_them(tmp_path):
-    file = tmp_path / 'own.csv'
-    file.write_text('velocity,force\n0,0\n0.004,0\n0.1,200\n')
-    settings = checked_settings(settings_of_options([f'mount_control.damper={file}']))
-    file.unlink()
-    assert np.array_equal(damper_curve(settings['mount_control']['damper']).table, damper_curve(POINTS).table)
-    with pytest.raises(ParameterError, match='cannot be read'):
-        checked_settings({'mount_control': {'damper': str(file)}})
-
-
 @pytest.mark.parametrize(
     ('name', 'meant'),
     [

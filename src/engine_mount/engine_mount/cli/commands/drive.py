@@ -238,7 +238,7 @@ def drive(
 def _list_faults() -> None:
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
-    from mount_sim.electronics.faults.kinds import FAULTS
+    from mount_sim.electronics.faults import FAULTS
 
     rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
     TerminalScreen(terminal()).table(Table('', 'll', rows, ('name', 'fault')))

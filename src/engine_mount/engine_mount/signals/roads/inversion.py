@@ -16,7 +16,7 @@ from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE, accelerati
 from engine_mount.signals.roads.driving import BAND, STEP_TIME, doubts_of_speed
 from engine_mount.signals.roads.table import EFFECTIVE
 from engine_mount.signals.signal import FloatArray, Signal
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 from mount_sim.plant.vehicle import Vehicle
 
 _PAUSE = 4.0  # s, chosen: four periods of the body
