@@ -53,8 +53,8 @@ import runpy, sys
 from unittest.mock import MagicMock
 sys.modules.update(dict.fromkeys(sys.argv[2].split(), MagicMock()))
 runpy.run_path(sys.argv[1])['generate_launch_description']()
-from mount_bringup.graph.run import ordered
-ordered(['vehicle', 'recording:=none', 'policy:=switched_viscous'])
+from mount_bringup.graph.order import launch_order
+launch_order(['vehicle', 'recording:=none', 'policy:=switched_viscous'])
 print(*sys.modules)
 """
 

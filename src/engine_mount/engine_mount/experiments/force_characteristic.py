@@ -17,7 +17,7 @@ from engine_mount.experiments.harness.experiment import (
 )
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
 from engine_mount.experiments.harness.measures import rms
-from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force
+from mount_models.actuator import TABLE_1, ForceLaw, checked_force
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import default_specimen

@@ -31,7 +31,7 @@ from engine_mount.identification.friction.recording import FloatArray, FrictionR
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, flattened
-from mount_sim.rack.friction import move, with_noise
+from mount_sim.rack import move, with_noise
 
 NAME = 'ramp_and_hold'
 _SYMBOLS = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}

@@ -46,7 +46,7 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW, simplified_response
 from mount_models.quantity import Quantity, flattened
 from mount_sim.plant.friction import full_response
-from mount_sim.rack.friction import move, sawtooth_corners, with_noise
+from mount_sim.rack import move, sawtooth_corners, with_noise
 
 NAME = 'sawtooth'
 

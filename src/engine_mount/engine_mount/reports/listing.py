@@ -28,7 +28,7 @@ from engine_mount.settings.run_folder import RunFolder
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
-from mount_sim.mount_choice import simulated_mounts
+from mount_sim.plant.mounts import simulated_mounts
 
 _COUNTS = {
     'lost_samples': 'samples lost',

@@ -25,9 +25,8 @@ from engine_mount.settings.mounts import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_RATE, SAMPLE_TIME
-from mount_sim.mount_choice import seat_of, with_control_of_mount
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, with_control_of_mount, without_friction
 
 DRIVEN, HYDRO, UNDAMPED = 'driven', 'hydromount', 'undamped'
 _BESIDE = {HYDRO: 'hydro', UNDAMPED: 'friction_off'}

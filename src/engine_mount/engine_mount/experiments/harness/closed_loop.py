@@ -18,8 +18,8 @@ from mount_control.policy import switched_viscous
 from mount_init.initialisation import InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.mount_choice import with_control_of_mount
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.mounts import with_control_of_mount
 from mount_sim.plant.plant import TRUTH
 
 K = TypeVar('K')

@@ -18,8 +18,7 @@ from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
 from mount_recorder.parameters import RecorderParameters
-from mount_sim.mount_choice import seat_of
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, without_friction
 
 Figures = dict[str, Any]
 

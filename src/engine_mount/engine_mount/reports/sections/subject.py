@@ -42,8 +42,7 @@ from mount_ros.topics import (
     SIM_MOUNT_FORCE,
     SIM_TRUTH,
 )
-from mount_sim.mount_choice import seat_of
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, without_friction
 from mount_sim.plant.ripple import RippleCoil
 
 _TRUTH = SIM_TRUTH.name
