@@ -38,7 +38,6 @@ from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import Change, SpecimenValues, declare
 from mount_ros.nodes.process import run_node
-from mount_ros.publishers import UnnamedPublisher
 from mount_ros.timing import LatencyHistogram
 
 _MEASURED_BEFORE = (
@@ -69,7 +68,6 @@ class MountControl(SafeLifecycleNode):
         self.loop = ControlLoop()
         self._activation = Activation()
         self._foreign = False  # whether another node publishes what this one subscribes to
-        self._nameless = UnnamedPublisher()
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
         self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
@@ -166,8 +164,7 @@ class MountControl(SafeLifecycleNode):
             longest_silence=self._settings.parameters.longest_bridge,
             step_median=self._latency.quantile(0.5),
             step_p99=self._latency.quantile(0.99),
-            # In lock-step a supervisor ends the graph, with the name of the other node where there is one.
-            foreign_is_fatal=not self._nameless.is_awaited(loop.nameless) and self.lockstep,
+            foreign_is_fatal=self.lockstep,  # then a supervisor ends the graph
             unread_reason=self._unread_reason,
             values={
                 'policy': self._settings.parameters.policy,

@@ -25,11 +25,6 @@ def control_qos(topic: Topic, *, lockstep: bool) -> QoSProfile:
     return _profile(CONTROL_DEPTH, reliability, DurabilityPolicy.VOLATILE)
 
 
-def recording_qos(topic: Topic) -> QoSProfile:
-    """Return what the recorder asks for: every message."""
-    return publisher_qos(topic)
-
-
 def _profile(depth: int, reliability: ReliabilityPolicy, durability: DurabilityPolicy) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability, durability=durability

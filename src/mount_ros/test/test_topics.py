@@ -4,7 +4,7 @@ import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 
 from mount_ros.messages.cdr import message_class
-from mount_ros.qos import CONTROL_DEPTH, control_qos, publisher_qos, recording_qos
+from mount_ros.qos import CONTROL_DEPTH, control_qos, publisher_qos
 from mount_ros.topics import DISPLACEMENT, JOINT_STATE, RACK_TOPICS, TOPICS, Delivery, topic
 
 each_topic = pytest.mark.parametrize('entry', TOPICS + RACK_TOPICS, ids=lambda entry: entry.name)
@@ -43,7 +43,7 @@ def test_scalars_belong_to_joint_states_and_are_distinct(entry):
 @pytest.mark.parametrize('lockstep', [True, False])
 def test_nobody_asks_for_more_than_is_offered(entry, lockstep):
     offered = publisher_qos(entry)
-    for wanted in (control_qos(entry, lockstep=lockstep), recording_qos(entry)):
+    for wanted in (control_qos(entry, lockstep=lockstep), publisher_qos(entry)):
         assert wanted.reliability in (offered.reliability, ReliabilityPolicy.BEST_EFFORT)
         assert wanted.durability in (offered.durability, DurabilityPolicy.VOLATILE)
 

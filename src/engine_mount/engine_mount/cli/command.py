@@ -86,7 +86,7 @@ _COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
         (audit.audit, audit.EPILOG),
     ),
     'Change recordings': (
-        (import_files.import_files, import_files.EPILOG),
+        (import_files.import_file, import_files.EPILOG),
         (cut.cut, cut.EPILOG),
         (merge.merge, merge.EPILOG),
         (recover.recover, recover.EPILOG),
@@ -104,7 +104,7 @@ _COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
 
 for _panel, _functions in _COMMANDS.items():
     for _function, _epilog in _functions:
-        _name = _function.__name__.removesuffix('_files')
+        _name = _function.__name__.removesuffix('_file')
         app.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
 app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)

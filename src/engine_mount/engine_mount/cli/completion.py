@@ -10,9 +10,9 @@ Completer = Callable[[str], list[str]]
 KINDS = {
     'scenario': 'mount_sim.excitation.scenario:SCENARIO_NAMES',
     'mount': 'mount_sim.plant.mounts:MOUNTS',
-    'place': 'mount_sim.plant.places:PLACES',
+    'place': 'mount_sim.plant.mounts:PLACES',
     'on_full': 'mount_recorder.diagnosis:OnFull',
-    'fault': 'mount_sim.electronics.faults.kinds:FAULTS',
+    'fault': 'mount_sim.electronics.faults:FAULTS',
     'case': 'engine_mount.faults.case:MATRIX',
     'group': 'engine_mount.cli.bench.bench:GROUPS',
     'topic': 'mount_ros.topics:TOPICS',

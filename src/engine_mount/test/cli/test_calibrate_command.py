@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from mount_models.specimen import load_specimen
-from mount_sim.rack.coil import drawn_rack, measure_force, record_ripple, write_columns
+from mount_sim.rack import drawn_rack, measure_force, record_ripple, write_columns
 
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)

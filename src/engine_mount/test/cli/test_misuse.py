@@ -103,7 +103,6 @@ def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, refus
     folder.parent.mkdir()
     command('drive', *DRIVE, '--out', folder)
     for words in (
-        ('compare', folder, folder, '--figure', f'{folder}.png'),
         ('cut', folder, '--from', '0.5s', '--to', '1s', '--out', f'{folder}_cut'),
         ('merge', folder, '--out', f'{folder}_merged'),
         ('recover', folder / 'recording', '--out', f'{folder}_recovered'),

@@ -149,14 +149,6 @@ def test_columns_of_text_are_left_out_and_told(tmp_path):
     assert 'state: no numbers, left out' in measured.notes
 
 
-def test_a_stated_rate_gives_the_times(tmp_path):
-    column = _read(tmp_path, 'az\n1.5\n2.5\n3.5\n', rate=200.0).column('az')
-    np.testing.assert_array_equal(column.time.times, [0.0, 0.005, 0.01])
-    assert column.time.told == 'the stated rate of 200 Hz'
-    with pytest.raises(SignalError, match=r'rate \(0 Hz\) must be above 0'):
-        _read(tmp_path, 'a\n1\n', rate=0.0)
-
-
 # What can be read in two ways
 
 
@@ -192,7 +184,7 @@ def test_titles_decide_what_the_numbers_leave_open(tmp_path):
         ('1.5;x', "column 'az': 'x' is no number; expected is a number with decimal point"),
         (
             '1.5;2,5',
-            "'2,5' is no number; expected is a number with decimal point; is the decimal sign a comma",
+            "'2,5' is no number; expected is a number with decimal point; is the decimal sign the other",
         ),
         ('1.5;1,234.5', 'export without signs between thousands'),
         ('1.5', "1 cells ('1.5') where the others have 2"),

@@ -145,7 +145,7 @@ def test_json_names_line_and_column_of_a_fault(tmp_path):
     path.write_text('{"t": [0, 1],\n "az": [1 2]}')
     assert 'line 2, column 11: Expecting' in _refusal(path)
     path.write_text('{"data": [[0, 1], [1]]}')
-    assert 'data[1] holds 1 values where row 0 holds 2' in _refusal(path)
+    assert 'data[1] holds 1 values where others hold 2' in _refusal(path)
     path.write_text('{"a": 1}')
     assert 'holds no columns of numbers' in _refusal(path)
 

@@ -18,7 +18,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_type
+from mount_models.arithmetic.record import number_record
 from mount_models.quantity import Quantity
 
 _RESISTANCE = 'Pa s/m^3'
@@ -61,11 +61,8 @@ class Hydromount(NamedTuple):
     stop_resistance: Annotated[float, Quantity(_RESISTANCE, 'R_st: stops of the decoupler', 0.0, 1e10)] = 6e7
 
 
-HYDROMOUNT_STATE = record_type(
-    [
-        (name, 'f8')
-        for name in ('upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume')
-    ]
+HYDROMOUNT_STATE = number_record(
+    'upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume'
 )
 """V_1, C_2 P_2 and V_d in m^3, flows in m^3/s, half a step earlier."""
 

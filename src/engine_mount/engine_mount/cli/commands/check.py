@@ -6,11 +6,9 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import (
-    Domain,
     JsonFile,
     Listing,
     NewFolder,
-    Priority,
     Settings,
     changes_of,
     option,
@@ -26,7 +24,7 @@ Examples:
 
 `engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
 
-`engine-mount check --only gap_20mm,rack --through lockstep` - two manoeuvres through the nodes
+`engine-mount check --only gap_20mm,rack` - two manoeuvres
 
 `engine-mount check --suite ours.yaml --json check.json --out bags/check` - your own manoeuvres and limits
 """
@@ -36,25 +34,19 @@ def check(
     suite: Annotated[Path | None, option('manoeuvres and limits; default: those shipped', 'FILE')] = None,
     only: Annotated[str, option('these manoeuvres only', 'NAME,...')] = '',
     show: Listing = False,
-    through: Annotated[str, option('core, lockstep, or graph (in real time)', 'WORD')] = 'core',
     settings: Settings = None,
-    jobs: Annotated[int, option('core: manoeuvres at a time; 0: one per core', least=0)] = 0,
+    jobs: Annotated[int, option('manoeuvres at a time; 0: one per core', least=0)] = 0,
     json_file: JsonFile = None,
     out: NewFolder = None,
-    priority: Priority = 10,
-    domain: Domain = None,
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.check import report
-    from engine_mount.experiments.check.run import CORE, MODES, run_trials, trials_of
+    from engine_mount.experiments.check.run import run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, passed, shipped_suite, suite_in_file
     from engine_mount.settings.run_folder import make_run_folder, new_place
-    from mount_bringup.graph.domain import chosen_domain
 
     screen = TerminalScreen()
-    if through not in MODES:
-        raise typer.BadParameter(f'--through is {", ".join(MODES)}; instead received {through!r}')
     given = changes_of(settings)
     try:
         known = shipped_suite() if suite is None else suite_in_file(suite)
@@ -63,19 +55,17 @@ def check(
             for each in chosen:
                 screen.say(f'{each.name:14}{each.about}')
             return
-        graph = {} if through == CORE else {'domain': chosen_domain(domain), 'priority': priority}
         place = out or new_place('check')
-        trials = trials_of(chosen, given, place, through, jobs=jobs, **graph)
+        trials = trials_of(chosen, given, place)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    file = make_run_folder(place, 'check').path / report.PAGE
+    make_run_folder(place, 'check')
     results = run_trials(
         trials, jobs, screen, lambda trial, result: report.show_result(trial, result, screen)
     )
     verdicts = report.all_verdicts(trials, results)
     screen.table(report.table_of(results, verdicts))
     write_figures(report.figures_of(trials, given, results, verdicts), json_file)
-    report.write_page(trials, given, results, verdicts, file)
-    screen.say(f'page       {file}')
+    screen.say(f'recordings {place}')
     if not all(map(passed, verdicts.values())):
         raise typer.Exit(1)

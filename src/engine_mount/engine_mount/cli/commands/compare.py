@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import (
-    Figure,
     JsonFile,
     flag,
     option,
@@ -22,7 +21,7 @@ EPILOG = """Examples:
 
 `engine-mount compare A B --tolerance current=0.01 --tolerance switching=0.002 --tolerance 0.1%`
 
-`engine-mount compare bags/long bags/cut --common --figure difference.png`
+`engine-mount compare bags/long bags/cut --common`; drawn: `engine-mount report A --compare B`
 """
 _NOT_COMPARED = 2
 
@@ -42,7 +41,6 @@ def compare(
     ] = None,
     common: Annotated[bool, flag('--common', 'compare only the time that both cover')] = False,
     json_file: JsonFile = None,
-    figure: Figure = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
 
@@ -50,7 +48,7 @@ def compare(
     no recording.
     """
     try:
-        equal = _compare(a, b, tolerances or [], common, json_file, figure)
+        equal = _compare(a, b, tolerances or [], common, json_file)
     except (ValueError, OSError) as error:
         refuse(error)
         raise typer.Exit(_NOT_COMPARED) from None
@@ -58,9 +56,7 @@ def compare(
         raise typer.Exit(1)
 
 
-def _compare(
-    a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
-) -> bool:
+def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
@@ -82,9 +78,4 @@ def _compare(
         for warning in recording.warnings:
             screen.note(f'{named(recording.path)}: {warning}')
     write_figures(comparison.figures(), json_file)
-    if figure is not None:
-        from engine_mount.reports.pictures import draw_comparison
-
-        draw_comparison(comparison, *recordings, figure)
-        screen.say(f'figure {figure}')
     return comparison.equal

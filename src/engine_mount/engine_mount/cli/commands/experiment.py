@@ -10,7 +10,6 @@ from engine_mount.cli.commands.options import (
     Listing,
     Page,
     argument,
-    flag,
     option,
     write_figures,
 )
@@ -39,9 +38,6 @@ def experiment(
         Path | None, option('pictures and recordings; default: a new one in bags', 'FOLDER')
     ] = None,
     json_file: JsonFile = None,
-    graph: Annotated[
-        bool, flag('--graph', 'through the real nodes, where controller and plant take part')
-    ] = False,
     settings: Annotated[
         list[str] | None,
         option(
@@ -78,7 +74,7 @@ def experiment(
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
     outcomes = []
-    for known, order in orders(chosen, given, out, graph=graph):
+    for known, order in orders(chosen, given, out):
         with screen.bar(known.name) as bar:
             outcomes.append(known.run(order.shown_on(bar)))
     for outcome in outcomes:

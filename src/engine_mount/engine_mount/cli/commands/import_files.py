@@ -1,4 +1,4 @@
-"""`engine-mount import`: foreign files as a recording that every command takes."""
+"""`engine-mount import`: a foreign file as a recording that every command takes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -19,9 +19,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local
 
-_PART = 's after the first sample of all files'
-
-EPILOG = """Exit code: 0 when the recording is written, 1 when a file was refused, with the reason.
+EPILOG = """Exit code: 0 when the recording is written, 1 when the file was refused, with the reason.
 
 A column that is named without a unit must tell it in its header. Quantities are displacement,
 engine_displacement, chassis_displacement, acceleration, force, current and others; a wrong one lists them.
@@ -32,16 +30,17 @@ Examples:
 
 `engine-mount import rack.csv --map-file rack_2.yaml --out bags/rack` - what a team agreed on
 
-`engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --from 12 --to 60 --out bags/weg`
+`engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
-`engine-mount import weg.csv kraft.csv --rate 1000 --column Weg:mm --column F:kN --out bags/two` - two files
+Of several files each is imported; `engine-mount merge --different-sessions` joins what they became, and
+`engine-mount cut` takes a part.
 """
 
 
-def import_files(
-    files: Annotated[
-        list[str],
-        recording_argument('FILE...', 'CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
+def import_file(
+    file: Annotated[
+        str,
+        recording_argument('FILE', 'CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
     ],
     out: Annotated[Path, option('folder to create; of several parts RECORDING_1, ...', 'RECORDING')],
     map_file: MapFile = None,
@@ -51,25 +50,23 @@ def import_files(
     dbc: Dbc = None,
     decimal: Decimal = '',
     delimiter: Delimiter = '',
-    first: Annotated[float | None, option(_PART, 'S', None, '--from')] = None,
-    last: Annotated[float | None, option(_PART, 'S', None, '--to')] = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Make a recording of foreign files, in SI units, with a session that tells its origin.
+    """Make a recording of a foreign file, in SI units, with a session that tells its origin.
 
     The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
     were sampled. A gap of more than 0.125 s parts the recording.
     """
-    from engine_mount import import_files as run_import
+    from engine_mount import import_file as run_import
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping
 
     screen = TerminalScreen()
-    places = [local(file, screen) for file in files]
+    place = local(file, screen)
     with screen.bar('reading', transient=True) as show:
         imported = run_import(
-            places, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
-            stated=stated(dbc, decimal, delimiter), first=first, last=last, progress=show,
+            place, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
+            stated=stated(dbc, decimal, delimiter), progress=show,
         )  # fmt: skip
     for topic, count in imported.samples.items():
         screen.say(f'{topic:<28}{count} samples')

@@ -23,8 +23,6 @@ Examples:
 
 `engine-mount ls bags /data/drives --json recordings.json` - of several folders
 
-`engine-mount ls s3://bucket/drives` - in a store names and sizes; `info URI` fetches one
-
 The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
 nothing of its files is missing; `engine-mount audit` tells more.
 """
@@ -47,24 +45,28 @@ by the exit code of `engine-mount audit`.
 def ls(
     folders: Annotated[
         list[str] | None,
-        argument('folders of runs, or runs, or their URIs; default: bags', '[FOLDER]...'),
+        argument('folders of runs, or runs; default: bags', '[FOLDER]...'),
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.listing import list_recordings
-    from engine_mount.signals.sources.uris import is_local, local_path, shown
+    from engine_mount.signals.sources.uris import is_local, local_path
 
-    screen, places = TerminalScreen(), folders or ['bags']
-    missing = [place for place in places if is_local(place) and not local_path(place).exists()]
+    if not all(map(is_local, folders or ())):
+        raise ValueError(
+            'ls reads folders of this machine; engine-mount info URI fetches one recording of a store'
+        )
+    screen, places = TerminalScreen(), [local_path(folder) for folder in folders or ['bags']]
+    missing = [str(place) for place in places if not place.exists()]
     if missing:
         raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
     with screen.console.status('reading'):
         found = list_recordings(places)
     write_figures({'recordings': found}, json_file)
     if not found:
-        screen.say(f'no recordings in {", ".join(map(shown, places))}')
+        screen.say(f'no recordings in {", ".join(map(str, places))}')
     for one in found:  # two lines for each, so that paths stay whole in 80 columns
         style = 'yellow' if one['sound'] is False else None
         screen.console.print(f'{one["recording"]}: {one["verdict"]}', style=style, soft_wrap=True)

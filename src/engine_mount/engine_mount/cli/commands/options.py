@@ -131,11 +131,10 @@ Scale = Annotated[
     float | None,
     option('foreign file: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
 ]
-Lateral = Annotated[float, option('road: track of an OpenCRG file, m left of its reference line', 'M')]
 Distance = Annotated[
     str, option('road: column of the distance, or the distance between two heights', 'NAME[:UNIT]|M')
 ]
-SpeedText = Annotated[str, option('road: 60/3.6, 60km/h, or a file of the speed over time', 'M/S|FILE')]
+SpeedText = Annotated[str, option('road: 60/3.6 or 60km/h', 'M/S')]
 Scheduler = Annotated[str, option('local, or tcp://HOST:PORT of a Dask cluster', 'local|ADDRESS')]
 Workers = Annotated[int, option('local: processes; 0: one on each core', least=0)]
 

@@ -8,22 +8,19 @@ import typer
 from engine_mount.cli.commands.options import (
     Distance,
     Figure,
-    JsonFile,
-    Lateral,
     Rate,
     Scale,
     SpeedText,
     TimeColumn,
     argument,
     option,
-    write_figures,
 )
 from engine_mount.cli.help import Command, Group
 
 app = typer.Typer(
     cls=Group,
     name='road',
-    help='Measured roads: class, waviness, stones; a road from a recorded acceleration.',
+    help='Measured roads: class and waviness; a road from a recorded acceleration.',
     no_args_is_help=True,
     rich_markup_mode='markdown',
 )
@@ -32,7 +29,7 @@ _SHOW_EPILOG = """Exit code: 0 when the file is a road, 1 with the reason when n
 
 Examples:
 
-`engine-mount road show blocks.crg --lateral 0.75 --figure road.png`
+`engine-mount road show blocks.csv --figure road.png`
 
 `engine-mount road show profile.csv --column Hoehe:mm --distance Weg:m --speed 60/3.6`
 """
@@ -43,21 +40,19 @@ Examples:
 `engine-mount road invert drive.csv --column az:m/s^2 --speed 60/3.6 --out road.csv` - then
 `engine-mount drive --road road.csv --speed 60/3.6`
 
-`engine-mount road invert imu.csv --column az:g --scale -1 --speed speed.csv --out road.csv`
+`engine-mount road invert imu.csv --column az:g --scale -1 --speed 60km/h --out road.csv`
 """
 
 
 @app.command(cls=Command, epilog=_SHOW_EPILOG)
 def show(
-    file: Annotated[str, argument('height over distance: CSV or OpenCRG', 'FILE')],
-    lateral: Lateral = 0.0,
+    file: Annotated[str, argument('table of height over distance', 'FILE')],
     column: Annotated[str, option('column of the height', 'NAME[:UNIT]')] = '',
     distance: Distance = '',
     speed: SpeedText = '',
     figure: Figure = None,
-    json_file: JsonFile = None,
 ) -> None:
-    """Tell what a measured road is: length, class and waviness by ISO 8608, stones and joints.
+    """Tell what a measured road is: length, class and waviness by ISO 8608.
 
     With `--speed` also which frequencies it holds at that speed.
     """
@@ -66,7 +61,7 @@ def show(
     from engine_mount.recordings.screen import Table
 
     screen = TerminalScreen()
-    found = road(file, lateral=lateral, column=column, distance=distance, speed=speed)
+    found = road(file, column=column, distance=distance, speed=speed)
     screen.table(Table(found.profile.name, 'll', found.rows()))
     for sentence in found.profile.notes:
         screen.note(sentence)
@@ -75,7 +70,6 @@ def show(
 
         draw_road(found.profile, found.unevenness, figure)
         screen.say(f'figure     {figure}')
-    write_figures(found.figures, json_file)
 
 
 @app.command(cls=Command, epilog=_INVERT_EPILOG)
@@ -87,7 +81,6 @@ def invert(
     time: TimeColumn = '',
     rate: Rate = None,
     scale: Scale = None,
-    json_file: JsonFile = None,
 ) -> None:
     """Make the road that gives the vehicle's chassis a recorded acceleration, from 0.9 to 50 Hz.
 
@@ -111,4 +104,3 @@ def invert(
     for sentence in (*signal.notes, *road.notes, *(f'not known: {word}' for word in UNKNOWN)):
         screen.note(sentence)
     screen.say(f'road       {out}')
-    write_figures({'length_m': float(road.distance[-1]), **road.kept._asdict()}, json_file)
