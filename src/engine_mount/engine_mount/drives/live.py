@@ -18,10 +18,10 @@ from engine_mount.drives.lockstep import ControlPlayer, displacement_messages
 from engine_mount.drives.replay import check_parameters, parsed_changes, with_changes
 from engine_mount.recordings.place import open_mount
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.screen import Bar, Screen
 from mount_bringup.graph.domain import domain_lock
 from mount_bringup.graph.nodes import SIMULATED
-from mount_recorder.topic_groups import registered_topic
 from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.nodes.process import ros_context

@@ -36,7 +36,6 @@ ANSWERS = (CURRENT_SETPOINT, CONTROL_TRACE)
 
 
 ACCEPTED_NAME = 'accepted.yaml'
-LARGEST_TOTAL = 5_000_000  # bytes, chosen: of all reference recordings together
 _CHUNK_SIZE = 1 << 20  # bytes, chosen: a tenth smaller than with the recorder's chunks
 _INPUTS = (SESSION, EVENT, AIR_GAP, CURRENT_FORCE_TABLE, DISPLACEMENT, COIL_RIPPLE, COIL_TEMPERATURE)
 _NAME = re.compile(r'[a-z][a-z0-9_]*')
@@ -83,7 +82,7 @@ def accept(
         made.mkdir(parents=True)
         with BagCopy(made / name, _CHUNK_SIZE) as bag:
             bag.add(parts)
-            bag.complete([], [], {})
+            bag.complete()
         entry = {
             'date': time_text(),
             'reason': reason.strip(),
@@ -92,13 +91,6 @@ def accept(
             'changes': changes or ['new reference'],
         }
         _write_history(made / name, target, entry)
-        size = _size(made / name)
-        total = size + sum(_size(p) for p in folder.iterdir() if p.is_dir() and p not in (target, made))
-        if total > LARGEST_TOTAL:
-            raise AcceptError(
-                f'all references would have {total / 1e6:.1f} MB, {name} {size / 1e6:.1f} MB of it; '
-                f'the limit is {LARGEST_TOTAL / 1e6:g} MB: drive a shorter one'
-            )
         aside = folder / f'.{name}.old'
         shutil.rmtree(aside, ignore_errors=True)
         if target.exists():
@@ -107,7 +99,7 @@ def accept(
         shutil.rmtree(aside, ignore_errors=True)
     finally:
         shutil.rmtree(made, ignore_errors=True)
-    return Accepted(target, size, total, tuple(changes))
+    return Accepted(target, _size(target), sum(map(_size, folder.iterdir())), tuple(changes))
 
 
 def _parts(run: Recording, before: Recording | None) -> list[Messages]:

@@ -29,7 +29,7 @@ def drives(tmp_path_factory):
         writer = BagWriter(folder / f'{hours:g}h')
         for topic in TOPICS:
             if topic.name in (AIR_GAP.name, CURRENT_FORCE_TABLE.name):
-                writer.add_topic(f'/{topic.name}', topic.type, latched=True)
+                writer.add_topic(f'/{topic.name}', topic.type)
         sim = {
             'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.2, 'seed': seed,
             'electronics.ripple_noise': 0.01, 'mechanics.contact_gap': 349e-6 - WEAR * hours,

@@ -89,7 +89,6 @@ REFUSED = {
     'info': (MISSING,),
     'ls': (MISSING,),
     'identify friction': ('--train', MISSING),
-    'merge': (MISSING, '--out', MISSING),
     'recover': (MISSING,),
     'replay': (MISSING,),
     'report': (MISSING,),
@@ -138,7 +137,7 @@ def test_a_word_in_brackets_is_refused_in_a_sentence_that_holds_it(command, caps
 
 
 @pytest.mark.parametrize(
-    'command', ['audit', 'compare', 'cut', 'merge', 'recover', 'replay', 'report', 'calibrate rack']
+    'command', ['audit', 'compare', 'cut', 'recover', 'replay', 'report', 'calibrate rack']
 )
 def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, drive, capsys, tmp_path):
     out = tmp_path / '[' / 'x]'
@@ -147,7 +146,6 @@ def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, drive
         'audit': (drive / 'recording',),
         'compare': (drive, drive, '--figure', f'{out}.png'),
         'cut': (drive, '--from', '0.5s', '--to', '1s', '--out', out),
-        'merge': (drive, '--out', out),
         'recover': (drive / 'recording', '--out', out),
         'replay': (drive, '--out', out),
         'report': (drive, '--out', f'{out}.html'),

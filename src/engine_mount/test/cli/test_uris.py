@@ -78,14 +78,6 @@ def test_a_report_about_a_uri_goes_into_the_current_folder(tmp_path):
     assert made(tmp_path) == ['gap_report', 'gap_report.html']
 
 
-def test_parts_by_uri_are_merged(tmp_path):
-    run('cut', RUN, '--to', '3s', '--out', 'a')
-    fsspec.filesystem('memory').put(str(tmp_path / 'here' / 'a'), '/drives/a', recursive=True)
-    run('cut', RUN, '--from', '3s', '--out', 'b')
-    run('merge', f'{STORE}/a', 'b', '--out', 'whole')
-    assert 'everything is equal' in run('compare', 'whole', RUN)
-
-
 def test_info_tells_the_same_of_a_uri():
     told = run('info', RUN)
     assert told.startswith(f'recording           {RUN}, whole')
@@ -122,7 +114,7 @@ def test_ls_tells_where_nothing_is():
         run('ls', f'{STORE}/gap/x')
 
 
-@pytest.mark.parametrize('command', ['audit', 'info', 'cut --to 1s', 'ls', 'view', 'merge --out m', 'report'])
+@pytest.mark.parametrize('command', ['audit', 'info', 'cut --to 1s', 'ls', 'view', 'report'])
 def test_every_command_refuses_a_uri_with_a_password_without_telling_it(command):
     name, *options = command.split()
     result = CliRunner().invoke(app, [name, 'sftp://driver:hunter2@host/a', *options])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compared_drives import answers, write_answers
+from compared_drives import add_answers, answers
 from mcap.writer import Writer
 from recorded_drive import START
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -148,17 +148,15 @@ def test_a_topic_of_another_type_is_never_equal(tmp_path):
 
 @pytest.fixture
 def with_camera(tmp_path):
-    """Return a recording with a camera beside the mount whose topics are called like ours."""
-    from engine_mount.recordings.merge import merge
-
-    drive = write_answers(tmp_path / 'drive', answers(400), marks=((100, 'a bump'),))
-    writer = BagWriter(tmp_path / 'camera')
-    for name in ('event', 'session', 'displacement', 'control_trace'):
-        writer.add_topic(f'/camera/{name}', 'std_msgs/msg/Int32')
-        writer.write(f'/camera/{name}', b'\x00\x01\x00\x00\x07\x00\x00\x00', START)
-    writer.close()
-    parts = [engine_mount.open(drive), engine_mount.open(tmp_path / 'camera')]
-    merge(parts, tmp_path / 'both', different_sessions=True)
+    """Return recordings of a camera whose topics are called like ours, alone and beside the mount."""
+    for folder in ('both', 'camera'):
+        writer = BagWriter(tmp_path / folder)
+        if folder == 'both':
+            add_answers(writer, answers(400), marks=((100, 'a bump'),))
+        for name in ('event', 'session', 'displacement', 'control_trace'):
+            writer.add_topic(f'/camera/{name}', 'std_msgs/msg/Int32')
+            writer.write(f'/camera/{name}', b'\x00\x01\x00\x00\x07\x00\x00\x00', START)
+        writer.close()
     return tmp_path
 
 

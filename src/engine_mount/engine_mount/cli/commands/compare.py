@@ -30,7 +30,7 @@ def compare(
             '--tolerance',
             metavar='NAME=VALUE',
             help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
-            'also topic=, topic.signal=, mount_left/topic.signal=',
+            'also topic=, topic.signal=',
         ),
     ] = None,
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,

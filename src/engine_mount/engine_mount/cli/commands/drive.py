@@ -16,7 +16,6 @@ from engine_mount.cli.commands.options import (
     NewFolder,
     Rate,
     Settings,
-    Snapshot,
     Split,
     TimeColumn,
     flag,
@@ -56,7 +55,7 @@ Examples:
 
 `engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
-`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
+`engine-mount drive --split 500MB` - in several files
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
 
@@ -145,8 +144,7 @@ def drive(
     on_full: Annotated[
         str, option('full disk: stop the run, or continue without recording', 'WORD', named('on_full'))
     ] = 'stop',
-    split: Split = None,
-    snapshot: Snapshot = '',
+    split: Split = '',
     priority: Annotated[
         int, option('real-time priority of the 1 kHz loop where permitted; 0: none', min=0, max=90)
     ] = 10,
@@ -160,9 +158,9 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
-    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
+    from engine_mount.reports.drive.results import evaluate_drive
     from engine_mount.reports.json_file import write_json
-    from engine_mount.settings.amounts import checked_recorder, recorder_options
+    from engine_mount.settings.amounts import recorder_options
     from engine_mount.settings.options import settings_of_options
     from mount_bringup.settings import SettingError
 
@@ -184,7 +182,7 @@ def drive(
         parameters = settings_of_options(settings or [])
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
-    recorder = recorder_options(split or [], snapshot)
+    recorder = recorder_options(split)
     if on_full != 'stop':
         recorder['on_full'] = on_full
     if recorder:
@@ -219,11 +217,7 @@ def drive(
         )  # fmt: skip
     except CombinationError as error:
         raise typer.BadParameter(str(error)) from None
-    recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
-    if recorded.snapshot:
-        told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
-    else:
-        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+    told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     if json_file is not None:
         write_json(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []

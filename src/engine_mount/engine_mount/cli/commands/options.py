@@ -42,13 +42,7 @@ NewFolder = Annotated[Path | None, typer.Option(help='folder to create; default:
 JsonFile = Annotated[
     Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
 ]
-Split = Annotated[
-    list[str] | None,
-    typer.Option(metavar='LIMIT', help='largest or longest file: 500MB, 60s; may be given once for each'),
-]
-Snapshot = Annotated[
-    str, typer.Option(metavar='DURATION', help='record only around events, with so much before: 30s')
-]
+Split = Annotated[str, typer.Option(metavar='SIZE', help='largest file, such as 500MB; default: one file')]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

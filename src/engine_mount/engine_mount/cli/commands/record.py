@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split, option
+from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Split, option
 from engine_mount.cli.completion import named
 from engine_mount.cli.terminal import terminal
 
@@ -17,9 +17,7 @@ Examples:
 
 `engine-mount record` - all topics, until Ctrl-C; `m` or space sets a mark
 
-`engine-mount record displacement control_trace --split 500MB --split 60s --out bags/long`
-
-`engine-mount record --snapshot 30s` - only what happens around marks, with the 30 s before each
+`engine-mount record displacement control_trace --split 500MB --out bags/long`
 
 In a terminal a line tells messages per second, size, lost messages and marks. The topic `event`, which
 holds the marks, is always recorded. Times are those of the wall clock.
@@ -34,9 +32,7 @@ def record(
         ),
     ] = None,
     out: NewFolder = None,
-    split: Split = None,
-    snapshot: Snapshot = '',
-    snapshot_after: Annotated[str, option('snapshot: and with so much after an event', 'DURATION')] = '10s',
+    split: Split = '',
     duration: Annotated[float | None, option('length, s; default: until Ctrl-C', 'S')] = None,
     on_full: Annotated[
         str,
@@ -58,10 +54,11 @@ def record(
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
-    options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
+    options = {'on_full': on_full, **recorder_options(split)}
     console = terminal()
+    folder = out if out is not None else new_place('record')
     outcome = run_record(
-        out if out is not None else new_place('record'),
+        folder,
         checked_recorder(options),
         TerminalScreen(console),
         topics=topics or (),
@@ -71,10 +68,8 @@ def record(
     )
     if outcome.failure:
         _print('note', outcome.failure, console)
-    sound = [_told(folder, console) for folder in outcome.folders]
-    if not sound and not outcome.failure:
-        console.print('no event came, so no snapshot was saved', soft_wrap=True)
-    if outcome.failure or outcome.lost or not all(sound):
+    sound = _told(folder, console)
+    if outcome.failure or outcome.lost or not sound:
         raise typer.Exit(1)
 
 

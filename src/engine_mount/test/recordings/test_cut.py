@@ -1,12 +1,10 @@
-"""Pieces of a recording: nothing in them is changed, and put together they are the whole."""
+"""Pieces of a recording: nothing in them is changed."""
 
 import itertools
 
 import numpy as np
 import pytest
 from compared_drives import START, answers, write_answers
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mcap.writer import Writer
 
 import engine_mount
@@ -18,7 +16,6 @@ from engine_mount.recordings.events import (
     find_event,
     recorded_events,
 )
-from engine_mount.recordings.merge import MergeError, merge
 from engine_mount.recordings.metadata import origin
 from mount_recorder.bag_writer import BagWriter
 
@@ -91,11 +88,11 @@ def test_a_cut_says_where_it_is_from(whole, place):
 @pytest.mark.parametrize(
     ('begin', 'end', 'why'),
     [
-        (0.2, 0.1, 'must lie behind its begin'),
-        (None, -1.0, 'must lie behind its begin'),
-        (0.2, 0.2, 'must lie behind its begin'),
+        (0.2, 0.1, 'would end at 0.100 s and begin at 0.200 s'),
+        (None, -1.0, 'would end at'),
+        (0.2, 0.2, 'would end at'),
         (9.0, None, 'ends at 0.399 s'),
-        (float('nan'), None, 'must be a number'),
+        (float('nan'), None, 'must be numbers'),
         (0.10030, 0.10031, 'has no message from'),
     ],
 )
@@ -104,70 +101,6 @@ def test_a_cut_of_nothing_is_refused(whole, place, begin, end, why):
     with pytest.raises(CutError, match=why):
         cut(whole, folder, begin, end)
     assert not folder.exists()
-
-
-# Merging.
-
-
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    ends=st.lists(st.integers(1, 397), min_size=1, max_size=4, unique=True),  # ms: no piece is empty
-    shift=st.sampled_from([0.0, 0.0004]),
-    overlap=st.sampled_from([0.0, 0.0005, 0.03]),
-    order=st.randoms(use_true_random=False),
-)
-def test_cuts_merged_in_any_order_are_the_original(whole, place, ends, shift, overlap, order):
-    borders = [None, *(1e-3 * end + shift for end in sorted(ends)), None]
-    pieces = []
-    for begin, end in itertools.pairwise(borders):
-        until = end if end is None else end + overlap
-        pieces.append(_cut(whole, place(), begin, until))
-    order.shuffle(pieces)
-    folder = place()
-    merged = merge(pieces, folder)
-    united = engine_mount.open(folder)
-    assert _messages(united) == _messages(whole)
-    assert compare(whole, united).equal
-    assert merged.messages == whole.message_count
-    assert merged.repeated == sum(piece.message_count for piece in pieces) - whole.message_count
-    assert not united.warnings
-
-
-def test_what_a_recording_has_twice_stays_twice(place):
-    def write(folder, copies):
-        writer = BagWriter(folder)
-        writer.add_topic('/x', 'std_msgs/msg/String')
-        for _ in range(copies):
-            writer.write('/x', b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00', 1000)
-        writer.close()
-        return engine_mount.open(folder)
-
-    folder = place()
-    merged = merge([write(place(), 2), write(place(), 3), write(place(), 1)], folder)
-    assert (merged.messages, merged.repeated) == (3, 3)
-
-
-def test_recordings_of_different_sessions_are_merged_only_if_asked(whole, place):
-    other = engine_mount.open(write_answers(place(), answers(20), session='scenario: motorway\n'))
-    with pytest.raises(MergeError, match='scenario is bench in A, motorway in B'):
-        merge([whole, other], place())
-    folder = place()
-    merge([whole, other], folder, different_sessions=True)
-    assert len(engine_mount.open(folder)['session']) == 2
-
-
-def test_a_recording_without_session_is_not_taken_for_a_part(whole, drive, place):
-    with pytest.raises(MergeError, match='has no session'):
-        merge([whole, engine_mount.open(drive)], place())
-
-
-def test_a_topic_of_two_types_is_refused(whole, place):
-    folder = place()
-    writer = BagWriter(folder)
-    writer.add_topic('/displacement', 'std_msgs/msg/String')
-    writer.close()
-    with pytest.raises(MergeError, match='displacement is sensor_msgs/msg/JointState in one recording'):
-        merge([whole, engine_mount.open(folder)], place())
 
 
 # Events.
@@ -183,13 +116,13 @@ def test_events_are_marks_and_switchings_in_order(whole):
 
 @pytest.mark.parametrize(
     ('wanted', 'sample'),
-    [('1', 50), ('2', 100), ('fault', 50), ('fault:2', 320), ('switch-on', 100), ('switch_off', 300)],
+    [('1', 50), ('2', 100), ('fault', 50), ('switch-on', 100), ('switch_off', 300)],
 )
 def test_an_event_is_found_by_number_kind_or_both(whole, wanted, sample):
     assert find_event(whole, wanted).log_time == START + sample * 1_000_000 + 200_000
 
 
-@pytest.mark.parametrize('wanted', ['0', '6', 'fault:3', 'rough', ''])
+@pytest.mark.parametrize('wanted', ['0', '6', 'rough', ''])
 def test_an_event_that_is_not_there_is_refused_with_those_that_are(whole, wanted):
     with pytest.raises(EventError, match=r'1 fault at 0.050 s, 2 switch_on at 0.100 s'):
         find_event(whole, wanted)
