@@ -28,7 +28,6 @@ ELSEWHERE = {
     'ros2 topic echo': _HARDWARE,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
     'ros2 launch mount_bringup sim.launch.py': _LAUNCH,
-    'ros2 run mount_bringup mount_prepare': 'by src/mount_bringup/test/test_prepare.py',
     'export ROS_DOMAIN_ID': _BAG_PLAY,
     'ros2 run mount_control': _BAG_PLAY,
     'ros2 lifecycle set /mount_control': _BAG_PLAY,

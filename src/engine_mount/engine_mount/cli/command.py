@@ -83,7 +83,7 @@ _COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (
     (_RECORDINGS, 'replay', replay.replay, replay.EPILOG),
     (_RECORDINGS, 'compare', compare.compare, compare.EPILOG),
     (_RECORDINGS, 'audit', audit.audit, audit.EPILOG),
-    (_CHANGE, 'import', import_files.import_files, import_files.EPILOG),
+    (_CHANGE, 'import', import_files.import_file, import_files.EPILOG),
     (_CHANGE, 'cut', cut.cut, cut.EPILOG),
     (_CHANGE, 'recover', recover.recover, recover.EPILOG),
     (_MOUNT, 'experiment', experiment.experiment, experiment.EPILOG),

@@ -10,11 +10,11 @@ Completer = Callable[[str], list[str]]
 KINDS = {
     'scenario': 'mount_sim.excitation.scenario:SCENARIO_NAMES',
     'mount': 'mount_sim.plant.mounts:MOUNTS',
-    'place': 'mount_sim.plant.places:PLACES',
+    'place': 'mount_sim.plant.mounts:PLACES',
     'policy': 'mount_control.policy.registry:POLICIES',
     'damper': 'mount_models.damper:DAMPERS',
     'on_full': 'mount_recorder.diagnosis:OnFull',
-    'fault': 'mount_sim.electronics.faults.kinds:FAULTS',
+    'fault': 'mount_sim.electronics.faults:FAULTS',
     'case': 'engine_mount.faults.case:MATRIX',
     'group': 'engine_mount.cli.bench.bench:GROUPS',
     'topic': 'mount_ros.topics:TOPICS',

@@ -27,7 +27,7 @@ from mount_recorder.versions import versions
 from mount_ros.messages.cdr import accelerometer
 from mount_ros.messages.scalars import OneNumberLayout
 from mount_sim.excitation.scenario import SweepScenario
-from mount_sim.mount_choice import with_control_of_mount
+from mount_sim.plant.mounts import with_control_of_mount
 
 Settings = Mapping[str, Any]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
 from engine_mount.recordings.events import paired_switchings, switching_times
-from mount_models.arithmetic.interpolation import each_interpolated
+from mount_models.arithmetic.sums import each_interpolated
 
 Column = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -8,11 +8,11 @@ import pytest
 import yaml
 
 from engine_mount.cli.command import main
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.specimen import load_specimen
 from mount_sim.plant.reluctance import force
-from mount_sim.rack.coil import drawn_rack, measure_force, record_ripple, write_columns
+from mount_sim.rack import drawn_rack, measure_force, record_ripple, write_columns
 
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)

@@ -12,7 +12,7 @@ from engine_mount.cli.command import main
 from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.mapping import ColumnChoice, Mapping
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
@@ -22,7 +22,7 @@ from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
-from mount_sim.rack.coil import drawn_rack, record_ripple
+from mount_sim.rack import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)

@@ -63,14 +63,12 @@ def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(che
     one, figures = check('one', '--jobs', '1')
     assert one.exit_code == 0, one.output
     assert '2 of 2 manoeuvres within their 11 limits.' in one.output
-    assert all(len(line) <= 80 for line in one.output.splitlines() if 'page' not in line)
-    assert (tmp_path / 'one' / 'check.html').read_text(encoding='utf-8').count('Within all limits.') == 2
+    assert all(len(line) <= 80 for line in one.output.splitlines() if 'recordings' not in line)
     assert (tmp_path / 'one' / 'gap' / 'recording').is_dir()
     assert check('two', '--jobs', '2')[1] == figures
     gap = json.loads(figures)['manoeuvres']['gap']['figures']
     assert gap['peak_over_undamped'] < 0.71
     assert gap['pad_energy_j'] > 0.1
-    assert gap['latency_p99_us'] is None
 
 
 @pytest.mark.slow
@@ -103,7 +101,6 @@ def test_a_worse_controller_fails_by_name(check, options, caught):
 @pytest.mark.parametrize(
     ('options', 'word'),
     [
-        (('--through', 'core,graph'), '--through is core, lockstep, graph'),
         (('--only', 'gpa'), "'gpa' is no manoeuvre of the suite; did you mean gap"),
         (('--set', 'mount_control.policy'), 'write NAME=VALUE or NODE.NAME=VALUE'),
         (('--set', 'mount_control.polcy=x'), 'did you mean policy'),

@@ -9,7 +9,7 @@ from engine_mount.drives.inputs.foreign import default_gap, foreign_input, forei
 from engine_mount.identification.friction.files import friction_mapping, read_recording
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.importing.reading import read_files
+from engine_mount.signals.importing.reading import read_file
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
@@ -37,11 +37,8 @@ def replay(file, mapping):
 
 
 def imported(file, mapping):
-    return (
-        read_files([str(file)], mapping_in_file(mapping).only(mapping_in_file(mapping).columns))[0]
-        .signals['displacement']
-        .values
-    )
+    chosen = mapping_in_file(mapping)
+    return read_file(file, chosen.only(chosen.columns)).signals['displacement'].values
 
 
 def invert(file, mapping):

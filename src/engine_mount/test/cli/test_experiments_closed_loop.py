@@ -37,9 +37,7 @@ def rack(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def swept(tmp_path_factory):
-    return experiment(
-        sweep.NAME, out=tmp_path_factory.mktemp('sweep'), last_frequency=14.5, idle_amplitude=0.0
-    )
+    return experiment(sweep.NAME, out=tmp_path_factory.mktemp('sweep'), last_frequency=14.5)
 
 
 @pytest.fixture(scope='module')
@@ -53,9 +51,7 @@ def gaps(tmp_path_factory):
 def test_the_rack_writes_recordings_pictures_and_plain_figures(rack):
     check(rack)
     assert len(rack.recordings) == 6
-    assert len(rack.figures['harmonics_n']) == 8
-    chosen = rack.figures['runs'][rack.figures['damper']]
-    assert all(rack.figures[key] == chosen[key] for key in ('harmonics_n', 'thd', 'loss_energy_j'))
+    assert len(rack.figures['runs'][rack.figures['damper']]['harmonics_n']) == 8
 
 
 @pytest.mark.parametrize(
@@ -109,13 +105,6 @@ def test_odd_harmonics_lie_below_those_of_the_hydromount_up_to_3000(rack):
     assert runs['viscous_2000']['thd'] <= 0.5 * runs[bench.HYDRO]['thd']
 
 
-def test_plain_coulomb_has_the_harmonics_of_a_rectangle_and_no_even_ones(rack):
-    found = rack.figures['runs'][bench.COULOMB]['harmonics_n']
-    rectangle = 400.0 / np.pi
-    expected = [np.hypot(160.0, rectangle), 0, rectangle / 3, 0, rectangle / 5, 0, rectangle / 7, 0]
-    assert found == pytest.approx(expected, rel=0.01, abs=0.1)
-
-
 def test_other_parameters_of_nodes_reach_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, 'FAMILY', ('viscous_2000',))  # one characteristic tells it
     loose = {'mount_sim': {'friction.scale': 0.5}}
@@ -149,10 +138,9 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
 
 def test_the_sweep_names_its_bands(swept):
     check(swept)
-    edges = swept.figures['band_edges_hz']
-    assert edges == [float(k) for k in range(1, 16)]
-    assert len(swept.figures['peak_displacement_m']) == len(edges) - 1
-    assert len(swept.figures['chassis_acceleration_rms']) == len(edges) - 1
+    chosen = swept.figures['runs'][sweep.FRICTION]
+    assert chosen['bands_hz'] == [k + 0.5 for k in range(1, 15)]
+    assert len(chosen['peak_displacement_m']) == 14
 
 
 @pytest.mark.parametrize(
@@ -192,10 +180,10 @@ def test_only_the_hydromount_shows_a_resonance_peak(swept):
 
 
 def test_a_resonance_peak_is_a_local_maximum_well_above_the_switch_on_level():
-    edges = [5.0, 6.0, 7.0, 8.0]
-    assert defined_peak(edges, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
-    assert defined_peak(edges, [0.4, 0.9, 0.6, 0.5], 0.8) is None
-    assert defined_peak(edges, [0.4, 1.1, 1.2, 1.3], 0.8) is None
+    middles = [5.5, 6.5, 7.5, 8.5]
+    assert defined_peak(middles, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
+    assert defined_peak(middles, [0.4, 0.9, 0.6, 0.5], 0.8) is None
+    assert defined_peak(middles, [0.4, 1.1, 1.2, 1.3], 0.8) is None
 
 
 # Gap.
@@ -241,12 +229,11 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     order = sensitivity.EXPERIMENT.order(tmp_path, {sensitivity.NAME: settings})
     outcome = sensitivity.EXPERIMENT.run(order.shown_on(lambda share, what: told.append(what)))
     check(outcome)
-    assert 'sensitivity: 11 of 11 runs' in told
+    assert 'sensitivity: 9 of 9 runs' in told
     ratios = np.array(outcome.figures['peak_ratio'])[:, 0, 0, 0]
     assert ratios[1] == pytest.approx(0.72, rel=0.03)
     assert ratios[0] > 1.3
     text = outcome.pages[0].read_text()
-    assert '| displacement, V0 = 0.06 m/s, R_d = 1e+08, F_i = 0 N | 1.78 | 1.78 | yes |' in text
     assert 'at V0 = 0.12 m/s it wins whatever the rest; at V0 = 0.06 m/s it loses whatever the rest' in text
     assert [statement.holds for statement in outcome.claims] == [
         Holds.PARTLY,
@@ -278,6 +265,6 @@ def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):
 # Contract.
 
 
-def test_closed_loop_experiments_take_the_nodes_parameters_and_the_graph():
+def test_closed_loop_experiments_take_the_nodes_parameters():
     closed = {name for name in NAMES if experiment_named(name).closed_loop}
-    assert closed == {'bench', 'sweep', 'motorway_gap', 'measured_road', 'recorded_drive'}
+    assert closed == {'bench', 'sweep', 'motorway_gap', 'recorded_drive'}

@@ -89,7 +89,7 @@ def test_a_drive_without_damping_says_so(tmp_path):
     )
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['times_on'] == 0
-    assert 'Damping was never on' in outcome.pages[0].read_text()
+    assert 'Damping went on 0 times' in outcome.pages[0].read_text()
     assert outcome.claims[1].holds is Holds.NOT_COMPARABLE
 
 
@@ -119,8 +119,6 @@ def test_without_a_file_it_says_what_to_give(tmp_path):
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SourceError, match='no such file'):
         experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'))
-    with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
-        experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'), duration=5.0)
     assert not (tmp_path / 'out').exists()
 
 

@@ -21,7 +21,7 @@ from engine_mount.settings.chosen import chosen_control
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen, load_specimen
-from mount_sim.rack.friction import (
+from mount_sim.rack import (
     RackNoise,
     move,
     ramp_and_hold,

@@ -136,15 +136,12 @@ def test_a_word_in_brackets_is_refused_in_a_sentence_that_holds_it(command, caps
     assert '[/x]' in printed
 
 
-@pytest.mark.parametrize(
-    'command', ['audit', 'compare', 'cut', 'recover', 'replay', 'report', 'calibrate rack']
-)
+@pytest.mark.parametrize('command', ['audit', 'cut', 'recover', 'replay', 'report', 'calibrate rack'])
 def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, drive, capsys, tmp_path):
     out = tmp_path / '[' / 'x]'
     out.parent.mkdir()
     arguments = {
         'audit': (drive / 'recording',),
-        'compare': (drive, drive, '--figure', f'{out}.png'),
         'cut': (drive, '--from', '0.5s', '--to', '1s', '--out', out),
         'recover': (drive / 'recording', '--out', out),
         'replay': (drive, '--out', out),

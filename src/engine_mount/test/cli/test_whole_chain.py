@@ -22,7 +22,7 @@ from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.settings.chosen import chosen_control, policy_of
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
@@ -30,8 +30,7 @@ from mount_models.quantity import flattened
 from mount_models.specimen import DEFAULT_SPECIMEN, load_specimen
 from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.plant.ripple import current_rate, flux_rate
-from mount_sim.rack.coil import drawn_rack
-from mount_sim.rack.friction import drawn_friction
+from mount_sim.rack import drawn_friction, drawn_rack
 
 pytestmark = pytest.mark.slow
 

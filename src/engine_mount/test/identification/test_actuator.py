@@ -9,7 +9,7 @@ from engine_mount.identification.actuator import fit as fit_module
 from engine_mount.identification.actuator.calibration import ActuatorCalibration
 from engine_mount.identification.actuator.fit import fit_force_law
 from engine_mount.identification.actuator.points import gap_groups
-from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force
+from mount_models.actuator import TABLE_1, ForceLaw, checked_force
 from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, force

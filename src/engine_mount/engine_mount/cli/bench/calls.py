@@ -59,7 +59,7 @@ def _decoding() -> Comparison:
     message = database.get_message_by_name('MountMeasurement')
     frame = codec.encode_measurement(Measurement(7, 7000, 1e-4, 0.2, 300.0, 110.0), 7)
     ours, other = median_times(
-        lambda: codec.decode_measurement(frame), lambda: message.decode(frame), _ROUNDS, _REPEATS
+        lambda: codec.measurement.decode(frame), lambda: message.decode(frame), _ROUNDS, _REPEATS
     )
     return Comparison('decode one CAN frame with CRC', ours, 'cantools, no CRC', other)
 

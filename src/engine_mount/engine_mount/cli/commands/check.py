@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import Domain, JsonFile, NewFolder, Settings
+from engine_mount.cli.commands.options import JsonFile, NewFolder, Settings
 from engine_mount.cli.terminal import terminal
 
 EPILOG = """Exit code: 0 when every manoeuvre stayed within its limits; 1 when a limit was exceeded; 2 for a
@@ -17,7 +17,7 @@ Examples:
 
 `engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
 
-`engine-mount check --only gap_20mm,rack --through lockstep` - two manoeuvres through the nodes
+`engine-mount check --only gap_20mm,rack` - two manoeuvres
 
 `engine-mount check --suite ours.yaml --json check.json --out bags/check` - your own manoeuvres and limits
 """
@@ -29,33 +29,23 @@ def check(
     ] = None,
     only: Annotated[str, typer.Option(metavar='NAME,...', help='these manoeuvres only')] = '',
     show: Annotated[bool, typer.Option('--list', help='tell which manoeuvres there are')] = False,
-    through: Annotated[
-        str, typer.Option(metavar='WORD', help='core, lockstep, or graph (in real time)')
-    ] = 'core',
     settings: Settings = None,
     policy: Annotated[str, typer.Option(help='of the controller: mount_control.policy')] = '',
     mount: Annotated[str, typer.Option(help='in the seat: mount_sim.mount')] = '',
-    jobs: Annotated[int, typer.Option(min=0, help='core: manoeuvres at a time; 0: one per core')] = 0,
+    jobs: Annotated[int, typer.Option(min=0, help='manoeuvres at a time; 0: one per core')] = 0,
     json_file: JsonFile = None,
     out: NewFolder = None,
-    priority: Annotated[
-        int, typer.Option(min=0, max=90, help='graph: real-time priority where permitted; 0: none')
-    ] = 10,
-    domain: Domain = None,
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.check import report
-    from engine_mount.experiments.check.run import CORE, MODES, run_trials, trials_of
+    from engine_mount.experiments.check.run import run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, passed, shipped_suite, suite_in_file
     from engine_mount.reports.json_file import write_json
     from engine_mount.settings.options import settings_of_options
     from engine_mount.settings.run_folder import make_run_folder, new_place
-    from mount_bringup.graph.domain import chosen_domain
 
     console = terminal()
-    if through not in MODES:
-        raise typer.BadParameter(f'--through is {", ".join(MODES)}; instead received {through!r}')
     try:
         known = shipped_suite() if suite is None else suite_in_file(suite)
         chosen = chosen_of(known, [name for name in only.split(',') if name])
@@ -68,12 +58,11 @@ def check(
             given.setdefault('mount_control', {})['policy'] = policy
         if mount:
             given.setdefault('mount_sim', {})['mount'] = mount
-        graph = {} if through == CORE else {'domain': chosen_domain(domain), 'priority': priority}
         place = out or new_place('check')
-        trials = trials_of(chosen, given, place, through, jobs=jobs, **graph)
+        trials = trials_of(chosen, given, place)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    file = make_run_folder(place, 'check').path / report.PAGE
+    make_run_folder(place, 'check')
     screen = TerminalScreen(console)
     results = run_trials(
         trials, jobs, screen, lambda trial, result: report.show_result(trial, result, screen)
@@ -82,7 +71,6 @@ def check(
     screen.table(report.table_of(results, verdicts))
     if json_file is not None:
         write_json(report.figures_of(trials, given, results, verdicts), json_file)
-    report.write_page(trials, given, results, verdicts, file)
-    console.print(f'page       {file}', soft_wrap=True)
+    console.print(f'recordings {place}', soft_wrap=True)
     if not all(map(passed, verdicts.values())):
         raise typer.Exit(1)

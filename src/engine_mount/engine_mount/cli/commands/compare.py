@@ -16,7 +16,7 @@ EPILOG = """Examples:
 
 `engine-mount compare A B --tolerance current=0.01 --tolerance switching=0.002 --tolerance 0.1%`
 
-`engine-mount compare bags/long bags/cut --common --figure difference.png`
+`engine-mount compare bags/long bags/cut --common`; drawn: `engine-mount report A --compare B`
 """
 _NOT_COMPARED = 2
 
@@ -35,9 +35,6 @@ def compare(
     ] = None,
     common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
     json_file: JsonFile = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='draw both and their difference (PNG)')
-    ] = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
 
@@ -45,7 +42,7 @@ def compare(
     no recording.
     """
     try:
-        equal = _compare(a, b, tolerances or [], common, json_file, figure)
+        equal = _compare(a, b, tolerances or [], common, json_file)
     except (ValueError, OSError) as error:
         refuse(error)
         raise typer.Exit(_NOT_COMPARED) from None
@@ -53,9 +50,7 @@ def compare(
         raise typer.Exit(1)
 
 
-def _compare(
-    a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
-) -> bool:
+def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
@@ -80,9 +75,4 @@ def _compare(
             note(console, f'{named(recording.path)}: {warning}')
     if json_file is not None:
         write_json(comparison.figures(), json_file)
-    if figure is not None:
-        from engine_mount.reports.pictures import draw_comparison
-
-        draw_comparison(comparison, *recordings, figure)
-        say(f'figure {figure}')
     return comparison.equal

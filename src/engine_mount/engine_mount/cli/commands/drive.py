@@ -26,7 +26,6 @@ from engine_mount.cli.commands.options import (
 from engine_mount.cli.commands.road_arguments import (
     ContactLength,
     Distance,
-    Lateral,
     Repeat,
     SpeedText,
     height_column,
@@ -53,7 +52,7 @@ Examples:
 
 `engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
-`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
+`engine-mount drive --road blocks.csv --speed 60/3.6 --core` - a measured road: height over distance
 
 `engine-mount drive --split 500MB` - in several files
 
@@ -103,9 +102,8 @@ def drive(
         float | None,
         option('recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
     ] = None,
-    road: Annotated[str, option('measured road: height over distance, CSV or OpenCRG', 'FILE')] = '',
+    road: Annotated[str, option('measured road: a table of height over distance', 'FILE')] = '',
     speed: SpeedText = '',
-    lateral: Lateral = 0.0,
     distance: Distance = '',
     contact_length: ContactLength = None,
     repeat: Repeat = False,
@@ -173,7 +171,7 @@ def drive(
             'file', 'recording', time=time, rate=rate, map_file=map_file, dbc=dbc, topic=topic, scale=scale,
             decimal=decimal, delimiter=delimiter, **others,
         )  # fmt: skip
-    of_roads = {'lateral': lateral, 'distance': distance, 'contact_length': contact_length, 'repeat': repeat}
+    of_roads = {'distance': distance, 'contact_length': contact_length, 'repeat': repeat}
     if not road:
         refuse_without('road', 'road', speed=speed, **of_roads)
     elif file:
@@ -194,9 +192,9 @@ def drive(
         from engine_mount.drives.external_excitation import measured_road
 
         if not speed:
-            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s), or a file of it over time')
+            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s)')
         named = height_column(column or [])
-        found = read_road(road, lateral=lateral, column=named, distance=distance, speed=speed)
+        found = read_road(road, column=named, distance=distance, speed=speed)
         length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
         excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:
@@ -234,7 +232,7 @@ def drive(
 def _list_faults() -> None:
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
-    from mount_sim.electronics.faults.kinds import FAULTS
+    from mount_sim.electronics.faults import FAULTS
 
     rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
     TerminalScreen(terminal()).table(Table('', 'll', rows, ('name', 'fault')))

@@ -37,9 +37,6 @@ def experiment(
     json_file: Annotated[
         Path | None, typer.Option('--json', metavar='FILE', help='write the figures; of several, by name')
     ] = None,
-    graph: Annotated[
-        bool, typer.Option('--graph', help='through the real nodes, where controller and plant take part')
-    ] = False,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -80,7 +77,7 @@ def experiment(
     except SettingError as error:
         raise typer.BadParameter(str(error)) from None
     screen, outcomes = TerminalScreen(console), []
-    for known, order in orders(chosen, given, out, graph=graph):
+    for known, order in orders(chosen, given, out):
         with screen.bar(known.name) as bar:
             outcomes.append(known.run(order.shown_on(bar)))
             bar(1.0, known.name)

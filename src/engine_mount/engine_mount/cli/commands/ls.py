@@ -18,8 +18,6 @@ Examples:
 
 `engine-mount ls bags /data/drives --json recordings.json` - of several folders
 
-`engine-mount ls s3://bucket/drives` - in a store names and sizes; `info URI` fetches one
-
 The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
 nothing of its files is missing; `engine-mount audit` tells more.
 """
@@ -42,18 +40,22 @@ by the exit code of `engine-mount audit`.
 def ls(
     folders: Annotated[
         list[str] | None,
-        typer.Argument(metavar='[FOLDER]...', help='folders of runs, or runs, or their URIs; default: bags'),
+        typer.Argument(metavar='[FOLDER]...', help='folders of runs, or runs; default: bags'),
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
     """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
     from engine_mount.reports.json_file import write_json
     from engine_mount.reports.listing import list_recordings
-    from engine_mount.signals.sources.uris import is_local, local_path, shown
+    from engine_mount.signals.sources.uris import is_local, local_path
 
     console = terminal()
-    places = folders or ['bags']
-    missing = [place for place in places if is_local(place) and not local_path(place).exists()]
+    if not all(map(is_local, folders or ())):
+        raise ValueError(
+            'ls reads folders of this machine; engine-mount info URI fetches one recording of a store'
+        )
+    places = [local_path(folder) for folder in folders or ['bags']]
+    missing = [str(place) for place in places if not place.exists()]
     if missing:
         raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
     with console.status('reading'):
@@ -61,7 +63,7 @@ def ls(
     if json_file is not None:
         write_json({'recordings': found}, json_file)
     if not found:
-        console.print(f'no recordings in {", ".join(map(shown, places))}', soft_wrap=True)
+        console.print(f'no recordings in {", ".join(map(str, places))}', soft_wrap=True)
     # Two lines for each, so that paths stay whole in 80 columns.
     rows = [_cells(one) for one in found]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -8,9 +8,6 @@ import typer
 if TYPE_CHECKING:
     pass
 
-Lateral = Annotated[
-    float, typer.Option(metavar='M', help='road: track of an OpenCRG file, m left of its reference line')
-]
 HeightColumn = Annotated[str, typer.Option('--column', metavar='NAME[:UNIT]', help='column of the height')]
 Distance = Annotated[
     str,
@@ -18,9 +15,7 @@ Distance = Annotated[
         metavar='NAME[:UNIT]|M', help='road: column of the distance, or the distance between two heights'
     ),
 ]
-SpeedText = Annotated[
-    str, typer.Option(metavar='M/S|FILE', help='road: 60/3.6, 60km/h, or a file of the speed over time')
-]
+SpeedText = Annotated[str, typer.Option(metavar='M/S', help='road: 60/3.6 or 60km/h')]
 ContactLength = Annotated[
     float | None,
     typer.Option(metavar='M', min=0.0, max=0.5, help='road: on so much of it the tyre stands; default: 0.1'),

@@ -89,7 +89,7 @@ def status(
     with (
         ending_signals(ending.set),
         open_feed(domain=chosen_domain(domain), namespace=namespace) as feed,
-        running_model(feed, beside=not once) as model,
+        running_model(feed, beside=False) as model,
     ):
         if once or json_file is not None:
             wait_for_state(model, _ONCE_LIMIT)

@@ -26,8 +26,8 @@ from engine_mount.signals.quantities import QUANTITIES
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SECOND, check_size
 from mount_init.parameters import InitParameters
-from mount_models.arithmetic.averages import mean
-from mount_models.force_table import contact_force, current_force_table, offset_current
+from mount_models.actuator import contact_force, current_force_table, offset_current
+from mount_models.arithmetic.sums import mean
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME_NS
 from mount_ros import topics

@@ -28,7 +28,7 @@ from engine_mount.identification.fitting import (
     silent,
     single_threaded,
 )
-from mount_models.actuator.law import LOWEST_SHARE, ForceLaw, check_force_law, checked_force, coefficients
+from mount_models.actuator import LOWEST_SHARE, ForceLaw, check_force_law, checked_force, coefficients
 from mount_models.arithmetic.compiled import compiled
 from mount_models.quantity import LawRefusedError
 

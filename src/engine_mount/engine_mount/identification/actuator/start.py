@@ -12,7 +12,7 @@ from numpy.polynomial.polynomial import polyfit, polyval
 
 from engine_mount.identification.actuator.points import Orders, gap_groups
 from engine_mount.identification.fitting import FloatArray
-from mount_models.actuator.law import TABLE_1
+from mount_models.actuator import TABLE_1
 
 _KNEES = (0.3, 0.45, 0.6, 0.8)  # chosen: current of the knee over the largest one, at the mean gap
 _LEANS = (0.1, 0.3)  # chosen: the knee moves to higher currents with the gap

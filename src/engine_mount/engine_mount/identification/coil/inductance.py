@@ -17,7 +17,7 @@ from engine_mount.identification.coil.temperature import (
 from engine_mount.identification.coil.unique_region import UniqueRegion, interval_text, unique_region
 from engine_mount.identification.specimen import described_files, rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
-from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT, TemperatureCompensation
+from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT, TemperatureCompensation
 from mount_models.quantity import LawRefusedError, OutsideLawError
 from mount_models.specimen import Specimen
 

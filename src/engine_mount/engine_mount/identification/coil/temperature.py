@@ -15,16 +15,16 @@ from numpy.polynomial.polynomial import polyfit
 
 from engine_mount.identification.coil.points import GapPoint
 from engine_mount.identification.fitting import FloatArray
-from mount_models.actuator.law import ForceLaw, checked_force
-from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
-from mount_models.coil.resistance import COPPER_COEFFICIENT
-from mount_models.coil.temperature import (
+from mount_models.actuator import ForceLaw, checked_force
+from mount_models.coil.copper import COPPER_COEFFICIENT
+from mount_models.coil.correction import (
     CONDUCTIVITY_COEFFICIENT,
     TemperatureCompensation,
     check_compensation,
     crossing_at_calibration,
     inductance_at_calibration,
 )
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
 from mount_models.quantity import LawRefusedError
 from mount_models.specimen import Specimen
 from mount_sim.plant.ripple import RippleCoil, duty, skin_factor
