@@ -50,19 +50,6 @@ def test_a_column_that_not_every_message_has_is_that_of_all_messages(changing):
     assert np.isnan(some['displacement']['other']).sum() == 400
 
 
-def test_a_message_that_is_none_is_named_as_among_all_messages(tmp_path):
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/displacement', JOINT_STATE)
-    for index in range(COUNT):
-        good = joint_state(START + index * PERIOD, ['mount'], np.array([1.0]), np.empty(0))
-        writer.write('/displacement', good if index != 300 else good[:30], START + index * PERIOD)
-    writer.close()
-    recording = engine_mount.open(tmp_path / 'bag')
-    recording.load_columns({'displacement': ['mount']})
-    with pytest.raises(SeriesError, match='message 300 is no'):
-        recording['displacement']['mount']
-
-
 def test_a_topic_without_stamps_has_its_columns(tmp_path):
     writer = BagWriter(tmp_path / 'bag')
     writer.add_topic('/number', 'std_msgs/msg/Float64')

@@ -105,32 +105,6 @@ def test_what_no_signal_shows_is_compared_too(tolerances, tmp_path):
     assert f'messages that differ: {COUNT} of thing' in text.sentences()
 
 
-def test_unknown_in_both_is_equal_and_the_sign_of_zero_counts_in_arrays_too(tmp_path):
-    def values(zero):
-        ranges = np.array([np.nan, zero, 1, 2], np.float32)
-        return lambda index: {'value': float(index), 'ranges': ranges, 'text': ''}
-
-    assert compared(tmp_path, HIDDEN, values(0.0), values(0.0)).equal
-    assert not compared(tmp_path, HIDDEN, values(0.0), values(-0.0)).equal
-
-
-@pytest.mark.parametrize('part', ['position', 'velocity', 'effort'])
-def test_numbers_of_a_joint_state_that_no_column_shows_are_compared(part, tmp_path):
-    """Two names with three positions, velocities whose unit nobody knows, efforts."""
-    fields = 'std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort'
-    joint_state = 'sensor_msgs/msg/JointState'
-
-    def values(last):
-        empty = np.empty(0)
-        numbers = {'position': empty, 'velocity': empty, 'effort': empty, part: np.array([1.0, 2.0, last])}
-        return lambda index: {'name': ['one', 'two'], **numbers}
-
-    a = write_things(tmp_path / 'a.mcap', fields, values(3.0), name=joint_state)
-    b = write_things(tmp_path / 'b.mcap', fields, values(4.0), name=joint_state)
-    assert compare(engine_mount.open(a), engine_mount.open(a)).equal
-    assert not compare(engine_mount.open(a), engine_mount.open(b)).equal
-
-
 def test_a_topic_of_another_type_is_never_equal(tmp_path):
     def values(index):
         return {'value': index}

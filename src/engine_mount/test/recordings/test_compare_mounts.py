@@ -1,14 +1,11 @@
 """Comparing recordings of several mounts: each by its own clock, under its own name."""
 
-import json
-
 import numpy as np
 import pytest
 from compared_drives import START, add_answers, answers
 
 import engine_mount
 from engine_mount.recordings.compare import compare
-from engine_mount.recordings.difference import signal_table
 from engine_mount.recordings.events import recorded_events
 from mount_recorder.bag_writer import BagWriter
 
@@ -35,27 +32,6 @@ def car(tmp_path):
         return engine_mount.open(tmp_path / name)
 
     return written
-
-
-def test_both_mounts_are_compared_under_their_own_names(car):
-    comparison = compare(car('a'), car('b', right=changed(150, 0.25)))
-    assert not comparison.equal
-    assert {signal.name for signal in comparison.differing} == {
-        'mount_right/current_setpoint.coil_current',
-        'mount_right/control_trace.current',
-    }
-    figures = json.loads(json.dumps(comparison.figures(), allow_nan=False))
-    topics = ('air_gap', 'displacement', 'current_setpoint', 'control_trace')
-    assert set(figures['topics']) == {f'mount_{side}/{name}' for side in ('left', 'right') for name in topics}
-    found = {
-        side: figures['topics'][f'mount_{side}/current_setpoint']['signals']['coil_current']['differing']
-        for side in ('left', 'right')
-    }
-    assert found == {'left': 0, 'right': 1}
-    assert [row[0] for row in signal_table(comparison.signals).rows] == [
-        'mount_right/current_setpoint\ncoil_current',
-        'mount_right/control_trace\ncurrent',
-    ]
 
 
 @pytest.mark.parametrize('phase', [-600_000, -400_000, 400_000, 600_000])

@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 from compared_drives import START, answers, write_answers
-from mcap.writer import Writer
 
 import engine_mount
 from engine_mount.recordings.compare import compare
@@ -52,7 +51,10 @@ def _cut(recording, folder, *times, **options):
 
 
 def test_a_cut_has_the_messages_of_its_time_and_the_latched_ones_before(whole, place):
-    piece = _cut(whole, place(), 0.1, 0.2)
+    piece = _cut(whole, place(), 0.1, 0.2, reason='fault')
+    (step,) = origin(piece.information)
+    told = [step[key] for key in ('did', 'recording', 'from_s', 'to_s', 'reason')]
+    assert told == ['cut', 'whole', 0.1, 0.2, 'fault']
     original = _messages(whole)
     begin, end = START + 100_000_000, START + 200_000_000
     for name, rows in _messages(piece).items():
@@ -60,29 +62,10 @@ def test_a_cut_has_the_messages_of_its_time_and_the_latched_ones_before(whole, p
         latched = name in ('/session', '/air_gap', '/event')
         before = [row for row in original[name] if row[0] < begin][-1:] if latched else []
         assert rows == before + inside
+    for name, topic in whole.topics.items():
+        assert piece.topics[name].offered_qos == topic.offered_qos
     assert len(piece['displacement']) == 100
     assert piece['event'].message(0).data == MARKS[0][1]
-
-
-def test_a_cut_keeps_topics_types_and_quality_of_service(whole, place):
-    piece = _cut(whole, place(), 0.1, 0.2)
-    for name, topic in whole.topics.items():
-        assert piece.topics[name].type == topic.type
-        assert piece.topics[name].offered_qos == topic.offered_qos
-        assert piece.topics[name].type_hash == topic.type_hash
-
-
-def test_a_cut_says_where_it_is_from(whole, place):
-    first = _cut(whole, place(), 0.1, 0.3, reason='fault')
-    step = origin(first.information)[0]
-    assert {key: step[key] for key in ('did', 'recording', 'from_s', 'to_s', 'reason')} == {
-        'did': 'cut',
-        'recording': 'whole',
-        'from_s': 0.1,
-        'to_s': 0.3,
-        'reason': 'fault',
-    }
-    assert [step['did'] for step in origin(_cut(first, place(), 0.15, 0.2).information)] == ['cut', 'cut']
 
 
 @pytest.mark.parametrize(
@@ -129,27 +112,6 @@ def test_an_event_that_is_not_there_is_refused_with_those_that_are(whole, wanted
 
 
 # Bags of others.
-
-
-def test_types_that_nobody_installed_are_cut_with_their_definition(place):
-    folder = place()
-    file = folder / 'foreign_0.mcap'
-    folder.mkdir()
-    with file.open('wb') as stream:
-        writer = Writer(stream)
-        writer.start(profile='ros2')
-        schema = writer.register_schema('strange_msgs/msg/Thing', 'ros2msg', b'int32 number')
-        channel = writer.register_channel('/thing', 'cdr', schema, {'offered_qos_profiles': ''})
-        for second in range(10):
-            time = START + second * 1_000_000_000
-            payload = b'\x00\x01\x00\x00' + second.to_bytes(4, 'little')
-            writer.add_message(channel, time, payload, time + 7)
-        writer.finish()
-    piece = _cut(engine_mount.open(folder), place(), 2.0, 5.0)
-    original = _messages(engine_mount.open(folder))['/thing']
-    assert _messages(piece) == {'/thing': original[2:5]}
-    (topic,) = piece.files[0].topics.values()
-    assert (topic.type, topic.definition) == ('strange_msgs/msg/Thing', b'int32 number')
 
 
 # Time.

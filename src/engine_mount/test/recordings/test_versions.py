@@ -11,11 +11,6 @@ HERE = {'numpy': '2.4.6', 'numba': '0.68.1', 'machine': 'x86_64'}
     ('session', 'sentence'),
     [
         ({'versions': HERE}, 'made with the same versions on the same kind of machine'),
-        ({'versions': {**HERE, 'more': '1'}}, 'made with the same versions on the same kind of machine'),
-        (
-            {'versions': {**HERE, 'numpy': '2.4.5'}},
-            'made with others than here: numpy 2.4.5 (here 2.4.6)',
-        ),
         (
             {'versions': {'numpy': '2.4.5'}},
             'made with others than here: numpy 2.4.5 (here 2.4.6); it does not tell numba, machine',
@@ -24,13 +19,8 @@ HERE = {'numpy': '2.4.6', 'numba': '0.68.1', 'machine': 'x86_64'}
             {'versions': {'numpy': '2.4.6'}},
             'made with the same versions as far as it tells; it does not tell numba, machine',
         ),
-        (
-            {'versions': {**HERE, 'numpy': '1'}, 'replay': {'versions': HERE}},
-            'the same versions on the same kind',
-        ),
         ({'versions': HERE, 'replay': {'versions': {**HERE, 'numpy': '1'}}}, 'numpy 1 (here 2.4.6)'),
         ({}, 'does not tell with which versions it was made'),
-        ({'versions': 'no mapping', 'replay': 3}, 'does not tell with which versions'),
     ],
 )
 def test_a_replay_says_which_versions_differ_and_that_none_does(session, sentence):
