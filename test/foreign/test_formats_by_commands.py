@@ -50,14 +50,6 @@ def test_drive(made, tmp_path):
 
 
 @each_format
-def test_replay(made, tmp_path):
-    order = ['--map', f'displacement={column(made, "travel")}', *said(made)]
-    done('replay', made.path, *order, '--out', tmp_path / 'run')
-    displacement = engine_mount.open(tmp_path / 'run' / 'recording')['displacement']
-    assert displacement['mount'][::5][40:360] == pytest.approx(TRAVEL[40:360], abs=2e-6)
-
-
-@each_format
 def test_import(made, tmp_path):
     order = [f'displacement={column(made, "travel")}', '--column', f'acceleration={column(made, "az")}']
     done('import', made.path, '--column', *order, *said(made), '--out', tmp_path / 'made')

@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
-from engine_mount.drives.keyboard import mark_keys, wait_for_keys
+from engine_mount.drives.keyboard import mark_keys
 from engine_mount.recordings.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
@@ -20,7 +20,6 @@ from mount_recorder.diagnosis import OnFull
 from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
 from mount_ros.environment import loopback_refusal
-from mount_ros.nodes.lifecycle import wake
 from mount_ros.nodes.process import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
 
@@ -81,7 +80,7 @@ def record(
         finally:
             if thread.is_alive():
                 ending.set()
-                wake(executor)
+                executor.wake()
                 thread.join()
                 node.trigger_deactivate()
                 figures = _figures(node)
@@ -128,7 +127,11 @@ def _watch(
             rate = (received - counted) / max(now - before, 1e-3)
             before, counted = now, received
             show(_line(figures, now - begin, rate) + hint)
-            for _ in range(wait_for_keys(pressed, min(_LINE_PERIOD, end - now))):
+            wait = min(_LINE_PERIOD, end - now)
+            if pressed is None:
+                time.sleep(wait)
+                continue
+            for _ in range(pressed(wait)):
                 node.mark()
 
 

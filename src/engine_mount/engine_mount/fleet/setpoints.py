@@ -18,7 +18,7 @@ from engine_mount.drives.inputs.consumed_samples import (
     looked_up,
     quiet_at_first,
 )
-from engine_mount.drives.inputs.foreign import default_gap
+from engine_mount.drives.inputs.gap import default_gap
 from engine_mount.drives.inputs.input import (
     displacement_of,
     has,

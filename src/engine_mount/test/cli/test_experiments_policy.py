@@ -9,11 +9,7 @@ from engine_mount.experiments import policy
 from engine_mount.experiments.harness import measures
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
 from engine_mount.experiments.registry import experiment
-from engine_mount.signals.roads.inversion import road_of
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.road import RandomRoad, random_road
-from mount_sim.excitation.scenario import STEP_TIME
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 SHORT = {
     'road_levels': '0.06,',
@@ -58,17 +54,6 @@ def test_page_and_pictures_are_written_from_the_numbers(compared):
     text = page.read_text(encoding='utf-8')
     assert f'{compared.figures["sweep_ratio"][CONTINUOUS]["0.06"]:.2f}' in text
     assert all(f'figures/{picture.name}' in text for picture in compared.pictures)
-
-
-def test_road_behind_an_acceleration_gives_that_acceleration_again():
-    time = STEP_TIME * np.arange(round(12.0 / STEP_TIME))
-    within = np.sin(np.pi * time / time[-1]) ** 2  # begins and ends at rest
-    road = within * random_road(time, RandomRoad(highest_frequency=0.6, lowest_frequency=0.06))
-    _, wanted = ride_without_friction(Vehicle(), resting_vehicle(), road, np.zeros(road.size), STEP_TIME)
-    found = road_of(wanted, STEP_TIME, Vehicle())
-    _, again = ride_without_friction(Vehicle(), resting_vehicle(), found, np.zeros(road.size), STEP_TIME)
-    middle = slice(road.size // 4, 3 * road.size // 4)
-    assert np.std(again[middle] - wanted[middle]) < 0.1 * np.std(wanted[middle])
 
 
 def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():

@@ -5,16 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from engine_mount.cli.command import main
-from engine_mount.drives.loop.run import run_core
+from engine_mount.drives.loop.recording import record_core
 from engine_mount.identification.drift import fit_line
-from engine_mount.identification.fitting import IdentificationError
-from mount_recorder.bag_writer import BagWriter
-from mount_ros.topics import (
-    AIR_GAP,
-    CURRENT_FORCE_TABLE,
-    TOPICS,
-)
 
 HOURS = (0.0, 50.0, 100.0, 150.0)
 WEAR = 0.2e-6  # m/h
@@ -24,41 +16,22 @@ WEAR = 0.2e-6  # m/h
 def drives(tmp_path_factory):
     """Return recordings of drives whose contact gap falls by 0.2 um each hour, 1 % noise on the ripple."""
     folder = tmp_path_factory.mktemp('drives')
-    made = []
     for seed, hours in enumerate(HOURS):
-        writer = BagWriter(folder / f'{hours:g}h')
-        for topic in TOPICS:
-            if topic.name in (AIR_GAP.name, CURRENT_FORCE_TABLE.name):
-                writer.add_topic(f'/{topic.name}', topic.type)
         sim = {
             'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.2, 'seed': seed,
             'electronics.ripple_noise': 0.01, 'mechanics.contact_gap': 349e-6 - WEAR * hours,
         }  # fmt: skip
-
-        def write(topic, raw, stamp, writer=writer):
-            if topic.name in (AIR_GAP.name, CURRENT_FORCE_TABLE.name):
-                writer.write(f'/{topic.name}', raw, stamp)
-
-        run_core({'mount_sim': sim}, write)
-        writer.close()
-        made.append(folder / f'{hours:g}h')
-    return made
-
-
-def drift(*words):
-    with pytest.raises(SystemExit) as ended:
-        main(['identify', 'drift', *map(str, words)])
-    return ended.value.code
+        record_core(folder / f'{hours:g}h', {'mount_sim': sim}, '')
+    return [folder / f'{hours:g}h' for hours in HOURS]
 
 
 def hours_of(drives, hours=HOURS):
     return [word for path, h in zip(drives, hours, strict=True) for word in ('--hours', f'{path}={h}')]
 
 
-def test_the_wear_comes_back_within_its_uncertainty(drives, tmp_path):
-    assert (
-        drift(*drives, *hours_of(drives), '--json', tmp_path / 'd.json', '--figure', tmp_path / 'd.png') == 0
-    )
+def test_the_wear_comes_back_within_its_uncertainty(drives, tmp_path, command):
+    targets = ('--json', tmp_path / 'd.json', '--figure', tmp_path / 'd.png')
+    command('identify', 'drift', *drives, *hours_of(drives), *targets)
     found = json.loads((tmp_path / 'd.json').read_text())
     wear, std = found['contact_gap']['per_hour_m'], found['contact_gap']['per_hour_std_m']
     assert wear == pytest.approx(-WEAR, abs=3.0 * std)
@@ -78,18 +51,13 @@ def test_the_wear_comes_back_within_its_uncertainty(drives, tmp_path):
         (1, HOURS[:1], '1 recording shows no drift; at least 2'),
         (3, (5.0, 5.0, 5.0), 'all 3 recordings are from one time'),
         (2, None, 'holds no time at which it began'),
+        (2, (3.0,), 'for all recordings or none'),
     ],
 )
-def test_what_shows_no_drift_is_refused(drives, count, hours, sentence, tmp_path, capsys):
-    told = [] if hours is None else hours_of(drives[:count], hours)
-    assert drift(*drives[:count], *told, '--json', tmp_path / 'd.json') == 1
-    assert sentence in capsys.readouterr().err.replace('\n', ' ')
+def test_what_shows_no_drift_is_refused(drives, count, hours, sentence, tmp_path, refused):
+    told = [] if hours is None else hours_of(drives[: len(hours)], hours)
+    assert sentence in refused('identify', 'drift', *drives[:count], *told, '--json', tmp_path / 'd.json')
     assert not (tmp_path / 'd.json').exists()
-
-
-def test_hours_of_some_recordings_only_are_refused(drives, capsys):
-    assert drift(*drives[:2], '--hours', f'{drives[0]}=3') == 1
-    assert 'for all recordings or none' in capsys.readouterr().err
 
 
 def test_the_stated_deviation_of_the_slope_is_the_scatter_of_repeated_slopes():
@@ -118,8 +86,3 @@ def test_without_stated_deviations_the_scatter_of_the_values_tells_that_of_the_s
     slopes, stated = np.array([(fit.slope, fit.slope_std) for fit in fits]).T
     assert slopes.mean() == pytest.approx(-4e-4, abs=5e-6)
     assert np.sqrt(np.mean(stated**2)) == pytest.approx(slopes.std(), rel=0.1)
-
-
-def test_a_deviation_of_zero_is_refused():
-    with pytest.raises(IdentificationError, match='must be above 0'):
-        fit_line([0.0, 1.0], [1.0, 2.0], [0.1, 0.0])

@@ -1,14 +1,19 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
-import functools
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import JsonFile, recording_argument
+from engine_mount.cli.commands.options import (
+    JsonFile,
+    flag,
+    option,
+    recording_argument,
+    write_figures,
+)
 from engine_mount.cli.fetching import local, named
-from engine_mount.cli.terminal import note, refuse, terminal
+from engine_mount.cli.terminal import refuse
 
 EPILOG = """Examples:
 
@@ -26,14 +31,15 @@ def compare(
     b: Annotated[str, recording_argument('B', 'the other one')],
     tolerances: Annotated[
         list[str] | None,
-        typer.Option(
-            '--tolerance',
-            metavar='NAME=VALUE',
-            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
+        option(
+            'signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
             'also topic=, topic.signal=',
+            'NAME=VALUE',
+            None,
+            '--tolerance',
         ),
     ] = None,
-    common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
+    common: Annotated[bool, flag('--common', 'compare only the time that both cover')] = False,
     json_file: JsonFile = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
@@ -57,22 +63,19 @@ def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Pat
     from engine_mount.recordings.difference import signal_table
     from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.place import open_run
-    from engine_mount.reports.json_file import write_json
 
-    console = terminal()
-    say = functools.partial(console.print, soft_wrap=True)
-    recordings = open_run(local(a, console)), open_run(local(b, console))
+    screen = TerminalScreen()
+    recordings = open_run(local(a, screen)), open_run(local(b, screen))
     comparison = compare_recordings(*recordings, tolerances, common=common)
-    say(f'A {comparison.name_a}, B {comparison.name_b}')
+    screen.say(f'A {comparison.name_a}, B {comparison.name_b}')
     for sentence in comparison.sentences():
-        say(f'- {sentence}')
+        screen.say(f'- {sentence}')
     if comparison.differing:
-        TerminalScreen(console).table(signal_table(comparison.signals))
+        screen.table(signal_table(comparison.signals))
     aligned = alignment_sentence(comparison.alignments)
-    say(f'Times are from the first displacement sample of A; {aligned}.')
+    screen.say(f'Times are from the first displacement sample of A; {aligned}.')
     for recording in recordings:
         for warning in recording.warnings:
-            note(console, f'{named(recording.path)}: {warning}')
-    if json_file is not None:
-        write_json(comparison.figures(), json_file)
+            screen.note(f'{named(recording.path)}: {warning}')
+    write_figures(comparison.figures(), json_file)
     return comparison.equal

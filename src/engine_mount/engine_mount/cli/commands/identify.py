@@ -6,22 +6,24 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.calibration.given import per_file
-from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
+from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
     Delimiter,
+    Figure,
     JsonFile,
     MapFile,
     Rate,
     TimeColumn,
+    argument,
     mapping_of,
+    option,
     stated,
 )
 from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
-from engine_mount.cli.terminal import terminal
 
 app = typer.Typer(
     cls=Group,
@@ -57,24 +59,23 @@ def _top() -> None:
 @app.command(cls=Command, epilog=EPILOG)
 def friction(
     train: Annotated[
-        list[str] | None,
-        typer.Option(metavar='FILE...', help='recordings to fit: files of any format, recordings, URIs'),
+        list[str] | None, option('recordings to fit: files of any format, recordings, URIs', 'FILE...')
     ] = None,
     held_out: Annotated[
-        list[str] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
+        list[str] | None, option('recordings that no fit sees, to judge by', 'FILE...')
     ] = None,
     file: Annotated[
-        list[str] | None,
-        typer.Option(metavar='FILE...', help='train on each, predict each other one; of one, its halves'),
+        list[str] | None, option('train on each, predict each other one; of one, its halves', 'FILE...')
     ] = None,
-    step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
+    step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            'column, or MCAP topic.field, of a quantity; repeatable',
+            'NAME=COLUMN:UNIT',
+            None,
             '--channel',
             '--column',
-            metavar='NAME=COLUMN:UNIT',
-            help='column, or MCAP topic.field, of a quantity; repeatable',
         ),
     ] = None,
     map_file: MapFile = None,
@@ -84,17 +85,16 @@ def friction(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     clamp: Annotated[
-        str,
-        typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
+        str, option("JSON: normal force from the band's pull while sliding, at rest, or none")
     ] = 'sliding',
     zero: Annotated[
         str,
-        typer.Option(
-            help='zero of the force: law (from the loop), rest (before the motion), recorded; default: law '
-            'for JSON of a damper, else recorded'
+        option(
+            'zero of the force: law (from the loop), rest (before the motion), recorded; default: law for '
+            'JSON of a damper, else recorded'
         ),
     ] = '',
-    seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
+    seed: Annotated[int, option('seed of the starts of the searches')] = 0,
     json_file: JsonFile = None,
     base: Base = None,
     name: Name = '',
@@ -106,6 +106,7 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import identify
     from engine_mount.identification.friction.files import friction_mapping
     from engine_mount.identification.specimen import check_targets
@@ -114,9 +115,9 @@ def friction(
     check_targets(out, json_file, figure)
     mapping = with_options(mapping_of(map_file), (), time, rate)
     columns = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
-    console = terminal()
+    screen = TerminalScreen()
     training, unseen, files = (
-        [local(place, console) for place in places or []] for places in (train, held_out, file)
+        [local(place, screen) for place in places or []] for places in (train, held_out, file)
     )
     with progress() as bar:
         result = identify.friction(
@@ -140,19 +141,14 @@ DRIFT_EPILOG = (
 @app.command(cls=Command, epilog=DRIFT_EPILOG)
 def drift(
     recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar='RECORDING...',
-            help='runs or recordings with an initialisation',
-            autocompletion=recordings,
-        ),
+        list[Path], argument('runs or recordings with an initialisation', 'RECORDING...', recordings)
     ],
     specimen: Annotated[
-        Path | None, typer.Option(help='specimen file of this actuator; default: the shipped one')
+        Path | None, option('specimen file of this actuator; default: the shipped one')
     ] = None,
     hours: Annotated[
         list[str] | None,
-        typer.Option(metavar='RECORDING=H', help='hours of all recordings; default: when sessions began'),
+        option('hours of all recordings; default: when sessions began', 'RECORDING=H'),
     ] = None,
     json_file: JsonFile = None,
     figure: Figure = None,
@@ -166,5 +162,5 @@ def drift(
     from engine_mount.identification.specimen import check_targets
 
     check_targets(json_file, figure)
-    counter = per_file(hours or [], recordings, '--hours', 1.0)
+    counter = per_file(hours or [], recordings, '--hours')
     publish(identify.drift(recordings, hours=counter, specimen=specimen or ''), json_file, figure)

@@ -1,9 +1,7 @@
-"""`engine-mount import`: a file of others as a recording that every command takes."""
+"""`engine-mount import`: a foreign file as a recording that every command takes."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Annotated
 
 from engine_mount.cli.commands.options import (
     Columns,
@@ -14,11 +12,12 @@ from engine_mount.cli.commands.options import (
     MapFile,
     Rate,
     TimeColumn,
+    option,
     recording_argument,
     stated,
+    write_figures,
 )
 from engine_mount.cli.fetching import local
-from engine_mount.cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the recording is written, 1 when the file was refused, with the reason.
 
@@ -41,11 +40,9 @@ Of several files each is imported; `engine-mount merge --different-sessions` joi
 def import_file(
     file: Annotated[
         str,
-        recording_argument('FILE', instead='CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
+        recording_argument('FILE', 'CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
     ],
-    out: Annotated[
-        Path, typer.Option(metavar='RECORDING', help='folder to create; of several parts RECORDING_1, ...')
-    ],
+    out: Annotated[Path, option('folder to create; of several parts RECORDING_1, ...', 'RECORDING')],
     map_file: MapFile = None,
     column: Columns = None,
     time: TimeColumn = '',
@@ -55,39 +52,32 @@ def import_file(
     delimiter: Delimiter = '',
     json_file: JsonFile = None,
 ) -> None:
-    """Make a recording of a file of others, in SI units, with a session that tells what it was made of.
+    """Make a recording of a foreign file, in SI units, with a session that tells its origin.
 
     The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
     were sampled. A gap of more than 0.125 s parts the recording.
     """
     from engine_mount import import_file as run_import
-    from engine_mount.cli.screen import progress_bar
-    from engine_mount.reports.json_file import write_json
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping
 
-    console = terminal()
-    place = local(file, console)
-    with progress_bar(console, transient=True) as progress:
-        task = progress.add_task('reading', total=1.0)
+    screen = TerminalScreen()
+    place = local(file, screen)
+    with screen.bar('reading', transient=True) as show:
         imported = run_import(
             place, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
-            stated=stated(dbc, decimal, delimiter),
-            progress=lambda share, what: progress.update(task, completed=share, description=what),
+            stated=stated(dbc, decimal, delimiter), progress=show,
         )  # fmt: skip
     for topic, count in imported.samples.items():
-        console.print(f'{topic:<28}{count} samples', soft_wrap=True)
+        screen.say(f'{topic:<28}{count} samples')
     for sentence in imported.notes:
-        note(console, sentence)
+        screen.note(sentence)
     for place, length in zip(imported.recordings, imported.lengths, strict=True):
-        console.print(f'recording  {place} ({length:.3f} s)', soft_wrap=True)
-    if json_file is not None:
-        write_json(_figures(imported), json_file)
-
-
-def _figures(imported: Any) -> dict[str, Any]:
-    return {
+        screen.say(f'recording  {place} ({length:.3f} s)')
+    figures = {
         'recordings': [str(place) for place in imported.recordings],
         'lengths_s': imported.lengths,
         'samples': imported.samples,
         'notes': imported.notes,
     }
+    write_figures(figures, json_file)

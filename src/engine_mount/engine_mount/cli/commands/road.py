@@ -5,9 +5,17 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.road_arguments import Distance, HeightColumn, SpeedText
+from engine_mount.cli.commands.options import (
+    Distance,
+    Figure,
+    Rate,
+    Scale,
+    SpeedText,
+    TimeColumn,
+    argument,
+    option,
+)
 from engine_mount.cli.help import Command, Group
-from engine_mount.cli.terminal import note, terminal
 
 app = typer.Typer(
     cls=Group,
@@ -38,13 +46,11 @@ Examples:
 
 @app.command(cls=Command, epilog=_SHOW_EPILOG)
 def show(
-    file: Annotated[str, typer.Argument(metavar='FILE', help='table of height over distance')],
-    column: HeightColumn = '',
+    file: Annotated[str, argument('table of height over distance', 'FILE')],
+    column: Annotated[str, option('column of the height', 'NAME[:UNIT]')] = '',
     distance: Distance = '',
     speed: SpeedText = '',
-    figure: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='draw heights and density (PNG)')
-    ] = None,
+    figure: Figure = None,
 ) -> None:
     """Tell what a measured road is: length, class and waviness by ISO 8608.
 
@@ -54,39 +60,34 @@ def show(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
 
-    console = terminal()
+    screen = TerminalScreen()
     found = road(file, column=column, distance=distance, speed=speed)
-    TerminalScreen(console).table(Table(found.profile.name, 'll', found.rows()))
+    screen.table(Table(found.profile.name, 'll', found.rows()))
     for sentence in found.profile.notes:
-        note(console, sentence)
+        screen.note(sentence)
     if figure is not None:
         from engine_mount.reports.road_picture import draw_road
 
         draw_road(found.profile, found.unevenness, figure)
-        console.print(f'figure     {figure}', soft_wrap=True)
+        screen.say(f'figure     {figure}')
 
 
 @app.command(cls=Command, epilog=_INVERT_EPILOG)
 def invert(
-    file: Annotated[
-        str, typer.Argument(metavar='FILE', help='recorded vertical acceleration of the chassis')
-    ],
+    file: Annotated[str, argument('recorded vertical acceleration of the chassis', 'FILE')],
     speed: SpeedText,
-    out: Annotated[Path, typer.Option(metavar='FILE', help='write the profile (CSV)')],
-    column: Annotated[
-        str, typer.Option(metavar='NAME[:UNIT]', help='column, or topic.field, of the acceleration')
-    ] = '',
-    time: Annotated[str, typer.Option(metavar='NAME[:UNIT]', help='column of the time')] = '',
-    rate: Annotated[
-        float | None, typer.Option(metavar='HZ', help='samples per second, of a file without times')
-    ] = None,
-    scale: Annotated[float | None, typer.Option(help='factor; -1 for an axis that points down')] = None,
+    out: Annotated[Path, option('write the profile (CSV)', 'FILE')],
+    column: Annotated[str, option('column, or topic.field, of the acceleration', 'NAME[:UNIT]')] = '',
+    time: TimeColumn = '',
+    rate: Rate = None,
+    scale: Scale = None,
 ) -> None:
     """Make the road that gives the vehicle's chassis a recorded acceleration, from 0.9 to 50 Hz.
 
     So a recorded drive can be driven again, with feedback, by other policies and mounts. What one
     acceleration cannot tell is said here and in the file.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping, with_options
     from engine_mount.signals.roads.driving import speed_of
     from engine_mount.signals.roads.inversion import UNKNOWN, inverted
@@ -94,12 +95,12 @@ def invert(
 
     if not column:
         raise typer.BadParameter('name the acceleration: --column NAME:UNIT, as in --column az:m/s^2')
-    console = terminal()
+    screen = TerminalScreen()
     mapping = with_options(Mapping(), [column], time, rate, scale, 'acceleration')
     driven = speed_of(speed)
     signal = select(file, mapping).signals['acceleration']
     road = inverted(signal, driven)
     road.write(out, Path(file).name)
     for sentence in (*signal.notes, *road.notes, *(f'not known: {word}' for word in UNKNOWN)):
-        note(console, sentence)
-    console.print(f'road       {out}', soft_wrap=True)
+        screen.note(sentence)
+    screen.say(f'road       {out}')
