@@ -1,6 +1,7 @@
 """A recording made of another: messages, schemas and channels as they were, and what its recorder lost."""
 
 import contextlib
+import heapq
 import os
 import shutil
 from collections.abc import Mapping, Sequence
@@ -62,8 +63,6 @@ class BagCopy:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
         self._topics: dict[int, StoredTopic] = {}  # by channel
-        self.notes: list[str] = []
-        """What was not copied, in sentences."""
         create_folder(self.folder)
         self._file = McapWriter(self.folder / f'{self.folder.name}_0.mcap', LIBRARY, chunk_size)
         self.write = self._file.add_message
@@ -105,11 +104,10 @@ class BagCopy:
         """Add messages by their log times."""
         channels = [self.channel_of(part.topic) for part in parts]
         heads = [part.heads[['log_time', 'publish_time', 'sequence']].tolist() for part in parts]
-        numbers = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-        places = np.concatenate([np.arange(0), *(np.arange(len(part)) for part in parts)])
-        times = np.concatenate([np.zeros(0, np.int64), *(part.heads['log_time'] for part in parts)])
-        order = np.argsort(times, kind='stable')
-        for number, place in zip(numbers[order].tolist(), places[order].tolist(), strict=True):
+        streams = [
+            [(head[0], number, place) for place, head in enumerate(rows)] for number, rows in enumerate(heads)
+        ]
+        for _, number, place in heapq.merge(*streams):
             self.write(channels[number], parts[number].payloads[place], *heads[number][place])
 
     def complete(
@@ -130,11 +128,6 @@ class BagCopy:
             for name, values in file.records:
                 if name not in ACCOUNTS:
                     self._file.add_metadata(name, values)
-            if file.attachments:
-                self.notes.append(
-                    f'{file.attachments} attachments are not copied: '
-                    f'mcap get attachment {file.path.name} has them'
-                )
             if statement := read_statement(file.metadata.get(RECORDER_RECORD, {})):
                 losses = _losses(statement, counts if read is None else read)
                 self._file.add_metadata(RECORDER_RECORD, loss_statement(losses, counts, excerpt=True))

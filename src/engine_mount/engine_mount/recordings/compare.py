@@ -1,6 +1,5 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
-from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +8,6 @@ from engine_mount.recordings.difference import SHOWN, SignalDifference, Toleranc
 from engine_mount.recordings.events import (
     SwitchingChange,
     paired_switchings,
-    recorded_marks,
     switching_times,
 )
 from engine_mount.recordings.matching import (
@@ -27,7 +25,7 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sessions, session_differences
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION, Topic
 
-# Sessions and marks have words of their own; diagnostics hold clock time and load, which are never equal.
+# Sessions have words of their own; diagnostics hold clock time and load, which are never equal.
 _NOT_BY_SAMPLES = (SESSION, EVENT, DIAGNOSTICS)
 _LACKING = {
     'samples missing in B': 'only_a',
@@ -49,8 +47,6 @@ class Comparison:
     only_a: tuple[str, ...]  # topics
     only_b: tuple[str, ...]
     sessions: tuple[str, ...]  # differences in words
-    marks_a: tuple[str, ...]  # events that the other has not
-    marks_b: tuple[str, ...]
     switching: tuple[SwitchingChange, ...] | None  # None: not told by both
     switching_tolerance: float
     common_only: bool
@@ -96,8 +92,6 @@ class Comparison:
         alone = {
             'topics only in A': self.only_a,
             'topics only in B': self.only_b,
-            'marks only in A': self.marks_a,
-            'marks only in B': self.marks_b,
         }
         return [
             *self.difference_sentences(),
@@ -133,8 +127,6 @@ class Comparison:
             'session': list(self.sessions),
             'only_in_a': list(self.only_a),
             'only_in_b': list(self.only_b),
-            'marks_only_in_a': list(self.marks_a),
-            'marks_only_in_b': list(self.marks_b),
             'switching': None if self.switching is None else [change.figures() for change in self.switching],
             'topics': {topic.name: topic.figures() for topic in self.topics},
         }
@@ -180,7 +172,6 @@ def compare(
         raise ComparisonError(f'no sample is in both {a.path} and {b.path}; {alignment_sentence(alignments)}')
     switched = [topic for topic in matched if topic.tells_switching]
     changes = [change for topic in switched for change in _switching(topic)]
-    marks_a, marks_b = _marks(a), _marks(b)
     return Comparison(
         name_a=a.short_name,
         name_b=b.short_name,
@@ -189,8 +180,6 @@ def compare(
         only_a=tuple(name for name in wanted if name not in other and a.topics[name].message_count),
         only_b=tuple(name for name in other if name not in wanted and b.topics[name].message_count),
         sessions=tuple(_sessions(a, b)),
-        marks_a=tuple((marks_a - marks_b).elements()),
-        marks_b=tuple((marks_b - marks_a).elements()),
         switching=tuple(sorted(changes, key=lambda change: change.time)) if switched else None,
         switching_tolerance=tolerances.switching,
         common_only=common_only,
@@ -216,12 +205,3 @@ def _sessions(a: Recording, b: Recording) -> list[str]:
         if text and others.get(name)
         for difference in session_differences(text, others[name])
     ]
-
-
-def _marks(recording: Recording) -> Counter[str]:
-    """Return the marks as text, each with its mount."""
-    return Counter(
-        mount_of(name, EVENT).replace('/', ': ') + ' '.join(filter(None, (mark.kind, mark.text)))
-        for name, marks in recorded_marks(recording).items()
-        for _, mark in marks
-    )

@@ -43,7 +43,7 @@ def cut(
 
     Times are in s on the time axis of `recording`, which the piece keeps; None is its beginning, or its end
     with the last message. Messages keep their bytes, log and publish times. Of latched topics and of `event`
-    the last message before `begin` comes with it, and so do attachments and metadata. What the recorder lost
+    the last message before `begin` comes with it, and so does metadata. What the recorder lost
     is told of the piece too: when that was is not known. `reason` and `made`, the time of the cut
     (by default now), go into the note of origin. Raises `CutError`.
     """
@@ -81,7 +81,7 @@ def cut(
     with BagCopy(out) as bag:
         bag.add(parts)
         bag.complete(recording, with_step(recording.information, step), read)
-    return Cut(Path(out), begin, end, count, carried, (*losses, *bag.notes))
+    return Cut(Path(out), begin, end, count, carried, tuple(losses))
 
 
 def _span(recording: Recording, begin: float | None, end: float | None) -> tuple[int, int]:

@@ -17,7 +17,7 @@ Places = NDArray[np.int64]
 
 SWITCHING = 'switching'
 _ALL = ''
-_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>[0-9.]+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
+_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>\d*\.?\d+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
 SHOWN = 6  # signals, switchings, session entries named one by one
 _ROWS = 10  # of the table
 _RANKS = {
@@ -80,12 +80,9 @@ class Tolerances:
 
 def _read(text: str) -> tuple[str, Tolerance]:
     match = _FORM.fullmatch(text.strip())
-    try:
-        value = float(match['value']) if match else 0.0
-    except ValueError:
-        match = None
     if match is None:
         raise ToleranceError(f'tolerance {text!r}: write NAME=VALUE as current=0.01, or NAME=1%, or 1%')
+    value = float(match['value'])
     name, relative = match['name'] or _ALL, bool(match['percent'])
     if name == _ALL and not relative:
         raise ToleranceError(

@@ -61,8 +61,6 @@ class McapFile:
         """Bytes, from and to, that are neither a chunk nor a record that is understood."""
         self._damaged: set[int] = set()  # positions of chunks
         self._undeclared = 0  # messages whose topic is not known
-        self.attachments = 0
-        """How many there are: their content is not read."""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._data_end = 0  # where the messages end, by the file's own account; 0: the end is missing
@@ -261,7 +259,6 @@ class McapFile:
                     self._warn(f'the metadata at byte {position} is not readable')
                 else:
                     self.records.append((metadata.name, dict(metadata.metadata)))
-            self.attachments += opcode == Opcode.ATTACHMENT
             position = end
         return position
 

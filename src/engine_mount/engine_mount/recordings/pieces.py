@@ -63,9 +63,7 @@ def find_pieces(path: Path) -> Pieces:
             information, obstacle = None, f'{METADATA_NAME} is not readable ({error})'
     if information is None:
         if not present:
-            inner = path / 'recording'
-            hint = f'; the recording of this run is {inner}' if inner.is_dir() else ''
-            raise StorageError(f'{path} holds no MCAP file{hint}')
+            raise StorageError(f'{path} holds no MCAP file')
         complete = [numbers[file] for file in present] == list(range(len(present)))
         return Pieces(present, None, (f'{obstacle}; topics and times are those in the files',), complete)
     if information.storage_identifier == 'sqlite3' or (
@@ -143,16 +141,13 @@ def definition_of(topic: TopicInformation) -> tuple[Definition | None, str]:
     """Return the definition of the messages, and a sentence where that of the recording is no use."""
     if topic.serialization_format != 'cdr':
         return None, f'its messages are encoded as {topic.serialization_format!r}, not as cdr'
-    text, obstacle = topic.stored.definition if topic.stored else b'', ''
+    text = topic.stored.definition if topic.stored else b''
     try:
-        if topic.stored and text.strip() and topic.stored.definition_encoding == 'ros2msg':
+        if text.strip() and topic.stored and topic.stored.definition_encoding == 'ros2msg':
             return text_definition(topic.type, text.decode()), ''
-        if text.strip():
-            obstacle = 'its definition is not written in ros2msg'
+        foreign = 'its definition is not written in ros2msg' if text.strip() else ''
+        return installed_definition(topic.type), foreign
     except (DefinitionError, UnicodeDecodeError) as error:
-        obstacle = f'the definition of {topic.type} in the recording is not readable ({error})'
-    try:
-        return installed_definition(topic.type), obstacle
+        return None, f'the definition of {topic.type} in the recording is not readable ({error})'
     except ValueError:
-        missing = f'type {topic.type!r} is not installed'
-        return None, f'{obstacle or "the recording does not define its type"}, and {missing}'
+        return None, f'the recording does not define its type, and type {topic.type!r} is not installed'

@@ -77,5 +77,5 @@ def recover(
         lost=0 if complete else None if expected is None else max(0, expected - bag.added),
         kept_seconds=bag.seconds,
         complete=complete,
-        notes=(*recording.warnings, *bag.notes),
+        notes=tuple(recording.warnings),
     )

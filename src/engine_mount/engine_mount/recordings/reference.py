@@ -15,7 +15,7 @@ from engine_mount.recordings.compare import compare
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Payloads
 from engine_mount.recordings.session import recorded_session, session_content
-from mount_models.plain_yaml import YamlError, yaml_in_file
+from mount_models.plain_yaml import yaml_in_file
 from mount_recorder.session import session_text, time_text
 from mount_ros.messages.cdr import string_message
 from mount_ros.topics import (
@@ -111,10 +111,7 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
                 messages = read_messages(source, name)
                 if messages is not None and len(messages):
                     parts[topic] = replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
-    for topic in ANSWERS:
-        if topic not in parts:
-            raise AcceptError(f'{run.path} has no {topic.name}; a reference is a drive with its answers')
-    for topic in (DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
+    for topic in (*ANSWERS, DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
     source = run if _has_displacement(run) else before
@@ -158,12 +155,7 @@ def _shortened(content: Any) -> Any:
 
 def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
     earlier = target / ACCEPTED_NAME
-    try:
-        entries = (yaml_in_file(earlier) or []) if earlier.is_file() else []
-    except YamlError as error:
-        raise AcceptError(f'{earlier} {error}') from None
-    if not isinstance(entries, list):
-        raise AcceptError(f'{earlier} must be a list of entries; restore it from the repository')
+    entries = (yaml_in_file(earlier) or []) if earlier.is_file() else []
     text = yaml.safe_dump([*entries, entry], sort_keys=False, allow_unicode=True, width=100)
     (made / ACCEPTED_NAME).write_text(text, encoding='utf-8')
 

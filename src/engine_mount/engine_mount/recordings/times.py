@@ -154,19 +154,6 @@ def missing_samples(streams: Sequence[Times], rate: float) -> int:
     return int(seen[-1] + 1 - len(seen) + np.count_nonzero(lacking))
 
 
-def stamp_jitter(stamps: Times, rate: float) -> tuple[float, float]:
-    """Return how far steps between samples at `rate` (Hz) are from their median, in s: rms and at most.
-
-    Stamps are in ns. Gaps are no jitter; NaN without steps.
-    """
-    steps = np.diff(ordered(stamps))
-    steps = steps[np.rint(steps * (rate / _NANOSECONDS)) == 1]
-    if not steps.size:
-        return math.nan, math.nan
-    deviation = (steps - np.median(steps)) / _NANOSECONDS
-    return float(np.sqrt(np.mean(deviation**2))), float(np.abs(deviation).max())
-
-
 class TimeAxis:
     """Time of a recording in s from the stamp `zero` (ns) of its first displacement sample.
 

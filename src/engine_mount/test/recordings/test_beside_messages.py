@@ -1,4 +1,4 @@
-"""What recover and cut keep besides messages: attachments, metadata, sequence numbers, losses."""
+"""What recover and cut keep besides messages: metadata, sequence numbers, losses."""
 
 import itertools
 
@@ -18,7 +18,6 @@ from mount_recorder.schemas import schema_text
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 200
-CALIBRATION = {'name': 'calibration.csv', 'media_type': 'text/csv', 'data': b'A,N\n0,0\n3,450\n' * 999}
 NOTES = ({'vehicle': 'B', 'track': 'north'}, {'vehicle': 'B', 'track': 'south'})
 
 
@@ -41,7 +40,6 @@ def by_others(folder, end=True):
         for index in range(COUNT):
             time = START + index * PERIOD
             writer.add_message(channel, time, sample(DISPLACEMENT, index), time, sequence=7 + 3 * index)
-        writer.add_attachment(START, START + 5, **CALIBRATION)
         writer.add_metadata('track', NOTES[1])
         if end:
             writer.finish()
@@ -79,15 +77,6 @@ def test_metadata_and_sequence_numbers_come_with_the_messages(place, copy, end):
     notes, sequences = stored(copy(folder, place()))
     assert notes == list(NOTES)
     assert sequences == [7 + 3 * index for index in range(len(engine_mount.open(folder)['displacement']))]
-
-
-def test_attachments_that_are_not_copied_are_named(place):
-    folder = by_others(place())
-    for said in (
-        recover(folder, place()).notes,
-        cut(engine_mount.open(folder), place()).losses,
-    ):
-        assert any('1 attachments are not copied: mcap get attachment other_0.mcap' in each for each in said)
 
 
 # What the recorder says of its losses.

@@ -214,7 +214,7 @@ def test_files_of_other_writers_are_read(tmp_path, compression, indexed):
     recording = engine_mount.open(path)
     np.testing.assert_array_equal(recording['displacement']['mount'], range(100))
     assert recording.topics['/broken'].message_count == 100
-    with pytest.raises(SeriesError, match='not installed'):
+    with pytest.raises(SeriesError, match='definition of pkg/msg/Broken in the recording is not readable'):
         recording['broken'].message(0)
 
 
