@@ -121,7 +121,6 @@ def test_json_and_figures_hold_what_was_found(calibrated):
     assert [len(law['parameters'][f'a{n}']) for n in range(1, 6)] == [4, 4, 4, 2, 4]
     gap = json.loads((calibrated / 'gap.json').read_text())
     assert gap['curves']['inductance_of_gap']['largest_gap_std_m'] < 1e-6
-    assert gap['warnings'] == []
     shown = {row['celsius'] for row in gap['temperature']['gap_error_um']}
     assert shown == {20.0, 80.0}
     warm = [
@@ -277,9 +276,9 @@ def test_a_gap_that_was_noted_wrongly_is_refused_and_named(files, capsys):
     assert 'is the gap of this file right?' in said
 
 
-def test_an_ambiguous_choice_is_warned_of(files, capsys):
+def test_an_ambiguous_choice_is_refused(files, capsys):
     said = refused(capsys, 'inductance', *files[1][:8], '--crossing-inductance', 32)
-    assert 'crossing_inductance (32.0 mH) must be one whose' in said
+    assert 'the crossing current must rise or fall steadily with the gap' in said
 
 
 def test_a_base_that_was_edited_to_nonsense_is_refused(calibrated, files, tmp_path, capsys):

@@ -84,7 +84,6 @@ REFUSED = {
     'fleet replay': (MISSING, '--set', 'continuous_viscous.damping_coefficient=1000', '--out', 'made'),
     'fleet report': (MISSING,),
     'fleet worst': (MISSING, '--by', 'duration_s'),
-    'identify drift': (MISSING, MISSING),
     'import': (MISSING, '--out', 'made'),
     'info': (MISSING,),
     'ls': (MISSING,),

@@ -11,15 +11,6 @@ if TYPE_CHECKING:
     from engine_mount.signals.mapping import Mapping
 
 
-def orders_of(text: str) -> tuple[int, int, int, int, int]:
-    """Return the numbers of coefficients of a1 .. a5 from `4,4,4,2,4`; raises `typer.BadParameter`."""
-    parts = text.replace(' ', '').split(',')
-    if len(parts) != 5 or not all(part.isdigit() for part in parts):
-        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
-    a, b, c, d, e = (int(part) for part in parts)
-    return a, b, c, d, e
-
-
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
     from engine_mount.identification.rack import RACK

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import given_ripple, orders_of, per_file, positive, rack_mapping
+from engine_mount.cli.calibration.given import given_ripple, per_file, positive, rack_mapping
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -34,7 +34,7 @@ _ACTUATOR_EPILOG = (
 
 `engine-mount calibrate actuator force.csv --name left --out left.yaml`
 
-`engine-mount calibrate actuator run1.csv run2.csv --orders 4,4,4,2,4 --figure force.png`
+`engine-mount calibrate actuator run1.csv run2.csv --figure force.png`
 
 `engine-mount calibrate actuator F.csv --column gap=Spalt:mm --column force=Kraft:kN`
 
@@ -50,11 +50,9 @@ _INDUCTANCE_EPILOG = (
     EXIT_CODES
     + """
 
-`engine-mount calibrate inductance ripple_*um.csv --coil-temperature 20 --base left.yaml --out left.yaml`
+`engine-mount calibrate inductance cold/*.csv warm/*.csv --base left.yaml --out left.yaml`
 
-`engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --gap b.csv=320`
-
-`engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
+`engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --coil-temperature b.csv=80`
 
 Columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
 `flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
@@ -65,7 +63,7 @@ _RACK_EPILOG = (
     EXIT_CODES
     + """
 
-`engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
+`engine-mount calibrate rack --out rack` - then `calibrate actuator rack/force.csv`,
 `calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
 """
 )
@@ -85,9 +83,6 @@ Gaps = Annotated[
 @app.command(cls=Command, epilog=_ACTUATOR_EPILOG)
 def actuator(
     files: Files,
-    orders: Annotated[
-        str, typer.Option(help='numbers of coefficients of a1 .. a5; 18 in all, as in Table 1')
-    ] = '4,4,4,2,4',
     columns: Columns = None,
     map_file: MapFile = None,
     dbc: Dbc = None,
@@ -114,11 +109,8 @@ def actuator(
     places = [local(file, console) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
     values = FileValues(per_file(gaps or [], places, '--gap', 1e-6))
-    numbers = orders_of(orders)
     with progress() as bar:
-        result = calibrate.actuator(
-            places, columns=mapping, values=values, orders=numbers, base=base or '', progress=bar
-        )
+        result = calibrate.actuator(places, columns=mapping, values=values, base=base or '', progress=bar)
     publish(result, json_file, figure, out, name)
 
 
@@ -160,8 +152,8 @@ def inductance(
 ) -> None:
     """Fit the gap curves L_0.2 and i_20 (Fig. 4) to coil ripple recorded at known gaps.
 
-    The temperature with most recordings is that of the curves. With recordings at a second one the
-    compensation is measured, else it is stated from the conductivity's coefficient and the base's force law.
+    The temperature with most recordings is that of the curves, recordings at a second one measure the
+    compensation; those of one temperature alone are refused.
     """
     from engine_mount.identification import calibrate
     from engine_mount.identification.specimen import check_targets
@@ -195,7 +187,8 @@ def rack(
         bool, typer.Option('--drawn', help='another actuator with other pads, drawn around the default ones')
     ] = False,
     celsius: Annotated[
-        list[float] | None, typer.Option(help='coil temperature of the ripple, degC; may be repeated')
+        list[float] | None,
+        typer.Option(help='coil temperature of the ripple, degC; may be repeated; default: 20 and 80'),
     ] = None,
 ) -> None:
     """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
@@ -203,6 +196,6 @@ def rack(
 
     with progress() as bar:
         files = calibrate.rack(
-            out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0,), progress=bar
+            out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0, 80.0), progress=bar
         )
     terminal().print(f'{len(files)} recordings in {out}', soft_wrap=True)

@@ -1,11 +1,9 @@
 """`engine-mount identify`: from recordings of a rack to parameters."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import per_file
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -18,7 +16,6 @@ from engine_mount.cli.commands.options import (
     mapping_of,
     stated,
 )
-from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import terminal
@@ -65,7 +62,7 @@ def friction(
     ] = None,
     file: Annotated[
         list[str] | None,
-        typer.Option(metavar='FILE...', help='train on each, predict each other one; of one, its halves'),
+        typer.Option(metavar='FILE...', help='train on each, predict each other one'),
     ] = None,
     step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
@@ -90,8 +87,7 @@ def friction(
     zero: Annotated[
         str,
         typer.Option(
-            help='zero of the force: law (from the loop), rest (before the motion), recorded; default: law '
-            'for JSON of a damper, else recorded'
+            help='zero of the force: law (from the loop) or recorded; default: law for JSON of a damper'
         ),
     ] = '',
     seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
@@ -124,47 +120,3 @@ def friction(
             base=base or '', progress=bar,
         )  # fmt: skip
     publish(result, json_file, figure, out, name)
-
-
-DRIFT_EPILOG = (
-    EXIT_CODES
-    + """
-
-`engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
-
-`engine-mount identify drift a b c --hours a=120 --hours b=180 --hours c=260` - by a counter
-"""
-)
-
-
-@app.command(cls=Command, epilog=DRIFT_EPILOG)
-def drift(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar='RECORDING...',
-            help='runs or recordings with an initialisation',
-            autocompletion=recordings,
-        ),
-    ],
-    specimen: Annotated[
-        Path | None, typer.Option(help='specimen file of this actuator; default: the shipped one')
-    ] = None,
-    hours: Annotated[
-        list[str] | None,
-        typer.Option(metavar='RECORDING=H', help='hours of all recordings; default: when sessions began'),
-    ] = None,
-    json_file: JsonFile = None,
-    figure: Figure = None,
-) -> None:
-    """Show wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
-
-    A line through the contact gaps of all recordings, weighted by the deviations that the initialisations
-    stated; where gaps scatter more than that, by as much less sure. Offset current likewise from its scatter.
-    """
-    from engine_mount.identification import identify
-    from engine_mount.identification.specimen import check_targets
-
-    check_targets(json_file, figure)
-    counter = per_file(hours or [], recordings, '--hours', 1.0)
-    publish(identify.drift(recordings, hours=counter, specimen=specimen or ''), json_file, figure)
