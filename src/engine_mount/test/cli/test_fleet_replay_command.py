@@ -43,10 +43,9 @@ def test_it_tells_how_many_have_no_figures_and_writes_what_it_tells(fleet, tmp_p
     asked = shlex.split(done.output.rpartition('note why 1 failed: engine-mount ')[2])
     assert 'broken.mcap' in CliRunner().invoke(app, asked).output
     figures = json.loads((tmp_path / 'figures.json').read_text(encoding='utf-8'))
-    assert (figures['recordings'], figures['failed'], figures['workers']) == (2, 1, 1)
+    assert (figures['recordings'], figures['failed']) == (2, 1)
     assert figures['replayed_s'] > 1.0
-    assert 0.0 < figures['starting_s'] < figures['wall_s']
-    assert figures['real_time_factor_per_core'] == figures['replayed_s'] / figures['wall_s']
+    assert figures['real_time_factor'] == figures['replayed_s'] / figures['wall_s']
     assert Path(figures['result']).is_file()
 
 

@@ -233,8 +233,8 @@ from engine_mount.drives.replay import parsed_changes
 
 killed = []
 
-def report(progress):
-    if progress.done and not killed:
+def report(done, of):
+    if done and not killed:
         killed.append(multiprocessing.active_children()[0])
         killed[0].kill()
 
@@ -243,7 +243,6 @@ if __name__ == '__main__':
     done = replay_fleet([sys.argv[1]], changes, Path(sys.argv[2]), progress=report, workers=2)
     assert not done.not_fetched
     assert killed
-    assert done.figures['workers'] <= 2  # a process that takes the place of another is no further one
 """
 
 

@@ -101,20 +101,6 @@ def test_a_task_that_kills_its_workers_is_given_up_and_no_other_one_is(tmp_path)
     assert len(list(tmp_path.glob('3_*'))) == LOSSES
 
 
-@pytest.mark.slow
-def test_a_task_that_outgrows_the_memory_of_its_worker_is_given_up():
-    def work(place):
-        if place == 0:
-            held = bytearray(b'x' * 2_000_000_000)
-            time.sleep(_PATIENCE)
-            return len(held)
-        return place
-
-    done = sorted(run_tasks(work, range(3), workers=1, memory=1_000_000_000), key=lambda one: one.place)
-    assert [one.result for one in done] == [None, 1, 2]
-    assert 'out of memory' in done[0].reason
-
-
 def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
     def work(place):
         time.sleep(0.05)

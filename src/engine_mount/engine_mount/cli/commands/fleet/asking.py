@@ -35,7 +35,7 @@ Examples:
 
 `engine-mount fleet worst catalogue --by peak_displacement_m --count 3` - the largest motions
 
-`engine-mount fleet worst catalogue --by contact_gap_m --lowest` - the smallest gaps
+`engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
 REPORT_EPILOG = """Exit code: 0 when the page is written, also where a recording could not be read again for
 its picture, which the page says; 1 when there is no result, or the page cannot be written.
@@ -84,9 +84,6 @@ def worst(
     folder: Annotated[Path, typer.Argument(metavar='FOLDER', help='result or catalogue')],
     by: Annotated[str, typer.Option(metavar='COLUMN', help='column of numbers')],
     count: Annotated[int, typer.Option(min=1, metavar='NUMBER', help='how many')] = 10,
-    lowest: Annotated[
-        bool, typer.Option('--lowest', help='the smallest values; otherwise the largest, whatever their sign')
-    ] = False,
     json_file: JsonFile = None,
 ) -> None:
     """List the recordings with the largest values of a column, with the commands that open them."""
@@ -94,10 +91,10 @@ def worst(
     from engine_mount.reports.json_file import write_json
 
     console = terminal()
-    found = worst(folder, by, count, lowest=lowest)
+    found = worst(folder, by, count)
     rows = []
-    for number, (row, value, uri, commands) in enumerate(found, 1):
-        recording, mount = row['recording'], row['mount'] or ''
+    for number, (row, uri, commands) in enumerate(found, 1):
+        recording, mount, value = row['recording'], row['mount'] or '', row[by]
         name = f'{recording} {mount}'.rstrip()
         console.print('\n    '.join([f'{number:>2}. {name}: {by} {value:.6g}', *commands]), soft_wrap=True)
         rows.append({'recording': recording, 'mount': mount, 'uri': uri, by: value, 'commands': commands})

@@ -97,10 +97,6 @@ def index(
     out: Annotated[Path, typer.Option(metavar='CATALOGUE', help='folder to make or to bring up to date')],
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
-    memory: Annotated[
-        int,
-        typer.Option(min=0, metavar='MB', help='local: most for each process; 0: its share of the machine'),
-    ] = 0,
     json_file: JsonFile = None,
 ) -> None:
     """Write what each recording is and holds into a catalogue: a row for it, and one for each event."""
@@ -111,9 +107,8 @@ def index(
 
     console, began = terminal(), monotonic()
     with _resumable(console, 'indexing', transient=True) as progress:
-        options = {'scheduler': scheduler, 'workers': workers, 'memory': memory * 1_000_000}
-        found = index(uris, out, progress, **options)
-    counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'vanished', 'unreadable')}
+        found = index(uris, out, progress, scheduler=scheduler, workers=workers)
+    counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'unreadable')}
     for name, count in {**counts, 'catalogue': out}.items():
         console.print(f'{name:<12}{count}', soft_wrap=True)
     if found.unreadable:
@@ -161,14 +156,10 @@ def replay(
     lines = [
         f'recordings {figures["recordings"]}{before}: {figures["replayed"]} replayed, {others}'
         f'{figures["failed"]} failed',
+        f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
+        f'{figures["real_time_factor"]:.0f} x real time',
         f'result     {out}',
     ]
-    if figures['workers']:
-        lines.insert(
-            1,
-            f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
-            f'{figures["real_time_factor_per_core"]:.0f} x real time on each of {figures["workers"]} cores',
-        )
     console.print('\n'.join(lines), soft_wrap=True)
     if figures['failed']:
         _note_question(console, f'{figures["failed"]} failed', out, "result where outcome = 'failed'")
@@ -191,10 +182,7 @@ def _resumable(console: Console, what: str, **options: Any) -> Iterator[Any]:
 
     with TerminalScreen(console).bar(what, **options) as show:
         try:
-            yield lambda now: show(
-                now.done / max(now.of, 1),
-                detail=f'{now.done} of {now.of}, {now.rate:.1f} recordings/s',
-            )
+            yield lambda done, of: show(done / max(of, 1), detail=f'{done} of {of} recordings')
         except KeyboardInterrupt:
             raise Interrupted(f'what was done stands, and {_GOES_ON}') from None
         except SchedulerLostError as error:
