@@ -80,6 +80,10 @@ def test_every_recording_has_a_row_and_the_damaged_ones_a_reason(local):
     assert 'is no MCAP file' in reasons['19_garbage']
     assert 'holds no MCAP file' in reasons['19_no_data']
     assert reasons['19_truncated'] == ''
+    told = {row['recording'].partition('/')[2]: row['reason'] for row in catalogue_of(local)[0].to_pylist()}
+    assert 'without its footer' in told['19_truncated']
+    assert 'metadata.yaml is missing' in told['19_no_metadata']
+    assert 'lost' in told['19_wrong_checksum']
     done = [row for row in rows if not row['reason']]
     assert any(row['setpoints_differing'] for row in done)
     assert all(row['as_recorded'] for row in done if not row['recording'].endswith('18_middle'))  # too short
