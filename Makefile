@@ -51,8 +51,7 @@ faults: $(VENV)/.ready ## bring every fault into the real graph; writes docs/ref
 	@$(BIN)/engine-mount faults --page docs/reference/faults.md $(FAULTS_OPTIONS)
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
-	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md $(if $(RECORDED_DRIVE),\
-		--set policy.recording=$(RECORDED_DRIVE) --set policy.column=accelerometer.2 --set policy.scale=-1)
+	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
 ifneq ($(RECORDED_DRIVE),)
 	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
 		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/explanation/recorded_drive.md

@@ -7,7 +7,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={
-        'engine_mount.experiments': ['*.csv', '*.yaml', 'check/*.yaml'],
+        'engine_mount.experiments': ['*.yaml', 'check/*.yaml'],
         'engine_mount.faults': ['faults.yaml'],
         'engine_mount.fleet': ['*.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],

@@ -22,7 +22,6 @@ setup(
     entry_points={
         'console_scripts': [
             'mount_supervisor = mount_ros.start:main',
-            'mount_prepare = mount_ros.start:main',
         ]
     },
 )

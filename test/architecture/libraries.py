@@ -38,7 +38,6 @@ LIBRARIES = {
     'numba': Library('numba'),  # python3-numba is a key, but of a package that Ubuntu 24.04 does not have
     'numpy': Library('numpy', 'python3-numpy'),
     'openpyxl': Library('openpyxl', 'python3-openpyxl'),
-    'PIL': Library('pillow', 'python3-pil'),
     'pyarrow': Library('pyarrow'),
     'pytest': Library('pytest', 'python3-pytest'),
     'rich': Library('rich', 'python3-rich'),

@@ -53,8 +53,8 @@ import runpy, sys
 from unittest.mock import MagicMock
 sys.modules.update(dict.fromkeys(sys.argv[2].split(), MagicMock()))
 runpy.run_path(sys.argv[1])['generate_launch_description']()
-from mount_bringup.graph.run import ordered
-ordered(['vehicle', 'recording:=none', 'policy:=switched_viscous'])
+from mount_bringup.graph.order import launch_order
+launch_order(['vehicle', 'recording:=none', 'policy:=switched_viscous'])
 print(*sys.modules)
 """
 
@@ -79,11 +79,6 @@ def test_what_the_car_loads_and_rosdep_cannot_install_is_in_the_file_that_the_re
     pinned = re.findall(r'^([\w-]+)==', (REPOSITORY / 'requirements-car.txt').read_text(), re.MULTILINE)
     assert set(pinned) == by_pip
     assert 'python3 -m pip install -r requirements-car.txt' in lines_for_the_car()
-
-
-def test_the_readme_installs_the_reader_of_recordings_as_long_as_the_car_loads_it():
-    reader = [file for file in files_behind(BEGIN) if 'engine_mount' in file.parts]
-    assert ('python3 -m pip install --no-deps src/engine_mount' in lines_for_the_car()) == bool(reader)
 
 
 def test_rosdep_is_given_the_packages_of_the_car_and_they_name_no_library_of_the_desk():

@@ -33,12 +33,6 @@ def test_a_package_names_what_its_tests_import_besides(package):
     assert declared(package, 'test_depend') == keys(imported(own_tests_of(package))) - code - {package}
 
 
-@pytest.mark.parametrize('package', ROS_PACKAGES)
-def test_a_package_names_what_builds_it(package):
-    assert imported([SOURCES / package / 'setup.py']) == {'setuptools'}
-    assert declared(package, 'buildtool_depend') == {'python3-setuptools'}
-
-
 def test_where_there_is_no_ros_the_requirements_pin_what_the_code_imports_and_nothing_else():
     assert pinned('requirements-desk.txt') == projects(code_of)
 

@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 from engine_mount.cli.command import app
-from engine_mount.cli.commands import compare
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'exit_codes.md'
 
@@ -19,8 +18,3 @@ def test_every_command_has_its_row():
     names = {each.name or each.callback.__name__ for each in app.registered_commands}
     groups = {each.name or each.typer_instance.info.name for each in app.registered_groups}
     assert _rows().keys() == names | groups
-
-
-def test_compare_tells_different_from_not_compared_in_its_help_and_on_the_page():
-    assert '| different | 2: not compared' in _rows()['compare']
-    assert '1: different; 2: not compared' in ' '.join(compare.compare.__doc__.split())

@@ -1,24 +1,14 @@
 """The registry of topics, the nodes, docs/reference and the tables of READMEs say the same."""
 
-import ast
-import math
 import re
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
-import typer
 
-from engine_mount.cli.command import app
 from mount_bringup.graph.nodes import SIMULATED
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
-from mount_models.actuator.law import ForceLaw
-from mount_models.damper import DegressiveDamper, ProgressiveDamper, ViscousDamper
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
-from mount_models.quantity import quantities
 from mount_ros import topics
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import (
@@ -28,14 +18,7 @@ from mount_ros.topics import (
     SESSION,
     TOPICS,
     Delivery,
-    Topic,
 )
-from mount_sim.excitation.road import RandomRoad
-from mount_sim.plant.closing import ClosingMechanics
-from mount_sim.plant.hydromount import Hydromount
-from mount_sim.plant.reluctance import ReluctanceActuator
-from mount_sim.plant.ripple import RippleCoil
-from mount_sim.plant.vehicle import Elastomer, Vehicle
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = REPOSITORY / 'src'
@@ -46,15 +29,6 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
     'mount_bringup/graph/graph.py',
     'engine_mount/cli/bench/relay.py',  # not of the graph: bare rclpy to compare with
 }
-
-PARAMETER_SETS = {
-    ('src/mount_models/README.md', 'Parameters'): (
-        ForceLaw, FrictionCoefficients, FrictionContact, ViscousDamper, DegressiveDamper, ProgressiveDamper,
-    ),
-    ('src/mount_sim/README.md', 'Parameters of the laws'): (
-        ReluctanceActuator, RippleCoil, ClosingMechanics, Elastomer, Hydromount, Vehicle, RandomRoad,
-    ),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize(('heading', 'registry'), [('Topics', TOPICS), ('Topics of the rack', RACK_TOPICS)])
@@ -96,14 +70,6 @@ def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
         assert names(row['taken by']) == ends_of_nodes('subscribe', name), f'subscribers of {name}'
 
 
-def test_only_experiments_use_the_topics_of_the_rack():
-    of_rack = {constant for constant, value in vars(topics).items() if value in RACK_TOPICS}
-    using = {
-        file.relative_to(SOURCES).parts[:3] for file in python_files() if of_rack & set(topics_used_in(file))
-    }
-    assert using == {('engine_mount', 'engine_mount', 'experiments')}
-
-
 @pytest.mark.parametrize('policy', POLICIES)
 def test_every_policy_traces_what_the_registry_declares_and_its_own_between(policy):
     fields = trace_fields(POLICIES[policy])
@@ -118,71 +84,19 @@ def test_the_units_of_what_policies_trace_are_known_to_readers():
     assert units == {name: unit for policy in POLICIES.values() for name, unit in policy.TRACE.items()}
 
 
-def test_every_topic_that_a_source_names_is_registered():
-    used = {(file, name) for file in python_files() for name in topics_used_in(file)}
-    assert len(used) > 20, 'the search no longer finds what it looks for'
-    unknown = [
-        f'{file.name}: {name}'
-        for file, name in used
-        if not hasattr(topics, name) or (isinstance(getattr(topics, name), Topic) and not registered(name))
-    ]
-    assert unknown == []
-
-
 def test_publishers_and_subscriptions_are_opened_by_the_registry_alone():
     opening = {
         '/'.join(file.relative_to(SOURCES).parts[1:])
-        for file in python_files()
+        for file in SOURCES.glob('*/*mount*/**/*.py')
         if re.search(r'\.create_(publisher|subscription)\(', file.read_text())
     }
     assert opening == MAY_CREATE_ENDS
 
 
-def test_the_graph_waits_for_registered_topics():
-    needed = {name for node in SIMULATED for name in node.needs}
-    assert needed
-    assert needed <= {topic.name for topic in TOPICS}
-
-
-@pytest.mark.parametrize(('place', 'kinds'), PARAMETER_SETS.items(), ids=('mount_models', 'mount_sim'))
-def test_readme_lists_every_parameter_with_unit_range_and_source(place, kinds):
-    file, heading = place
-    listed: dict[str, list[tuple[str, ...]]] = {}
-    for row in table(heading, file):
-        name, *values = row.values()
-        listed.setdefault(name, []).append(tuple(values))
-    assert set(listed) == {kind.__name__ for kind in kinds}
-    for kind in kinds:
-        defaults = kind._field_defaults
-        assert listed[kind.__name__] == [
-            (
-                name,
-                f'{defaults[name]:g}' if name in defaults else '',
-                note.unit,
-                f'{note.low:g} .. {note.high:g}' if note.low > -math.inf else '',
-                note.source,
-            )
-            for name, note in quantities(kind).items()
-        ]
-
-
-def test_bringup_readme_lists_every_option_of_drive():
-    command = typer.main.get_command(app)
-    assert isinstance(command, typer.core.TyperGroup)
-    options = {parameter.opts[0] for parameter in command.commands['drive'].params}
-    assert {
-        row['option'].split()[0] for row in table('drive', 'src/engine_mount/engine_mount/cli/README.md')
-    } == options
-    commands = {
-        row['command'].split()[1] for row in table('Commands', 'src/engine_mount/engine_mount/cli/README.md')
-    }
-    assert commands == set(command.commands)
-
-
 @cache
-def table(heading: str, file: str = 'docs/reference/interface.md') -> list[dict[str, str]]:
-    """Return the first table below a heading of a page, code marks removed."""
-    text = (REPOSITORY / file).read_text()
+def table(heading: str) -> list[dict[str, str]]:
+    """Return the first table below a heading of the page on the interface, code marks removed."""
+    text = (REPOSITORY / 'docs' / 'reference' / 'interface.md').read_text()
     section = re.split(rf'^#+ {heading}$', text, flags=re.MULTILINE)[1]
     lines = re.findall(r'(?:^\|.*\|\n)+', section, flags=re.MULTILINE)[0].splitlines()
     header, *rows = [
@@ -206,20 +120,3 @@ def ends_of_nodes(kind: str, topic_name: str) -> set[str]:
             if getattr(topics, constant).name == topic_name:
                 found.add(node.name)
     return found
-
-
-def python_files() -> list[Path]:
-    return sorted(SOURCES.glob('*/*mount*/**/*.py'))
-
-
-def topics_used_in(file: Path) -> Iterator[str]:
-    """Return the constants that a file takes from the registry, by either way of importing it."""
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module == 'mount_ros.topics':
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == 'topics' and node.attr.isupper():
-            yield node.attr
-
-
-def registered(constant: str) -> bool:
-    return getattr(topics, constant) in TOPICS + RACK_TOPICS

@@ -3,7 +3,7 @@
 _INSTALLATION = 'on a ROS 2 installation; test/architecture/test_car.py holds what it installs and loads'
 _HARDWARE = 'by nobody: with a CAN FD adapter and the electronics of a mount'
 _LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
-_BAG_PLAY = 'on a ROS 2 installation; `replay --live --with-control` plays to the same control'
+_BAG_PLAY = 'on a ROS 2 installation; src/mount_control/test plays to the same control'
 _RECORD = 'beside a running graph in test/graph/test_recording.py'
 _VIEW = 'with clients of its own in src/engine_mount/test/view'
 _SET = 'on a running node in test/replay/test_parameter_changes.py'
@@ -28,7 +28,6 @@ ELSEWHERE = {
     'ros2 topic echo': _HARDWARE,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
     'ros2 launch mount_bringup sim.launch.py': _LAUNCH,
-    'ros2 run mount_bringup mount_prepare': 'by src/mount_bringup/test/test_prepare.py',
     'export ROS_DOMAIN_ID': _BAG_PLAY,
     'ros2 run mount_control': _BAG_PLAY,
     'ros2 lifecycle set /mount_control': _BAG_PLAY,

@@ -76,11 +76,6 @@ def test_no_command_stands_in_a_block_that_is_not_run(page):
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)
-def test_no_page_names_a_folder_by_the_time_at_which_it_was_made(page):
-    assert re.findall(r'\d{4}-\d\d-\d\d_\d\d', page.read_text(encoding='utf-8')) == []
-
-
-@pytest.mark.parametrize('page', PAGES, ids=name_of)
 def test_every_command_that_a_page_names_exists_with_its_options(page):
     for text in COMMAND.findall(page.read_text(encoding='utf-8')):
         words = text.split('#')[0].replace('\\\n', ' ').split()

@@ -20,7 +20,3 @@ def test_a_notebook_is_small_and_tells_nothing_of_the_machine_that_ran_it(file):
     assert 'metadata' not in {key for cell in read(file).cells for key in cell.metadata}
     assert '/home/' not in text
     assert '/tmp/' not in text
-
-
-def test_there_is_a_notebook():
-    assert NOTEBOOKS

@@ -5,7 +5,7 @@ import re
 import pytest
 from vehicle_file import FILE, text
 
-from mount_bringup.graph.run import ordered as order_of
+from mount_bringup.graph.order import launch_order as order_of
 from mount_bringup.settings import defaults_of_nodes
 
 

@@ -36,7 +36,7 @@ def bus_listener(domain):
         while not ending.is_set():
             frame = bus.recv(0.1)
             if frame is not None:
-                setpoints.append(codec.decode_setpoint(frame.data)[1])
+                setpoints.append(codec.setpoint.decode(frame.data)[1])
 
     thread = threading.Thread(target=listen)
     thread.start()

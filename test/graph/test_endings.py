@@ -112,7 +112,7 @@ def _drive_with_a_control_that_stands_still(command, bus_listener) -> str:
     finally:
         os.kill(nodes['mount_control'].pid, signal.SIGCONT)
     output, _ = process.communicate(timeout=LIMIT)
-    if 'too late for 1 kHz' in output:  # then what stood still may not have been active yet
+    if 'too late for setpoints' in output:  # then what stood still may not have been active yet
         return output
     assert process.returncode == 1, output
     figures = json.loads((out / 'summary.json').read_text())
@@ -128,7 +128,7 @@ def _drive_with_a_control_that_stands_still(command, bus_listener) -> str:
 
 
 @pytest.mark.slow
-def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
+def test_lockstep_ends_with_an_error_where_a_sample_is_not_answered(command):
     result = command.drive(
         '--lockstep', '--scenario', 'bench', '--duration', '5',
         '--set', 'mount_sim.answer_patience=2.0',
@@ -136,7 +136,6 @@ def test_lockstep_ends_with_an_error_that_names_who_does_not_answer(command):
     )  # fmt: skip
     assert result.code == 1
     assert 'was not answered within 2 s' in result.output
-    assert 'mount_driver does not answer' in result.output
     assert len(engine_mount.open(result.folder / 'recording')['displacement']) == 4000
 
 

@@ -7,8 +7,6 @@ import pytest
 
 from engine_mount.cli.command import main
 
-PAPER = ('--set', 'mount_control.policy=switched_viscous')
-
 
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path, monkeypatch):
@@ -16,42 +14,19 @@ def own_folder(tmp_path, monkeypatch):
     monkeypatch.setenv('COLUMNS', '200')
 
 
-def _csv(path, times, values):
-    rows = '\n'.join(f'{t},{v}' for t, v in zip(times, values, strict=True))
-    path.write_text(f't,az\n{rows}\n')
-    return path
-
-
-TIMES = np.arange(500) / 100.0
-WAVE = np.sin(2 * np.pi * 8.0 * TIMES)
-
-
-@pytest.fixture
-def bad_inputs(tmp_path):
-    backwards = TIMES.copy()
-    backwards[200] = backwards[100]
-    return {
-        'good': _csv(tmp_path / 'good.csv', TIMES, WAVE),
-        'backwards': _csv(tmp_path / 'backwards.csv', backwards, WAVE),
-        'gap': _csv(tmp_path / 'gap.csv', np.where(TIMES > 2.0, TIMES + 1.0, TIMES), WAVE),
-        'slow': _csv(tmp_path / 'slow.csv', TIMES * 100.0, WAVE),
-        'missing': tmp_path / 'missing.csv',
-    }
-
-
 @pytest.mark.parametrize(
-    ('which', 'column', 'words'),
+    ('column', 'words'),
     [
-        ('missing', 'az', ('missing.csv: no such file or folder',)),
-        ('good', 'ay', ("has no column 'ay'", 'its columns are t, az')),
-        ('good', 'az', ('no unit is said', 'it could be m/s^2, g', 'write --column acceleration=az:m/s^2')),
-        ('backwards', 'az:m/s^2', ('time does not rise at sample 200',)),
-        ('gap', 'az:m/s^2', ('has a gap of 1.010 s at 2.000 s',)),
-        ('slow', 'az', ('samples per second', 'these look like ms: write --time t:ms')),
+        ('ay', ("has no column 'ay'", 'its columns are t, az')),
+        ('az', ('no unit is said', 'it could be m/s^2, g', 'write --column acceleration=az:m/s^2')),
+        ('az:m/s^2', ('has a gap of 1.010 s at 2.000 s',)),
     ],
 )
-def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words):
-    order = ('--scenario', 'recorded', '--file', str(bad_inputs[which]), '--column', column)
+def test_bad_recorded_input_is_refused(capsys, tmp_path, column, words):
+    times = np.arange(500) / 100.0
+    values = np.c_[np.where(times > 2.0, times + 1.0, times), np.sin(16.0 * np.pi * times)]
+    np.savetxt(tmp_path / 'gap.csv', values, delimiter=',', header='t,az', comments='')
+    order = ('--scenario', 'recorded', '--file', str(tmp_path / 'gap.csv'), '--column', column)
     _expect_refusal(capsys, order, *words)
 
 
@@ -59,7 +34,6 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
     ('options', 'words'),
     [
         (('--scenario', 'race'), ("scenario 'race' is unknown", 'motorway, bench, sweep, recorded')),
-        (('--mount', 'rubber'), ("mount 'rubber' is unknown", 'friction, friction_off', 'hydro, elastomer')),
         (
             ('--mount', 'friction_always_on', '--set', 'mount_control.policy=continuous_viscous'),
             ('needs mount_control.policy switched_viscous', 'received continuous_viscous'),
@@ -68,15 +42,8 @@ def test_bad_recorded_input_is_refused(capsys, bad_inputs, which, column, words)
             ('--set', 'mount_control.switch_on_level=0.0006'),
             ('switch_on_level of the policy switched_viscous', 'set mount_control.policy to'),
         ),
-        (('--scenario', 'sweep', '--duration', '60'), ('duration (60 s)', '(49 s)')),
         (('--scenario', 'recorded'), ('needs a file',)),
-        ((*PAPER, '--set', 'mount_control.quality=5e1'), ('quality (50', '0.3 .. 5')),
         (('--set', 'mount_control.qualty=1'), ("'qualty' is no parameter of mount_control", 'quality')),
-        (
-            ('--set', 'mount_kontrol.quality=1'),
-            ("'mount_kontrol.quality' is no parameter", 'mount_control.quality'),
-        ),
-        ((*PAPER, '--set', 'mount_control.damper=soft'), ("'soft'", 'viscous_2000')),
         (('--fault', 'flat_tyre@3'), ("fault 'flat_tyre' is unknown",)),
         (('--core', '--fault', 'lost_5@3'), ('fault lost_5 shows on the CAN bus only',)),
         (('--domain', '400'), ("ROS domain '400'", '0 .. 101')),

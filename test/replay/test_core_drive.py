@@ -28,7 +28,7 @@ from mount_models.damper import damper_curve
 from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.topics import Topic
-from mount_sim.mount_choice import with_control_of_mount
+from mount_sim.plant.mounts import with_control_of_mount
 from mount_sim.plant.simulated_car import DivergedError
 
 PAPER = {'policy': 'switched_viscous'}

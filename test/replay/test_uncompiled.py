@@ -17,7 +17,7 @@ LIMIT = 600.0  # s: only a hang takes so long
 REPLAYS = """
 import sys, types
 from pathlib import Path
-from mount_models.arithmetic.interpolation import interpolated
+from mount_models.arithmetic.sums import interpolated
 from engine_mount.drives.replay import replay
 
 assert isinstance(interpolated, types.FunctionType), 'compiled'

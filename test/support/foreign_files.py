@@ -64,11 +64,10 @@ def _table(path, times, columns, delimiter, decimal, before=()):
 
 
 def make_text(folder, name, times, columns):
-    """Write blanks between the cells, by numpy, without titles or times."""
+    """Write blanks between the cells, by numpy, without titles; the times come first."""
     path = folder / f'{name}.txt'
-    np.savetxt(path, stacked(columns), fmt='%25.17g')
-    rate = round((len(times) - 1) / float(times[-1] - times[0]), 6)
-    return Made(path, numbers(columns), stated=Stated(rate=rate), units=False)
+    np.savetxt(path, np.column_stack([times, stacked(columns)]), fmt='%25.17g')
+    return Made(path, {key: str(place) for place, key in enumerate(columns, 1)}, '0', units=False)
 
 
 def make_json(folder, name, times, columns):

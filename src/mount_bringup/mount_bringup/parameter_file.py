@@ -10,6 +10,7 @@ from mount_models.plain_yaml import YamlError, yaml_in_file
 from mount_models.quantity import check_name
 
 _VALUES = 'ros__parameters'
+_PARTS = {'**': '(/[^/]+)*', '*': '/[^/]+'}  # of a name: any number, one
 
 
 def settings_of_file(
@@ -38,18 +39,17 @@ def settings_in(
         if _VALUES not in path:
             raise SettingError(f'{"/".join(["", *path])} must have {_VALUES}; instead received {value!r}')
         place = path.index(_VALUES)
-        *spaces, last = '/'.join(path[:place]).strip('/').split('/')
-        name = '.'.join(path[place + 1 :])
-        nodes = [node for node in known if last in (node, '*', '**')]
+        pattern, name = '/'.join(path[:place]).strip('/'), '.'.join(path[place + 1 :])
+        nodes = [node for node in known if pattern.rpartition('/')[2] in (node, '*', '**')]
         if not nodes:
-            pattern = '/'.join(path[:place])
             raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
         owners = [node for node in nodes if general_name_of(node, name) in known[node]]
         if not owners:
             names = {name for node in nodes for name in known[node]}
             check_name(f'{" or ".join(nodes)} ({file})', name, names)
+        expression = ''.join(_PARTS.get(part, '/' + re.escape(part)) for part in pattern.split('/'))
         for node in owners:
-            if _matches([*spaces, last], f'{namespace.strip("/")}/{node}'):
+            if re.fullmatch(expression, f'/{namespace.strip("/")}/{node}'.replace('//', '/')):
                 settings.setdefault(node, {})[name] = value
     return settings
 
@@ -61,10 +61,3 @@ def _leaves(content: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ..
             yield from _leaves(inner, (*path, str(key)))
     else:
         yield path, content
-
-
-def _matches(pattern: list[str], name: str) -> bool:
-    """Whether a full name matches, `*` standing for one part of it and `**` for any number of them."""
-    parts = {'**': '(/[^/]+)*', '*': '/[^/]+'}
-    expression = ''.join(parts.get(part, '/' + re.escape(part)) for part in pattern)
-    return re.fullmatch(expression, f'/{name.strip("/")}') is not None

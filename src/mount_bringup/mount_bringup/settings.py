@@ -1,7 +1,6 @@
 """The settings of a user for the nodes: names known, types as declared, before a node starts."""
 
 import contextlib
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -32,18 +31,14 @@ def defaults_of_nodes(nodes: Sequence[str] = NODES) -> dict[str, dict[str, Any]]
 def _defaults(node: str) -> dict[str, Any]:
     if node == 'mount_control':
         return control.defaults()
-    return {name: value for declared in _declared(node) for name, value in flattened(declared).items()}
-
-
-def _declared(node: str) -> tuple[NamedTuple, ...]:
-    """Return the declared parameters of a node."""
+    declared: tuple[NamedTuple, ...] = (RecorderParameters(),)
     if node == 'mount_sim':
         from mount_sim.parameters import NodeParameters, SimParameters  # not in the car
 
-        return SimParameters(), NodeParameters()
-    if node == 'mount_recorder':
-        return (RecorderParameters(),)
-    return DriverParameters() if node == 'mount_driver' else InitParameters(), SpecimenChoice()
+        declared = SimParameters(), NodeParameters()
+    elif node in OF_EACH:
+        declared = DriverParameters() if node == 'mount_driver' else InitParameters(), SpecimenChoice()
+    return {name: value for each in declared for name, value in flattened(each).items()}
 
 
 def checked_settings(
@@ -56,15 +51,12 @@ def checked_settings(
     ROS itself takes an unknown parameter silently. `known` is {node: {parameter: default}} where others
     than nodes of the graph have parameters; `owner` is what those are called in the refusal.
     """
-    if known is None:
-        known = defaults_of_nodes()
+    known = known or defaults_of_nodes()
     checked: dict[str, dict[str, Any]] = {}
     for node, values in settings.items():
         kind = node.rpartition('/')[2]  # of a node of one mount, as in left/mount_control
         if kind not in known or (kind != node and kind not in OF_EACH):
-            near = difflib.get_close_matches(kind, known, n=1)
-            hint = f'; did you mean {near[0]}?' if near else ''
-            raise ParameterError(f'{node!r} is no {owner}{hint or "; known are " + ", ".join(known)}')
+            raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
         for name in values:
             check_name(node, general_name_of(kind, name), known[kind])
         checked[node] = {
@@ -78,7 +70,7 @@ def general_name_of(node: str, name: str) -> str:
     """Return the parameter behind that of one mount, as in mount_sim.mount_left.friction.scale."""
     if node != 'mount_sim' or not name.startswith('mount_'):
         return name
-    from mount_sim.plant.places import general_name
+    from mount_sim.plant.mounts import general_name
 
     return general_name(name)
 
@@ -125,7 +117,7 @@ def settings_of_mount(settings: Known, mount: str) -> dict[str, dict[str, Any]]:
         if own := settings.get(f'{mount}/{node}'):
             found[node] = {**found.get(node, {}), **own}
     if 'mount_sim' in found:
-        from mount_sim.plant.places import values_of_mount
+        from mount_sim.plant.mounts import values_of_mount
 
         found['mount_sim'] = values_of_mount(found['mount_sim'], mount)
     return found

@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 import mount_bringup
+from mount_bringup.graph.graph import SILENCE_LIMIT
 from mount_bringup.graph.nodes import SIMULATED
-from mount_bringup.graph.reports import SILENCE_LIMIT
 
 FILE = Path(mount_bringup.__file__).parents[1] / 'config' / 'diagnostic_aggregator.yaml'
 

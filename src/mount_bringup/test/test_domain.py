@@ -1,8 +1,6 @@
 """One graph and one simulated CAN bus for each ROS domain and namespace."""
 
 import os
-import subprocess
-import sys
 
 import pytest
 
@@ -36,24 +34,6 @@ def test_a_second_graph_in_a_namespace_is_refused_until_the_first_has_ended():
         domain_lock(3, '/left').__enter__()
     with domain_lock(3, 'left'):
         pass
-
-
-def test_a_graph_that_was_killed_holds_its_place_no_more_and_leaves_no_file(tmp_path):
-    hold = (
-        f'from mount_bringup.graph import domain; domain._PLACE = {domain._PLACE!r}; '
-        'lock = domain.domain_lock(5, "left"); lock.__enter__(); print("held", flush=True); input()'
-    )
-    environment = {**os.environ, 'TMPDIR': str(tmp_path)}
-    with subprocess.Popen(
-        [sys.executable, '-c', hold], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as holder:
-        assert holder.stdout.readline() == b'held\n'
-        with pytest.raises(ParameterError, match='namespace /left'):
-            domain_lock(5, 'left').__enter__()
-        holder.kill()
-        holder.wait()
-    with domain_lock(5, 'left'):
-        assert list(tmp_path.iterdir()) == []
 
 
 def test_namespaces_that_would_share_a_can_bus_do_not_run_at_the_same_time(monkeypatch):

@@ -8,13 +8,9 @@ import pytest
 import mount_bringup
 from mount_bringup.graph.domain import can_port
 from mount_bringup.graph.graph import Graph
-from mount_bringup.graph.launch_arguments import arguments_of
 from mount_bringup.graph.nodes import (
-    CONTROL,
     DRIVER,
-    INIT,
     RECORDER,
-    SIM,
     SIMULATED,
     VEHICLE,
     GraphSettings,
@@ -23,10 +19,9 @@ from mount_bringup.graph.nodes import (
     groups,
     of_mounts,
 )
-from mount_bringup.graph.run import ordered
-from mount_bringup.settings import SettingError, checked_settings
+from mount_bringup.graph.order import launch_order
+from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError
-from mount_sim.plant.mounts import MOUNTS as SEATED
 
 CONFIG = Path(mount_bringup.__file__).parents[1] / 'config'
 MOUNTS = ('left', 'right')
@@ -48,7 +43,7 @@ def order(monkeypatch, tmp_path):
             file = tmp_path / 'own.yaml'
             file.write_text(config)
         given = {'config': file, 'recording': 'bags/first', **given}
-        return ordered([graph, *(f'{name}:={text}' for name, text in given.items())])
+        return launch_order([graph, *(f'{name}:={text}' for name, text in given.items())])
 
     return of_arguments
 
@@ -79,25 +74,18 @@ def test_arguments_win_over_the_file_and_the_file_over_what_is_not_given(paramet
         '/**/mount_driver: {ros__parameters: {port: 9000}}\n'
         '/**/mount_sim: {ros__parameters: {port: 9000}}\n'
     )
-    given = parameters('sim', text, mount='hydro', port='9001', duration='5', fault='coil_open@8, lost_5@6:2')
+    given = parameters('sim', text, mount='hydro', duration='5', fault='coil_open@8, lost_5@6:2')
     assert repr(given['mount_control']['eigenfrequency']) == '9.0'
     assert given['mount_control']['damper'] == 'viscous_3000'
-    assert (given['mount_sim']['port'], given['mount_driver']['port']) == (9001, 9001)
+    assert (given['mount_sim']['port'], given['mount_driver']['port']) == (9000, 9000)
     assert repr(given['mount_sim']['timeline.duration']) == '5.0'
     assert given['mount_sim']['mount'] == 'hydro'
     assert given['mount_sim']['faults'] == ['coil_open@8', 'lost_5@6:2']
-    kept = parameters('sim', text, recording='2026')
-    assert (kept['mount_sim']['port'], kept['mount_driver']['port']) == (9000, 9000)
-    assert kept['mount_recorder']['uri'] == '2026'
+    assert parameters('sim', text, recording='2026')['mount_recorder']['uri'] == '2026'
 
 
 def test_a_mount_that_damps_always_takes_its_control_along(parameters):
     assert parameters('sim', mount='friction_always_on')['mount_control']['switching'] == 'always'
-
-
-def test_every_simulated_mount_stands_in_the_help_of_its_argument():
-    [meaning] = [argument.meaning for argument in arguments_of('sim') if argument.name == 'mount']
-    assert meaning.partition(': ')[2].split(', ') == list(SEATED)
 
 
 def test_without_a_recording_there_is_no_recorder(order):
@@ -106,28 +94,23 @@ def test_without_a_recording_there_is_no_recorder(order):
     assert set(without.settings.parameters) == {'mount_driver', 'mount_sim', 'mount_init', 'mount_control'}
 
 
-def test_duration_place_and_processes_of_an_order(order):
-    car = order('vehicle', duration='30', composed='true', namespace='right', recording='a:=b')
-    assert (car.duration, car.settings.namespace, car.settings.domain) == (30.0, 'right', 7)
-    assert car.settings.grouping is Grouping.COMPOSED
-    assert car.settings.parameters['mount_recorder']['uri'] == 'a:=b'
-    assert order('vehicle').duration == float('inf')
-    assert order('sim', duration='2').duration == float('inf')
+def test_place_and_processes_of_an_order(order):
+    car = order('vehicle', composed='true', namespace='right', recording='a:=b').settings
+    assert (car.namespace, car.domain, car.grouping) == ('right', 7, Grouping.COMPOSED)
+    assert car.parameters['mount_recorder']['uri'] == 'a:=b'
 
 
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
-        ({'recording': ''}, 'a recording needs a folder'),
-        ({'recording': str(CONFIG)}, 'exists already; a recording is never written over'),
         ({'mounts': 'left,top'}, "'top' is no place"),
         ({'mount': 'friction_always_on', 'policy': 'continuous_viscous'}, 'needs mount_control.policy'),
         ({'damper': 'viscous_2000', 'policy': 'continuous_viscous'}, 'add policy:=switched_viscous'),
-        ({'port': '['}, 'mount_driver.port must be a int'),
         ({'duration': 'long'}, 'timeline.duration must be a float'),
+        ({'restarts': 'x'}, 'restarts:=x must be a number within 0 .. 1000'),
         ({'priority': '-1'}, 'priority:=-1 must be a number within 0 .. 98'),
         ({'config': '/nowhere/none.yaml'}, 'parameter file /nowhere/none.yaml cannot be read'),
-        ({'scenary': 'bench'}, 'scenary:=bench is no argument of this launch file; did you mean scenario:=?'),
+        ({'scenary': 'bench'}, "'scenary' is no parameter of sim.launch.py; did you mean scenario"),
         ({'qqq': '1'}, 'known are config'),
         (
             {
@@ -152,11 +135,14 @@ def test_what_cannot_be_is_refused_before_a_process_starts(order, given, words):
 
 @pytest.mark.parametrize(
     ('command', 'words'),
-    [(['car'], 'the first word must be one of vehicle, sim'), (['sim', 'bench'], 'bench is no argument')],
+    [
+        (['car'], 'the first word must be one of vehicle, sim'),
+        (['sim', 'bench'], "'bench' is no parameter of sim.launch.py"),
+    ],
 )
 def test_a_command_that_is_not_written_as_it_must_be_is_refused(command, words):
-    with pytest.raises(SettingError, match=words):
-        ordered(command)
+    with pytest.raises(ParameterError, match=words):
+        launch_order(command)
 
 
 def test_a_simulator_is_no_node_of_the_car(order):
@@ -183,14 +169,13 @@ def test_each_simulated_mount_has_its_nodes_bus_and_parameters(parameters):
     assert [given[f'{mount}/mount_control']['highest_current'] for mount in MOUNTS] == [1.5, 2.0]
 
 
-def test_each_mount_in_the_car_has_its_channel(order, parameters):
-    given = parameters('vehicle', OF_TWO, mounts='left,right', channels='can0, can1')
-    assert [given[f'{mount}/mount_driver']['channel'] for mount in MOUNTS] == ['can0', 'can1']
-    with pytest.raises(ValueError, match='the mounts left and right have one CAN bus, can0'):
-        order('vehicle', OF_TWO, mounts='left,right')
-    for channels in ('can0', 'can0,can0'):
-        with pytest.raises(ValueError, match='must name a channel for each of the mounts'):
-            order('vehicle', OF_TWO, mounts='left,right', channels=channels)
+@pytest.mark.parametrize(
+    ('graph', 'config', 'bus'),
+    [('vehicle', OF_TWO, 'can0'), ('sim', '/**/mount_driver: {ros__parameters: {port: 9000}}', '9000')],
+)
+def test_two_mounts_on_one_bus_are_refused(order, graph, config, bus):
+    with pytest.raises(ValueError, match=f'the mounts left and right have one CAN bus, {bus}'):
+        order(graph, config, mounts='left,right')
 
 
 def test_a_file_gives_each_mount_in_the_car_its_channel_and_one_of_them_its_own_friction(parameters):
@@ -224,21 +209,6 @@ def test_nodes_of_each_mount_start_side_by_side_and_end_before_the_electronics()
     assert names(ending_order(VEHICLE)) == [name for name in ended if name != 'mount_sim']
 
 
-@pytest.mark.parametrize(
-    ('grouping', 'expected'),
-    [
-        (Grouping.APART, [[RECORDER], [DRIVER], [SIM], [INIT], [CONTROL]]),
-        (Grouping.COMPOSED, [[RECORDER], [DRIVER, INIT, CONTROL], [SIM]]),
-        (Grouping.TOGETHER, [[RECORDER, DRIVER, SIM, INIT, CONTROL]]),
-    ],
-)
-def test_which_nodes_share_a_process(grouping, expected):
-    assert groups(SIMULATED, grouping) == expected
-    composed = [names(group) for group in groups(of_mounts(SIMULATED, MOUNTS), Grouping.COMPOSED)]
-    assert ['right/mount_driver', 'right/mount_init', 'right/mount_control'] in composed
-    assert len(composed) == 4
-
-
 def test_topics_that_are_waited_for_are_those_of_the_mount():
     nodes = recorder, left, right = of_mounts((RECORDER, DRIVER), MOUNTS)
     graph = Graph(nodes, GraphSettings(namespace='/car'))
@@ -249,3 +219,11 @@ def test_topics_that_are_waited_for_are_those_of_the_mount():
     assert graph.missing_topics(recorder) == ['/car/left/current_setpoint', '/car/right/displacement']
     graph.figures = lambda node: {}
     assert graph.missing_topics(left) == ['its first diagnostics']
+
+
+def test_which_nodes_share_a_process():
+    assert groups(SIMULATED, Grouping.APART) == [[node] for node in SIMULATED]
+    assert groups(SIMULATED, Grouping.TOGETHER) == [[*SIMULATED]]
+    composed = [names(group) for group in groups(of_mounts(SIMULATED, MOUNTS), Grouping.COMPOSED)]
+    assert ['right/mount_driver', 'right/mount_init', 'right/mount_control'] in composed
+    assert len(composed) == 4

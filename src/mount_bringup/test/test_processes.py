@@ -1,9 +1,7 @@
 """What the processes of the graph are given besides their parameters."""
 
-import time
-
 import pytest
-from ros_testing import LIMIT, wait_until
+from ros_testing import wait_until
 
 from mount_bringup.graph import processes
 from mount_bringup.graph.nodes import CONTROL, DRIVER, RECORDER, GraphSettings
@@ -34,41 +32,6 @@ def test_modules_in_the_working_directory_are_not_imported(tmp_path, monkeypatch
     monkeypatch.setattr(processes, '_program', lambda *_: 'import queue, yaml')
     process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
     assert process.wait() == 0, process.last_words()
-
-
-@pytest.fixture
-def held(tmp_path, monkeypatch):
-    """Return a process that has loaded a module of its own and makes no node yet."""
-    (tmp_path / 'loaded.py').write_text('print("loaded", flush=True)\ndef run_nodes(classes): print("begun")')
-    program = processes._program([CONTROL], '')
-    for module in ('mount_ros.nodes.process', 'mount_control.node'):
-        program = program.replace(module, 'loaded')
-    monkeypatch.setattr(
-        processes,
-        '_program',
-        lambda *_: f'MountControl = int; {program}'.replace(
-            'from loaded import MountControl', 'import loaded'
-        ),
-    )
-    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    process = processes.NodeProcess([CONTROL], GraphSettings(), tmp_path)
-    end = time.monotonic() + LIMIT
-    while 'loaded' not in process.log_file.read_text():
-        assert time.monotonic() < end, process.log_file.read_text()
-        time.sleep(0.01)
-    return process
-
-
-def test_a_process_loads_at_once_and_makes_its_nodes_when_told_to(held):
-    assert held.exit_code is None
-    held.begin()
-    assert held.wait() == 0
-    assert held.log_file.read_text() == 'loaded\nbegun\n'
-
-
-def test_a_process_that_has_made_nothing_yet_is_ended_without_a_complaint(held):
-    assert ended([held]) == []
-    assert held.exit_code is not None
 
 
 def ended(processes_, *, at_once=False):
@@ -129,7 +92,7 @@ def started(monkeypatch, folder, node, program, settings=None):
     monkeypatch.setattr(processes, '_program', lambda *_: program)
     process = processes.NodeProcess([node], settings or GraphSettings(), folder)
     wait_until(lambda: 'up' in process.log_file.read_text(), 'the process')
-    process.begin()
+    process.begun = True
     return process
 
 
@@ -138,7 +101,7 @@ def started(monkeypatch, folder, node, program, settings=None):
 def test_each_frozen_process_is_killed_and_named(tmp_path, monkeypatch, at_once):
     frozen = [started(monkeypatch, tmp_path, node, STANDING) for node in (DRIVER, CONTROL)]
     told = ended(frozen, at_once=at_once)
-    assert [sentence.split(' after')[0] for sentence in told] == [
+    assert [sentence.split(':')[0] for sentence in told] == [
         'mount_control ended with code -9',
         'mount_driver ended with code -9',
     ]
@@ -165,5 +128,5 @@ def test_a_process_that_died_before_the_end_is_told_once(tmp_path, monkeypatch):
     dead = [started(monkeypatch, tmp_path, node, 'print("up"); exit(3)') for node in (DRIVER, CONTROL)]
     wait_until(lambda: all(process.exit_code is not None for process in dead), 'their ends')
     dead[1].reported = True
-    told = f'mount_driver ended with code 3 before the end of the graph: up (log: {dead[0].log_file})'
+    told = f'mount_driver ended with code 3: up (log: {dead[0].log_file})'
     assert ended(dead) == [told]

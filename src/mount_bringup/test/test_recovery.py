@@ -24,7 +24,6 @@ from mount_bringup.graph.nodes import (
     SIMULATED,
     GraphError,
     GraphSettings,
-    of_mounts,
 )
 from mount_bringup.graph.recovery import (
     ACTIONS,
@@ -40,7 +39,6 @@ MEASURING = {'state': 'active', 'restarts': '0', 'gaps': '0', 'samples': '9000',
              'last_stamp': '10000000000', 'sample_rate': '1000.0'}  # fmt: skip
 LATCHED = {'state': 'active', 'last_stamp': '4000000000'}
 INITIALISED = ['activate mount_driver', 'activate mount_init', 'activate mount_control']
-MOUNTS = ['left', 'right']
 
 
 @pytest.mark.parametrize(
@@ -96,7 +94,7 @@ class Graph:
     """A graph that notes what is done; while `during` is configured, `lost` fails."""
 
     def __init__(self, folder='', nodes=SIMULATED, resting=()):
-        self.nodes, self.resting, self.done, self.reports = nodes, resting, [], self
+        self.nodes, self.resting, self.done = nodes, resting, []
         self.settings = GraphSettings(parameters={RECORDER.name: {'uri': f'{folder}/recording'}})
         self.last = {node.full_name: {'state': 'active'} for node in nodes}
         self.last |= {DRIVER.name: dict(MEASURING), INIT.name: dict(LATCHED)}
@@ -161,7 +159,7 @@ def recovered(graph):
 
     def recover(*nodes, limit=3, times=1, reason='lost'):
         graph.settings = replace(graph.settings, restart_limit=limit)
-        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)], graph.activate), []
+        recovery, reports = Recovery(graph, [*map(graph.process, graph.nodes)]), []
         recovery.report = reports.append
         for _ in range(times):
             recovery.recover(NodesFailedError(nodes, reason))
@@ -294,61 +292,34 @@ def test_failures_of_long_ago_do_not_count(graph, recovered, monkeypatch):
     assert graph.done.count('start mount_init') == 4
 
 
-def initialised_again(graph, mount):
-    return Recovery(graph, [], graph.activate).initialise_again(mount)
-
-
 @pytest.mark.parametrize('resting', [(), (CONTROL.name,)])
 def test_damping_ends_first_and_the_control_comes_back_last_even_if_it_was_refused_before(resting):
     graph = Graph(resting=resting)
-    assert initialised_again(graph, '') == 'mount_init: gap of mount_init'
+    assert Recovery(graph, []).initialise_again() == 'mount_init: gap of mount_init'
     assert graph.done == [*OFF[len(resting) :], 'match', *INITIALISED]
 
 
-def test_of_several_mounts_one_is_initialised_or_all():
-    graph, both = (Graph(nodes=of_mounts(SIMULATED, MOUNTS)) for _ in range(2))
-    assert initialised_again(graph, 'right') == 'right/mount_init: gap of right/mount_init'
-    assert not any('left' in step for step in graph.done)
-    gaps = initialised_again(both, '')
-    assert gaps == '; '.join(f'{mount}/mount_init: gap of {mount}/mount_init' for mount in MOUNTS)
-    controls, inits = (
-        [both.done.index(f'deactivate {mount}/{kind.name}') for mount in MOUNTS] for kind in (CONTROL, INIT)
-    )
-    assert max(controls) < min(inits) < both.done.index('match')
-
-
-@pytest.fixture
-def service(domain, tmp_path):
-    """Return the function that calls the service of a supervisor, and its answer."""
-    graph = Supervisor(of_mounts((DRIVER,), MOUNTS), GraphSettings(domain=domain), tmp_path)
+def test_the_service_answers_with_the_gaps_or_the_reason_and_the_graph_is_served_meanwhile(domain, tmp_path):
+    graph = Supervisor((DRIVER,), GraphSettings(domain=domain), tmp_path)
     graph.open()
 
-    def answer_of(initialise=None, mount=''):
-        graph._recovers = initialise is not None
-        graph.recovery.initialise_again = lambda mount: initialise(graph, mount)
-        answer = graph.call(Trigger, f'/engine_mount_supervisor/{mount}reinitialize')
-        return answer.success, answer.message
-
-    yield answer_of
-    assert graph.stop() == []
-
-
-def test_the_answer_holds_the_gaps_and_the_graph_is_served_meanwhile(service):
-    def initialise(graph, mount):
+    def initialise():
         served = []
         graph.node.create_timer(0.01, lambda: served.append(True))
         graph.wait_until(lambda: bool(served), LIMIT, 'a timer')
-        return f'mount_init of {mount!r}'
+        return 'the gaps'
 
-    assert service(initialise, 'right/') == (True, "initialised anew; mount_init of 'right'")
+    def refuse():
+        raise GraphError('no pads')
 
-
-def test_a_refusal_is_answered_with_its_reason(service):
-    def refuse(graph, mount):
-        raise GraphError('mount_init refused to activate: no pads')
-
-    reason = 'not initialised, the coil stays at 0 A: mount_init refused to activate: no pads'
-    assert service(refuse) == (False, reason)
-    success, message = service()
-    assert not success
-    assert message.startswith('not initialised: the graph starts, recovers or runs in lock-step')
+    answers = []
+    for step in (None, initialise, refuse):
+        graph._recovers, graph.recovery.initialise_again = step is not None, step
+        answer = graph.call(Trigger, '/engine_mount_supervisor/reinitialize')
+        answers.append((answer.success, answer.message.partition('; ')[0]))
+    assert graph.stop() == []
+    assert answers == [
+        (False, 'not initialised: the graph starts, recovers or runs in lock-step'),
+        (True, 'initialised anew'),
+        (False, 'not initialised, the coil stays at 0 A: no pads'),
+    ]

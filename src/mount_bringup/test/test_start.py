@@ -9,7 +9,7 @@ import pytest
 
 NAMES = [
     *('mount_driver', 'mount_init', 'mount_control', 'mount_sim', 'mount_recorder'),
-    *('mount_supervisor', 'mount_prepare'),
+    'mount_supervisor',
 ]
 
 START = 'import sys; sys.argv[0] = {!r}; from mount_ros.start import main; main()'
@@ -33,6 +33,7 @@ def test_ctrl_c_while_an_executable_loads_leaves_no_traceback(tmp_path, name):
 
 
 def test_an_executable_runs_its_module():
-    program = [sys.executable, '-c', START.format('bin/mount_supervisor'), '--help']
-    ended = subprocess.run(program, capture_output=True, text=True, check=True)
-    assert ended.stdout.startswith('usage: mount_supervisor')
+    program = [sys.executable, '-c', START.format('bin/mount_supervisor'), 'car']
+    ended = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "graph 'car' is unknown" in ended.stdout + ended.stderr

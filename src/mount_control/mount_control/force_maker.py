@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.interpolation import each_interpolated
 from mount_models.arithmetic.record import record_type
+from mount_models.arithmetic.sums import each_interpolated
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step_with, speed_terms

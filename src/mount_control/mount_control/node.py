@@ -38,7 +38,6 @@ from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import Change, SpecimenValues, declare
 from mount_ros.nodes.process import run_node
-from mount_ros.publishers import UnnamedPublisher
 from mount_ros.timing import LatencyHistogram
 
 _MEASURED_BEFORE = (
@@ -69,7 +68,6 @@ class MountControl(SafeLifecycleNode):
         self.loop = ControlLoop()
         self._activation = Activation()
         self._foreign = False  # whether another node publishes what this one subscribes to
-        self._nameless = UnnamedPublisher()
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
         self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
@@ -104,7 +102,7 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
@@ -114,7 +112,7 @@ class MountControl(SafeLifecycleNode):
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
-        self.report_publisher_conflict()
+        self.data_path.publisher_watch.report()
         self.get_logger().info(
             f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
             f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
@@ -166,8 +164,7 @@ class MountControl(SafeLifecycleNode):
             longest_silence=self._settings.parameters.longest_bridge,
             step_median=self._latency.quantile(0.5),
             step_p99=self._latency.quantile(0.99),
-            # In lock-step a supervisor ends the graph, with the name of the other node where there is one.
-            foreign_is_fatal=not self._nameless.is_awaited(loop.nameless) and self.lockstep,
+            foreign_is_fatal=self.lockstep,  # then a supervisor ends the graph
             unread_reason=self._unread_reason,
             values={
                 'policy': self._settings.parameters.policy,

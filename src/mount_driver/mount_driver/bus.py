@@ -7,22 +7,20 @@ That interface joins the group on the default route, so it needs a network. `Loo
 the loopback interface: it needs none, and no frame that moves an actuator can leave the machine.
 """
 
-import contextlib
 import ctypes
 import errno
 import ipaddress
-import math
-import os
 import select
 import socket
 import struct
 from collections.abc import Sequence
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import msgpack
 
-from mount_driver.can_library import VirtualBus, can, pack_message
+from mount_driver.can_library import SocketcanBus, VirtualBus, can, pack_message
 
 MULTICAST_GROUP = '239.74.163.2'  # python-can's default IPv4 group, of administrative scope
 MULTICAST_PORT = 43113  # python-can's default port
@@ -65,43 +63,29 @@ class Frame(can.Message):
 
 
 def open_bus(
-    interface: str,
-    channel: str,
-    *,
-    receive: Sequence[int] = (),
-    port: int = MULTICAST_PORT,
-    bitrate: int = 500_000,
-    data_bitrate: int = 2_000_000,
+    interface: str, channel: str, *, receive: Sequence[int] = (), port: int = MULTICAST_PORT
 ) -> can.BusABC:
     """Return an open CAN FD bus that delivers the frames with the identifiers `receive` (empty: all).
 
-    `port` is that of `udp_multicast`; `bitrate` and `data_bitrate` (bit/s) are for adapters that
-    python-can sets up itself: those of SocketCAN are set with `ip link`. Raises `CanLinkError`.
+    `port` is that of `udp_multicast`; the bit rates of `socketcan` are set with `ip link`. Raises
+    `CanLinkError`.
     """
     filters = [{'can_id': number, 'can_mask': 0x7FF, 'extended': False} for number in receive] or None
-    tried = f'CAN interface {interface!r}, channel {channel!r}'
-    options: dict[str, Any] = {}
-    if interface == 'udp_multicast':
-        tried += f', port {port}'
-    elif interface == 'virtual':
-        options['protocol'] = can.CanProtocol.CAN_FD
-    elif interface != 'socketcan':
-        tried += f', {bitrate} and {data_bitrate} bit/s'
-        options |= {'bitrate': bitrate, 'data_bitrate': data_bitrate}
     try:
+        if interface == 'udp_multicast':
+            return LoopbackMulticastBus(channel, port, can_filters=filters)
+        if interface == 'virtual':
+            return VirtualBus(channel, protocol=can.CanProtocol.CAN_FD, can_filters=filters)
         if interface == 'socketcan':
             _check_socketcan(channel)
-        if interface == 'udp_multicast':
-            bus: can.BusABC = LoopbackMulticastBus(channel, port, can_filters=filters)
-        else:  # without python-can's configuration files: only our own parameters decide
-            options |= {'can_filters': filters, 'fd': True, 'ignore_config': True}
-            bus = can.Bus(interface=interface, channel=channel, **options)
-    except Exception as error:
-        # The adapters of python-can raise whatever they like, even NameError where a driver is missing.
-        remedy = _remedy(interface, channel, error, bitrate, data_bitrate)
-        raise CanLinkError(f'{tried} does not open: {error}; {remedy}') from error
-    _widen_receive_buffer(bus)
-    return bus
+            bus = SocketcanBus(channel, can_filters=filters, fd=True)
+            bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+            return bus
+        raise ValueError('known interfaces are socketcan, udp_multicast and virtual')
+    except Exception as error:  # python-can raises whatever it likes
+        remedy = _remedy(interface, channel, error)
+        tried = f'CAN interface {interface!r}, channel {channel!r}, port {port}'
+        raise CanLinkError(f'{tried} does not open: {error}{remedy}') from error
 
 
 class Reception:
@@ -148,11 +132,8 @@ class LoopbackMulticastBus(can.BusABC):
         super().__init__(channel, can_filters)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
-        """Send one frame; raises `can.CanOperationError`."""
-        try:
-            self._sender.sendto(pack_message(msg), self._destination)
-        except OSError as error:
-            raise can.CanOperationError(f'sending failed: {error.strerror}', error.errno) from error
+        """Send one frame; raises `OSError`."""
+        self._sender.sendto(pack_message(msg), self._destination)
 
     def fileno(self) -> int:
         """Return the receiving socket's file number."""
@@ -173,7 +154,10 @@ class LoopbackMulticastBus(can.BusABC):
             return None, False
         except OSError as error:
             raise can.CanOperationError(f'receiving failed: {error.strerror}', error.errno) from error
-        message = _message(datagram, _arrival(ancillary))
+        message = _message(datagram)
+        for _, _, data in ancillary:  # the time of arrival alone
+            seconds, nanoseconds = _TIME.unpack_from(data)
+            message.timestamp = seconds + 1e-9 * nanoseconds
         # Like SocketCAN: error frames pass the filter, because they show the state of the bus.
         return message, message.is_error_frame or message.arbitration_id in self._received
 
@@ -185,8 +169,7 @@ def _check_socketcan(channel: str, interfaces: Path = Path('/sys/class/net')) ->
     """Refuse an interface that is missing, down or not in FD mode, which would show only when sending."""
     folder = interfaces / channel
     if not folder.exists():
-        known = sorted(path.name for path in interfaces.glob('*can*'))
-        raise OSError(f'no such network interface; there are {", ".join(known) or "no CAN interfaces"}')
+        raise OSError('no such network interface')
     if (folder / 'operstate').read_text().strip() == 'down':
         raise OSError('the interface is down')
     mtu = int((folder / 'mtu').read_text())
@@ -194,41 +177,26 @@ def _check_socketcan(channel: str, interfaces: Path = Path('/sys/class/net')) ->
         raise OSError(f'the interface is not in CAN FD mode: its MTU is {mtu}, needed is {_CAN_FD_MTU}')
 
 
-def _remedy(interface: str, channel: str, error: Exception, bitrate: int, data_bitrate: int) -> str:
-    number = getattr(error, 'errno', None)
+def _remedy(interface: str, channel: str, error: Exception) -> str:
     if interface == 'socketcan':
-        if number in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT):
-            return 'this kernel has no CAN sockets: load can_raw, or use udp_multicast on one machine'
-        settings = f'type can bitrate {bitrate} dbitrate {data_bitrate} fd on'
-        return f'is it up? `ip link set {channel} up {settings}`'
-    if interface == 'udp_multicast':
-        if isinstance(error, ValueError):
-            return f'the channel must be an IPv4 multicast address such as {MULTICAST_GROUP}'
-        if number in (errno.EADDRNOTAVAIL, errno.ENODEV, errno.ENETUNREACH):
-            return 'the loopback interface is down: `ip link set lo up`'
-        return 'is the port free, and may this user open UDP sockets?'
-    known = ', '.join(sorted(can.VALID_INTERFACES))
-    if interface not in can.VALID_INTERFACES:
-        return f'known interfaces are {known}'
-    return 'is the adapter plugged in, its driver installed and does it know CAN FD?'
+        if getattr(error, 'errno', None) in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT):
+            return '; this kernel has no CAN sockets: load can_raw, or use udp_multicast on one machine'
+        settings = 'type can bitrate 500000 dbitrate 2000000 fd on'
+        return f'; is it up? `ip link set {channel} up {settings}`'
+    if interface != 'udp_multicast':
+        return ': an adapter has a socketcan interface where Linux has its driver'
+    if isinstance(error, ValueError):
+        return f'; the channel must be an IPv4 multicast address such as {MULTICAST_GROUP}'
+    return '; is the port free and the loopback interface up (`ip link set lo up`)?'
 
 
-def _widen_receive_buffer(bus: can.BusABC) -> None:
-    try:
-        number = bus.fileno()
-    except NotImplementedError:
-        return  # buses without a socket have a queue without a limit
-    with contextlib.suppress(OSError), socket.socket(fileno=os.dup(number)) as sock:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
-
-
-def _message(datagram: bytes, arrival: float) -> can.Message:
+def _message(datagram: bytes) -> can.Message:
     """Return the frame in a datagram; what another program sent raises whatever its content leads to."""
     fields = msgpack.unpackb(datagram)
     # python-can takes any object for an identifier, and a number for so many bytes of data.
     if not (isinstance(fields['arbitration_id'], int) and isinstance(fields['data'], bytes)):
         raise TypeError('a datagram of another form')
-    fields['timestamp'] = arrival
+    fields['timestamp'] = nan  # that of the sender
     return can.Message(**fields)
 
 
@@ -237,38 +205,21 @@ def _receiving_socket(channel: str, port: int) -> socket.socket:
     if not address.is_multicast:
         raise ValueError(f'{channel} is no multicast address')
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        sock.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
-        sock.bind(('', port))
-        membership = address.packed + socket.inet_aton(_LOOPBACK)
-        sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-        sock.setblocking(False)
-    except OSError:
-        sock.close()
-        raise
+    options = (socket.SO_REUSEADDR, 1), (socket.SO_REUSEPORT, 1), (_SO_TIMESTAMPNS, 1)
+    for option, value in (*options, (socket.SO_RCVBUF, _RECEIVE_BUFFER)):
+        sock.setsockopt(socket.SOL_SOCKET, option, value)
+    sock.bind(('', port))
+    membership = address.packed + socket.inet_aton(_LOOPBACK)
+    sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    sock.setblocking(False)
     return sock
-
-
-def _arrival(ancillary: list[tuple[int, int, bytes]]) -> float:
-    """Return the system time (s) at which the kernel received the datagram; NaN where it did not say."""
-    for level, kind, data in ancillary:
-        if (level, kind) == (socket.SOL_SOCKET, _SO_TIMESTAMPNS):
-            seconds, nanoseconds = _TIME.unpack_from(data)
-            return seconds + 1e-9 * nanoseconds
-    return math.nan
 
 
 def _sending_socket() -> socket.socket:
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
-        sock.bind(('', 0))
-    except OSError:
-        sock.close()
-        raise
+    sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+    sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(_LOOPBACK))
+    sock.bind(('', 0))
     return sock
 
 

@@ -14,6 +14,7 @@ if _absent:
 try:
     import can
     import cantools
+    from can.interfaces.socketcan import SocketcanBus
     from can.interfaces.udp_multicast.utils import pack_message
     from can.interfaces.virtual import VirtualBus
     from cantools.database.can import Database, Message
@@ -22,4 +23,6 @@ finally:
     if _absent:
         del sys.modules[_BESIDE]
 
-__all__ = ['Database', 'Message', 'Signal', 'VirtualBus', 'can', 'cantools', 'pack_message']
+__all__ = [
+    'Database', 'Message', 'Signal', 'SocketcanBus', 'VirtualBus', 'can', 'cantools', 'pack_message',
+]  # fmt: skip

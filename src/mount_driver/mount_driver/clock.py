@@ -3,7 +3,7 @@
 `ElectronicsClock` is for real time, `CounterClock` for lock-step.
 """
 
-import math
+from math import inf
 
 from mount_models.sampling import SAMPLE_TIME_NS
 
@@ -102,7 +102,11 @@ class ElectronicsClock:
         arrival = received_monotonic_ns + self._epoch_offset
         if not self._running or step > _GAP_US:
             if self._running:
-                self._report_jump(step, received_monotonic_ns)
+                waited = (received_monotonic_ns - self._received) // _NS
+                if abs(step - waited % _WRAP) <= _GAP_US:
+                    self.gaps += 1
+                else:
+                    self.restarts += 1
             self._begin(arrival)
         elif step:
             self._elapsed += step
@@ -131,7 +135,7 @@ class ElectronicsClock:
         self._slope = (self.drift + correction) * _NS
         self._base = self._stamp
         self._elapsed = 0
-        self._earliest = math.inf
+        self._earliest = inf
 
     def _end_block(self) -> None:
         earliest = self._earliest - self._elapsed * self._correction * _NS  # what is left of it now
@@ -154,13 +158,6 @@ class ElectronicsClock:
             limit = _SLEW_LIMIT - abs(self.drift)
             correction = min(max(_PHASE_GAIN * error, -limit), limit)
         self._begin_block(correction)
-
-    def _report_jump(self, step: int, received: int) -> None:
-        waited = (received - self._received) // _NS
-        if abs(step - waited % _WRAP) <= _GAP_US:
-            self.gaps += 1
-        else:
-            self.restarts += 1
 
 
 Clock = CounterClock | ElectronicsClock

@@ -4,18 +4,16 @@ No ROS here: samples leave by a callback, setpoints come in by `send_setpoint` f
 """
 
 import atexit
-import math
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import replace
 
 from mount_driver.bus import CanLinkError, Frame, Reception, may_have_frames, open_bus
 from mount_driver.can_library import can
 from mount_driver.clock import Clock
-from mount_driver.layout import FrameError
-from mount_driver.link import Arrival, Counts, Fault, Link, Refusal, Stamped
+from mount_driver.link import Counts, Fault, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec, Setpoint
 from mount_driver.watches.guard import Guard
@@ -24,7 +22,6 @@ from mount_driver.watches.ripple_law import RippleLaw
 from mount_models.sampling import sample_time_ns
 
 _WAKE = 0.02  # s, chosen: longest sleep of the receiving thread when no frames come
-_REOPEN_PERIOD = 0.2  # s, chosen
 _OFF_FRAMES = 3  # chosen: so that one lost frame does not leave the coil on until the electronics' own watch
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
 
@@ -54,13 +51,10 @@ class Exchange:
         heat: HeatWatch | None = None,
         law: RippleLaw | None = None,
     ):
-        sample_time = sample_time_ns(parameters.sample_rate)
-        self.link = Link(codec, clock, round(parameters.setpoint_timeout * 1e9), sample_time)
+        self.link = Link(codec, clock, sample_time_ns(parameters.sample_rate))
         self.reception = Reception()
         self.failure = ''
         """Why the exchange has ended on its own; empty while it runs."""
-        self.trouble = ''
-        """What is wrong with the bus at present; empty when nothing is."""
         self.bus_off = False
         self.unsent_reason = ''
         """Why the bus did not take the last setpoint frame of `Counts.unsent`."""
@@ -76,7 +70,6 @@ class Exchange:
         self._steady = steady
         heat = heat or HeatWatch(parameters.heating)
         self.guard = Guard(parameters, codec, clock, self.link, heat, law or RippleLaw())
-        self._ids = (codec.measurement.frame_id, codec.status.frame_id, codec.setpoint.frame_id)
         self._measurement_id = codec.measurement.frame_id
         self._bus: can.BusABC | None = None
         self._alive = 0  # counter of the next frame
@@ -93,7 +86,10 @@ class Exchange:
 
     def start(self, *, threaded: bool = True) -> None:
         """Open the bus and begin to receive, in threads or by `poll`; raises `CanLinkError`."""
-        self._bus = self._open()
+        p, codec = self._parameters, self._codec
+        messages = codec.measurement, codec.status, codec.setpoint
+        receive = [message.frame_id for message in messages]
+        self._bus = open_bus(p.interface, p.channel, receive=receive, port=p.port)
         self._accepting = True
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
         loops = {'can_receive': self._serve} if threaded else {}
@@ -121,7 +117,7 @@ class Exchange:
         """Send the current (A) that answers the sample of `stamp` (ns) at once; False if it was refused."""
         with self._sending:
             link = self.link
-            if not self._accepting or self.bus_off or self.trouble:
+            if not self._accepting or self.bus_off:
                 link.refuse(Refusal.BUS_LOST)
                 return False
             guard = self.guard
@@ -174,19 +170,18 @@ class Exchange:
             self._fail(error)
 
     def _attempt(self, wait: float) -> bool:
-        """Handle the frame that comes within `wait` s; what cannot be recovered ends the exchange safely."""
+        """Handle the frame that comes within `wait` s; what is raised ends the exchange safely."""
         try:
-            try:
-                return self._receive(wait)
-            except can.CanError as error:
-                self._recover(error)
+            return self._receive(wait)
         except BaseException as error:
             self._fail(error)
         return False
 
     def _fail(self, error: BaseException) -> None:
         """End the exchange at 0 A with the reason: the border of its threads."""
-        self.failure = str(error) if isinstance(error, CanLinkError) else _named(error)
+        self.failure = _named(error)
+        if isinstance(error, can.CanError):
+            self.failure = f'CAN bus lost ({error}): activate mount_driver again when it is back'
         try:
             self._leave_off()
         except CanLinkError as unsent:
@@ -223,7 +218,7 @@ class Exchange:
         """Take a measurement frame that is no new sample."""
         self.switch_off(self.guard.judge_frame(received))
         latest = self.link.latest
-        if self.link.arrival is Arrival.RESENT and latest is not None:
+        if self.link.resent and latest is not None:
             with self._sending:
                 setpoint = self.link.answer_again(latest.sample.sample_counter, self._now())
                 if setpoint is not None:
@@ -242,19 +237,18 @@ class Exchange:
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
         self.switch_off(self.guard.judge_status(status, self._now()))
-        if status is None or latest is None or math.isnan(status.coil_temperature_celsius):
-            return
         # The frame has no time of its own. A second one without a sample between has none at all.
-        if latest.stamp != self._temperature_stamp:
-            self._temperature_stamp = latest.stamp
-            self._on_temperature(latest.stamp, status.coil_temperature_celsius)
+        if status is not None and latest is not None and latest.stamp != self._temperature_stamp:
+            celsius = status.coil_temperature_celsius
+            if celsius == celsius:
+                self._temperature_stamp = latest.stamp
+                self._on_temperature(latest.stamp, celsius)
 
     def _take_foreign_setpoint(self, message: can.Message) -> None:
-        try:
-            _, setpoint = self._codec.decode_setpoint(message.data)
-        except FrameError:
+        layout = self._codec.setpoint
+        if not layout.is_sound(message.data):
             return  # nor do the electronics use it, and their status reports it
-        self.switch_off(self.guard.judge_foreign(setpoint, self._now()))
+        self.switch_off(self.guard.judge_foreign(layout.decode(message.data)[1]))
         # One frame with 0 A behind each of the other sender's keeps its sequence from being believed.
         with self._sending:
             self._send(self.link.off())
@@ -265,8 +259,6 @@ class Exchange:
     def _send(self, setpoint: Setpoint) -> bool:
         """Send one frame and return whether the bus took it; call it with the lock held."""
         bus = self._bus
-        if bus is None:
-            self.unsent_reason = self.trouble
         if bus is None or not self._accepting:
             return False
         try:
@@ -295,40 +287,6 @@ class Exchange:
                 f'{taken.count(False)} of {_OFF_FRAMES} frames with 0 A were not taken by the bus '
                 f'({self.unsent_reason}); the electronics go to 0 A by their own watch'
             )
-
-    def _recover(self, error: can.CanError) -> None:
-        """Open the bus again and again until it works, `stop` is called, or the time is over."""
-        self.trouble = str(error)
-        deadline = time.monotonic() + self._parameters.recovery_time
-        while not self._ending.is_set():
-            with self._sending:
-                with suppress(Exception):  # it is lost already: how it ends is of no interest
-                    self._close()
-                try:
-                    self._bus = self._open()
-                except CanLinkError as refused:
-                    self.trouble = str(refused)
-                else:
-                    self.trouble = ''
-                    self.link.counts.recoveries += 1
-                    return
-            if time.monotonic() > deadline:
-                raise CanLinkError(
-                    f'{self.trouble}; given up after {self._parameters.recovery_time:g} s, '
-                    f'activate the driver again when the bus is back'
-                ) from error
-            self._ending.wait(_REOPEN_PERIOD)
-
-    def _open(self) -> can.BusABC:
-        p = self._parameters
-        return open_bus(
-            p.interface,
-            p.channel,
-            receive=self._ids,
-            port=p.port,
-            bitrate=p.bitrate,
-            data_bitrate=p.data_bitrate,
-        )
 
     def _close(self) -> None:
         bus, self._bus = self._bus, None

@@ -5,9 +5,10 @@ kHz. So the positions, lengths, signs, scales and limits are read from its datab
 call of a compiled bit field does the work. A test holds the result against cantools.
 """
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from decimal import Decimal
+from math import nan
+from typing import Generic, TypeVar
 
 import bitstruct.c
 from e2e.p05 import e2e_p05_check, e2e_p05_protect
@@ -15,13 +16,11 @@ from e2e.p05 import e2e_p05_check, e2e_p05_protect
 from mount_driver.can_library import Message, Signal
 from mount_models.quantity import ParameterError
 
+M = TypeVar('M')
+
 # Steps from the DBC's units to SI; other units are kept and appear in the name of the field.
 _SI_FACTORS = {'mm': Decimal('0.001')}
 _E2E_ATTRIBUTES = 'E2EDataId', 'E2EMaxDeltaCounter', 'E2ESyncFrames'
-
-
-class FrameError(ValueError):
-    """A frame has not the length of its message, or its CRC does not fit: it is damaged, or another one."""
 
 
 class Scaling:
@@ -48,22 +47,24 @@ class Scaling:
 
     def within(self, value: float) -> float:
         """Return `value`, or NaN where it lies outside the limits."""
-        return value if self.raw_low <= value * self.steps <= self.raw_high else math.nan
+        return value if self.raw_low <= value * self.steps <= self.raw_high else nan
 
     def to_si(self, raw: int) -> float:
         """Return the SI value of a raw number, the nearest float64; NaN where it lies outside the limits."""
-        return raw / self.steps if self.raw_low <= raw <= self.raw_high else math.nan
+        return raw / self.steps if self.raw_low <= raw <= self.raw_high else nan
 
 
-class MessageLayout:
+class MessageLayout(Generic[M]):
     """Packs and unpacks the raw numbers of one message, in the order of the wire."""
 
-    def __init__(self, message: Message):
+    def __init__(self, message: Message, message_of: Callable[[tuple[int, ...]], M | None]):
+        """`message_of` returns the message of the raw numbers, None where its content is not allowed."""
         signals = sorted(message.signals, key=lambda signal: signal.start)
         self.name = message.name
         self.names = tuple(signal.name for signal in signals)
         self.frame_id = message.frame_id
         self.length = message.length
+        self.message_of = message_of
         attributes = message.dbc.attributes
         self.data_id, self.max_delta_counter, self.sync_frames = (
             attributes[name].value for name in _E2E_ATTRIBUTES
@@ -73,23 +74,20 @@ class MessageLayout:
         """Between the raw numbers, the last one first, and the reversed bytes of a message."""
 
     def pack(self, raw: Sequence[int]) -> bytearray:
-        """Return the message with these raw numbers and its CRC; raises `ParameterError`."""
-        try:
-            data = bytearray(self.pack_bits(*raw[::-1]))
-        except OverflowError:
-            numbers = ', '.join(f'{name} {number}' for name, number in zip(self.names, raw, strict=True))
-            raise ParameterError(f'{self.name}: a number does not fit its bits: {numbers}') from None
+        """Return the message with these raw numbers and its CRC; raises `OverflowError`."""
+        data = bytearray(self.pack_bits(*raw[::-1]))
         data.reverse()
         e2e_p05_protect(data, self.data_id, increment_counter=False)
         return data
 
-    def unpack(self, data: bytes | bytearray) -> tuple[int, ...]:
-        """Return the raw numbers of a message; raises `FrameError`."""
-        if len(data) != self.length:
-            raise FrameError(f'frame 0x{self.frame_id:X} has {len(data)} bytes; the DBC has {self.length}')
-        if not e2e_p05_check(data, self.data_id):
-            raise FrameError(f'frame 0x{self.frame_id:X} fails its CRC; the frame is not used')
-        return self.unpack_bits(data[::-1])[::-1]
+    def is_sound(self, data: bytes | bytearray) -> bool:
+        """Return whether a frame has the length of this message and a CRC that fits."""
+        return len(data) == self.length and e2e_p05_check(data, self.data_id)
+
+    def decode(self, data: bytes | bytearray) -> tuple[int, M | None]:
+        """Return alive counter and message of a sound frame, whatever came before it."""
+        raw = self.unpack_bits(data[::-1])[::-1]
+        return raw[1], self.message_of(raw)
 
 
 def _reversed_bit_format(length: int, signals: Sequence[Signal]) -> str:

@@ -9,12 +9,12 @@ setpoint timeout. So nothing but a new sample and its own answer prolongs it, ev
 
 from collections import deque
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum
 from typing import NamedTuple
 
 from mount_driver.clock import Clock
 from mount_driver.protocol import E2EReceiver, Measurement, MountCodec, Outcome, Setpoint, Status
-from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS
+from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
 _COUNTER_MASK = 0xFFFF
@@ -29,19 +29,6 @@ _RATE_TOLERANCE = 0.2  # of the period, chosen: less than any other rate lies be
 _FARTHEST = 8  # samples, chosen: over more the counters may have begun anew
 _OFF_RATE = 10  # samples in a row, chosen: 5 to 20 ms
 _new = tuple.__new__  # makes a named tuple without the call of a Python function
-
-
-class Arrival(IntEnum):
-    """What a measurement frame was."""
-
-    NEW = 0
-    RESENT = 1  # the sample that came last, once more
-    LATE = 2  # older than the last one: not used
-    CORRUPT = 3  # wrong CRC, length or content: not used
-    DISORDERED = 4  # repeated or of wrong sequence by its alive counter, or soon after such: not used
-
-
-_NEW = Arrival.NEW  # a look-up in the class costs more
 
 
 class Refusal(Enum):
@@ -80,7 +67,6 @@ class Counts:
     restarts: int = 0  # of the electronics' counters, see `Clock`
     jumps: int = 0  # samples at which SampleCounter and Microseconds contradict each other, within a second
     gaps: int = 0  # pauses of more than a second, see `Clock`
-    recoveries: int = 0  # of a lost bus
     error_frames: int = 0
     unreadable: int = 0  # frames and datagrams that no frame could be made of
     setpoint_errors: int = 0  # statuses that report setpoint frames which failed their check
@@ -122,15 +108,13 @@ class Link:
         self,
         codec: MountCodec,
         clock: Clock,
-        setpoint_timeout_ns: int,
         sample_time_ns: int = SAMPLE_TIME_NS,
     ):
         self.clock = clock
-        self.samples = E2EReceiver(codec.measurement, codec.measurement_of)
-        self.statuses = E2EReceiver(codec.status, codec.status_of)
+        self.samples, self.statuses = E2EReceiver(codec.measurement), E2EReceiver(codec.status)
         self.counts = Counts()
-        self.arrival = _NEW
-        """What the last measurement frame was."""
+        self.resent = False
+        """Whether the last measurement frame was the sample that came before it, once more."""
         self.contradictions = 0
         """Samples that came once more with another content."""
         self.latest: Stamped | None = None
@@ -147,7 +131,7 @@ class Link:
 
         self._lockstep = clock.lockstep
         self._highest_current = codec.current.high
-        self._timeout = setpoint_timeout_ns
+        self._timeout = round(1e9 * SETPOINT_TIMEOUT)
         self._period = sample_time_ns // 1000  # us
         self._slack = round(_RATE_TOLERANCE * self._period)  # us
         self._shortest, self._longest = self._period - self._slack, self._period + self._slack
@@ -163,15 +147,15 @@ class Link:
     # From the electronics.
 
     def take(self, frame: bytes | bytearray, received: int) -> Stamped | None:
-        """Return the sample of a frame with its stamp if it is a new one, else None: see `arrival`.
+        """Return the sample of a frame with its stamp if it is a new one, else None.
 
         `received` is the time of the frame on the steady clock.
         """
         sample, before, counts = self.samples.receive(frame), self.latest, self.counts
+        self.resent = False
         if sample is None:
-            self.arrival = self._count_unused(self.samples.outcome)
+            self._count_unused(self.samples.outcome)
             return None
-        self.arrival = _NEW
         counter, microseconds = sample.sample_counter, sample.microseconds
         if before is not None:
             last = before.sample
@@ -179,10 +163,8 @@ class Link:
             step_us = (microseconds - last.microseconds) & _MICROSECOND_MASK
             if step == 1 and self._shortest <= step_us <= self._longest:
                 self._off_rate = 0
-            else:
-                self.arrival = self._judge_order(sample, last, step, step_us)
-                if self.arrival is not _NEW:
-                    return None
+            elif not self._is_new(sample, last, step, step_us):
+                return None
         counts.samples += 1
         if sample.displacement != sample.displacement:
             counts.invalid_displacements += 1
@@ -317,26 +299,24 @@ class Link:
                 'nodes that publish current_setpoint'
             )
 
-    def _count_unused(self, outcome: Outcome) -> Arrival:
+    def _count_unused(self, outcome: Outcome) -> None:
         """Count a frame that is not used, of any message."""
         self.counts.repeated += outcome is Outcome.REPEATED
         self.counts.wrong_sequence += outcome is Outcome.WRONG_SEQUENCE
-        if outcome < Outcome.WRONG_CRC:
-            return Arrival.DISORDERED
-        self.counts.corrupt += 1
-        return Arrival.CORRUPT
+        self.counts.corrupt += outcome is Outcome.CORRUPT
 
-    def _judge_order(self, sample: Measurement, last: Measurement, step: int, step_us: int) -> Arrival:
-        """Return what a sample is that came `step` samples and `step_us` behind the last one."""
+    def _is_new(self, sample: Measurement, last: Measurement, step: int, step_us: int) -> bool:
+        """Judge and count a sample that came `step` samples and `step_us` behind the last one."""
         counts = self.counts
         if step == 0 and step_us == 0:
             counts.resent += 1
+            self.resent = True
             self.contradictions += sample[:_MEASURED] != last[:_MEASURED]
-            return Arrival.RESENT
+            return False
         back_us = _MICROSECOND_MASK + 1 - step_us
         if back_us < _LATE_US and _COUNTER_MASK + 1 - step <= _REMEMBERED:
             counts.late += 1
-            return Arrival.LATE
+            return False
         beside = abs(step_us - step * self._period)
         # Behind a restart or a pause the counters say nothing: the clock counts it, once.
         if step_us < _LATE_US and not (step > 0 and step_us > 0 and beside < _DISAGREEMENT_US):
@@ -349,13 +329,10 @@ class Link:
         elif 0 < step <= _FARTHEST:
             self._off_rate += 1
             if self._off_rate >= _OFF_RATE:
-                self._object_to_rate(step_us / step)
-        return _NEW
-
-    def _object_to_rate(self, measured_us: float) -> None:
-        # Both counters come in the same frame, so neither load nor lost frames alter what is seen.
-        self.rate_objection = (
-            f'the electronics sample every {measured_us:.0f} us, but sample_rate ({1e6 / self._period:g} Hz) '
-            f'means {self._period} us (limit {self._slack} us beside it): start the whole graph with the '
-            'sample_rate of the electronics'
-        )
+                # Both counters come in the same frame, so neither load nor lost frames alter what is seen.
+                self.rate_objection = (
+                    f'the electronics sample every {step_us / step:.0f} us, but sample_rate '
+                    f'({1e6 / self._period:g} Hz) means {self._period} us (limit {self._slack} us beside '
+                    'it): start the whole graph with the sample_rate of the electronics'
+                )
+        return True

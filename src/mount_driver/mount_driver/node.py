@@ -1,7 +1,7 @@
 """The driver's node: CAN on one side, topics on the other."""
 
-import math
 import time
+from math import nan
 
 from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.exchange import Exchange
@@ -11,17 +11,16 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
-from mount_models.coil.heating import check_heating
+from mount_models.coil.copper import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.messages.cdr import temperature
 from mount_ros.messages.scalars import MessageError, OneNumberLayout, ScalarsLayout
-from mount_ros.nodes.diagnostics import Level, Verdict
+from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import RealTimeThreads
-from mount_ros.publishers import UnnamedPublisher
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
@@ -37,11 +36,7 @@ class MountDriver(SafeLifecycleNode):
         declare(self, DriverParameters())
         declare(self, SpecimenChoice())
         self._of_specimen = SpecimenValues(self)
-        self._settings, self._law = DriverParameters(), RippleLaw()
-        self._codec: MountCodec | None = None
         self._exchange: Exchange | None = None
-        self._health: Health | None = None
-        self._nameless = UnnamedPublisher()
         self._heat: HeatWatch | None = None
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
@@ -65,9 +60,8 @@ class MountDriver(SafeLifecycleNode):
         self._path = path
 
     def activate(self) -> None:
-        assert self._codec is not None
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         period = sample_time_ns(self._settings.sample_rate)
@@ -88,7 +82,7 @@ class MountDriver(SafeLifecycleNode):
         exchange.start(threaded=not attended)
         self._exchange = exchange
         self._health = Health(exchange, self._settings, started, lockstep=self.lockstep)
-        self.report_publisher_conflict()
+        self.data_path.publisher_watch.report()
         if attended:
             self._path.add_poll(exchange.poll)
 
@@ -102,9 +96,6 @@ class MountDriver(SafeLifecycleNode):
                 if exchange.link.fault:
                     self._not_before = time.monotonic() + _BREAK
 
-    def cleanup(self) -> None:
-        self._codec = None
-
     def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         exchange = self._exchange
         if exchange is not None:
@@ -112,22 +103,15 @@ class MountDriver(SafeLifecycleNode):
             exchange.switch_off(Fault(confirmed, foreign_writer=True) if confirmed else None)
 
     def judge(self) -> Verdict:
-        exchange, health = self._exchange, self._health
-        if exchange is None or health is None:
-            return Verdict(Level.OK, 'inactive')
-        awaited = self._nameless.is_awaited(exchange.link.nameless)
-        return health.judge(time.monotonic_ns(), name_awaited=awaited)
+        return self._health.judge(time.monotonic_ns())
 
     def _heat_of(self, settings: DriverParameters) -> HeatWatch:
         """Return what is known of the coil: a new configuration does not cool it."""
         before = self._heat
         if before is None:
             return HeatWatch(settings.heating, settings.coil_celsius_before)
-        return (
-            before
-            if before.heating == settings.heating
-            else HeatWatch(settings.heating, before.known_celsius)
-        )
+        same = before.heating == settings.heating
+        return before if same else HeatWatch(settings.heating, before.known_celsius)
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()
@@ -146,11 +130,8 @@ class MountDriver(SafeLifecycleNode):
 
     def _on_judged(self, stamped: Stamped) -> None:
         stamp, sample = stamped
-        self._publish_ripple(
-            self._ripple_layout.pack(
-                stamp, (sample.coil_current, math.nan), (sample.current_rate, sample.flux_rate)
-            )
-        )
+        slopes = sample.current_rate, sample.flux_rate
+        self._publish_ripple(self._ripple_layout.pack(stamp, (sample.coil_current, nan), slopes))
 
     def _on_temperature(self, stamp: int, celsius: float) -> None:
         self._publish_temperature(self._temperature_layout.pack(stamp, celsius))

@@ -4,17 +4,15 @@ All numbers of the wire (positions, scales, limits, data ids) come from the DBC.
 profile 5: a 16 bit CRC over all other bytes and the data id, and an 8 bit alive counter.
 """
 
-import math
-from collections.abc import Callable
 from enum import IntEnum
+from math import isnan, nan
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
-from e2e.p05 import e2e_p05_check, e2e_p05_protect
+from e2e.p05 import e2e_p05_check
 
 from mount_driver.can_library import Database
 from mount_driver.layout import MessageLayout, Scaling
-from mount_models.quantity import ParameterError
 
 M = TypeVar('M')
 
@@ -23,7 +21,6 @@ DATABASE_FILE = Path(__file__).parent / 'dbc' / 'mount.dbc'
 _VOLTAGE_NOT_AVAILABLE = 65535  # value tables of the DBC
 _TEMPERATURE_NOT_AVAILABLE = -32768
 _LOOK_BACK = 16  # frames, chosen: a sequence that goes on so soon after it was left still has its sender
-_NAN = math.nan
 _new = tuple.__new__  # makes a named tuple without the call of a Python function
 
 
@@ -79,17 +76,16 @@ class Status(NamedTuple):
 class MountCodec:
     """Encodes and decodes the messages of `mount.dbc`; no state but its tables, so one serves all threads.
 
-    Encoding takes the alive counter (0..255) of the frame, decoding returns it with the message. Decoding
-    raises `FrameError` before it reads any number. `E2EReceiver` makes the same checks, then calls
-    `measurement_of`, `setpoint_of` or `status_of`.
+    Encoding takes the alive counter (0..255) of the frame. What is received is decoded by an `E2EReceiver`.
     """
 
     def __init__(self, database_file: Path = DATABASE_FILE):
         database = Database()
         database.add_dbc_file(database_file)
-        names = 'MountMeasurement', 'MountSetpoint', 'MountStatus'
-        messages = [database.get_message_by_name(name) for name in names]
-        self.measurement, self.setpoint, self.status = map(MessageLayout, messages)
+        measurement, setpoint, status = messages = database.messages
+        self.measurement = MessageLayout(measurement, self._measurement_of)
+        self.setpoint = MessageLayout(setpoint, self._setpoint_of)
+        self.status = MessageLayout(status, self._status_of)
         scalings = {signal.name: Scaling(signal) for message in messages for signal in message.signals}
         self.displacement, self.coil_current = scalings['Displacement'], scalings['CoilCurrent']
         self.current_rate, self.flux_rate = scalings['CurrentRate'], scalings['FluxRate']
@@ -122,13 +118,8 @@ class MountCodec:
             )
         )
 
-    def decode_measurement(self, data: bytes | bytearray) -> tuple[int, Measurement]:
-        """Return alive counter and sample; what is not valid or lies outside the DBC's limits is NaN."""
-        raw = self.measurement.unpack(data)
-        return raw[1], self.measurement_of(raw)
-
-    def measurement_of(self, raw: tuple[int, ...]) -> Measurement:
-        """Return the sample of raw numbers, see `decode_measurement`."""
+    def _measurement_of(self, raw: tuple[int, ...]) -> Measurement:
+        """Return the sample of raw numbers; what is not valid or lies outside the DBC's limits is NaN."""
         # Without a function for each number: this runs for every sample.
         (
             _,
@@ -154,12 +145,12 @@ class MountCodec:
                 microseconds,
                 displacement / x.steps
                 if displacement_valid and x.raw_low <= displacement <= x.raw_high
-                else _NAN,
-                current / i.steps if current_valid and i.raw_low <= current <= i.raw_high else _NAN,
+                else nan,
+                current / i.steps if current_valid and i.raw_low <= current <= i.raw_high else nan,
                 current_rate / di.steps
                 if ripple_valid and di.raw_low <= current_rate <= di.raw_high
-                else _NAN,
-                flux_rate / db.steps if ripple_valid and db.raw_low <= flux_rate <= db.raw_high else _NAN,
+                else nan,
+                flux_rate / db.steps if ripple_valid and db.raw_low <= flux_rate <= db.raw_high else nan,
                 enabled == 1,
                 setpoint_timeout == 1,
                 current_limited == 1,
@@ -167,31 +158,14 @@ class MountCodec:
         )
 
     def encode_setpoint(self, setpoint: Setpoint, alive_counter: int) -> bytearray:
-        """Return the 8 bytes of a setpoint, limited to 0..3 A; NaN is refused with `ParameterError`."""
+        """Return the 8 bytes of a setpoint, limited to 0..3 A; raises `ValueError` for NaN."""
         current, answered_counter, enable = setpoint
         limits = self.current
-        if current != current:
-            raise ParameterError(
-                f'current setpoint (NaN) must lie within {limits.low:g} .. {limits.high:g} A; '
-                f'send 0 A with enable off where no setpoint is known'
-            )
         raw = round(min(max(current, limits.low), limits.high) * limits.steps)
-        layout, numbers = self.setpoint, (0, alive_counter, raw, answered_counter, enable)
-        try:
-            data = bytearray(layout.pack_bits(*numbers[::-1]))
-        except OverflowError:
-            return layout.pack(numbers)  # raises, with all the numbers
-        data.reverse()
-        e2e_p05_protect(data, layout.data_id, increment_counter=False)
-        return data
+        return self.setpoint.pack((0, alive_counter, raw, answered_counter, enable))
 
-    def decode_setpoint(self, data: bytes | bytearray) -> tuple[int, Setpoint | None]:
-        """Return alive counter and setpoint, which is None where its current exceeds the DBC's limit."""
-        raw = self.setpoint.unpack(data)
-        return raw[1], self.setpoint_of(raw)
-
-    def setpoint_of(self, raw: tuple[int, ...]) -> Setpoint | None:
-        """Return the setpoint of raw numbers, see `decode_setpoint`."""
+    def _setpoint_of(self, raw: tuple[int, ...]) -> Setpoint | None:
+        """Return the setpoint of raw numbers, None where its current exceeds the DBC's limit."""
         _, _, current, answered_counter, enable = raw
         limits = self.current
         if not limits.raw_low <= current <= limits.raw_high:
@@ -201,21 +175,14 @@ class MountCodec:
     def encode_status(self, status: Status, alive_counter: int) -> bytearray:
         """Return the 8 bytes of a status; NaN is sent as not available. Raises `ParameterError`."""
         voltage, temperature, *faults = status
-        raw_voltage = _VOLTAGE_NOT_AVAILABLE if math.isnan(voltage) else self.supply_voltage.to_raw(voltage)
+        raw_voltage = _VOLTAGE_NOT_AVAILABLE if isnan(voltage) else self.supply_voltage.to_raw(voltage)
         raw_temperature = (
-            _TEMPERATURE_NOT_AVAILABLE
-            if math.isnan(temperature)
-            else self.coil_temperature.to_raw(temperature)
+            _TEMPERATURE_NOT_AVAILABLE if isnan(temperature) else self.coil_temperature.to_raw(temperature)
         )
         return self.status.pack((0, alive_counter, raw_voltage, raw_temperature, *faults))
 
-    def decode_status(self, data: bytes | bytearray) -> tuple[int, Status]:
-        """Return alive counter and status; what is not available or lies outside the DBC's limits is NaN."""
-        raw = self.status.unpack(data)
-        return raw[1], self.status_of(raw)
-
-    def status_of(self, raw: tuple[int, ...]) -> Status:
-        """Return the status of raw numbers, see `decode_status`."""
+    def _status_of(self, raw: tuple[int, ...]) -> Status:
+        """Return the status of raw numbers; what is not available or outside the DBC's limits is NaN."""
         _, _, voltage, temperature, *faults = raw
         return Status(
             self.supply_voltage.to_si(voltage),
@@ -232,9 +199,7 @@ class Outcome(IntEnum):
     SYNCHRONISING = 2  # in order, but too soon after a wrong sequence or the start to be believed
     REPEATED = 3  # the same alive counter as the last one
     WRONG_SEQUENCE = 4  # its counter went back, or farther ahead than frames may be missing
-    WRONG_CRC = 5
-    WRONG_LENGTH = 6
-    OUT_OF_RANGE = 7  # protected and complete, but its content is not allowed
+    CORRUPT = 5  # its length or CRC is wrong, or its content is not allowed
 
 
 _OK, _LOST = Outcome.OK, Outcome.LOST  # a look-up in the class costs more
@@ -256,8 +221,7 @@ class AliveCounter:
 class E2EReceiver(Generic[M]):
     """Checks and decodes the frames of one message, judges their order by the alive counter and counts."""
 
-    def __init__(self, layout: MessageLayout, message_of: Callable[[tuple[int, ...]], M | None]):
-        """`message_of` returns the message of the raw numbers, None where its content is not allowed."""
+    def __init__(self, layout: MessageLayout[M]):
         self.outcome = _OK
         """Of the last frame."""
         self.counts = [0] * len(Outcome)
@@ -270,7 +234,7 @@ class E2EReceiver(Generic[M]):
         They carry another content under the counter of the last one, or go on with a sequence that was left
         for another a few frames before. Losses and a restart of the sender do neither.
         """
-        self._layout, self._message_of = layout, message_of
+        self._layout, self._message_of = layout, layout.message_of
         self._last = -1  # alive counter of the last frame whose CRC was good; none yet
         self._awaited = 0  # frames in order that must still come before one is used
         self._last_data: bytes | bytearray = b''
@@ -279,10 +243,8 @@ class E2EReceiver(Generic[M]):
     def receive(self, data: bytes | bytearray) -> M | None:
         """Return the message of a frame, or None where it must not be used; see `outcome`."""
         layout, message = self._layout, None
-        if len(data) != layout.length:
-            outcome = Outcome.WRONG_LENGTH
-        elif not e2e_p05_check(data, layout.data_id):
-            outcome = Outcome.WRONG_CRC
+        if len(data) != layout.length or not e2e_p05_check(data, layout.data_id):
+            outcome = Outcome.CORRUPT
         else:
             raw = layout.unpack_bits(data[::-1])[::-1]
             if (raw[1] - self._last) & 0xFF == 1 and not self._awaited:
@@ -292,7 +254,7 @@ class E2EReceiver(Generic[M]):
             self._last, self._last_data = raw[1], data
             message = self._message_of(raw)
             if message is None:
-                outcome = Outcome.OUT_OF_RANGE
+                outcome = Outcome.CORRUPT
         self.outcome = outcome
         self.counts[outcome] += 1
         return message if outcome <= _LOST else None

@@ -3,8 +3,9 @@
 import itertools
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ros_testing import free_domain
@@ -32,3 +33,30 @@ def multicast(ports: Iterator[int]) -> tuple[str, int]:
     """Return a multicast group of this process and a port of this test."""
     process = os.getpid()
     return f'239.74.{process >> 8 & 0xFF}.{process & 0xFF}', next(ports)
+
+
+@pytest.fixture
+def make_car() -> Iterator[Callable[..., Any]]:
+    """Return a function that makes a `Car` with some parameters."""
+    from car import Car
+
+    made: list[Car] = []
+
+    def make(**parameters: Any) -> Car:
+        made.append(Car(**parameters))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.exchange.stop()
+        each.far.close()
+
+
+@pytest.fixture
+def car(make_car: Callable[..., Any]) -> Any:
+    """Return a car whose first samples were answered with 3 A."""
+    from car import GOOD
+
+    made = make_car()
+    made.drive(GOOD, made.answer)
+    return made

@@ -54,7 +54,11 @@ class FarEnd:
         """Return the next setpoint that arrives."""
         message = self.bus.recv(LIMIT)
         assert message is not None, f'no setpoint frame within {LIMIT} s'
-        return CODEC.decode_setpoint(message.data)[1]
+        return CODEC.setpoint.decode(message.data)[1]
+
+    def setpoints(self) -> list[Setpoint]:
+        """Return the setpoints that have come since the last call."""
+        return [CODEC.setpoint.decode(each.data)[1] for each in iter(lambda: self.bus.recv(0.0), None)]
 
     def setpoint_where(self, condition) -> Setpoint:
         """Return the next setpoint that fulfils a condition."""

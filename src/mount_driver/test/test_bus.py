@@ -2,11 +2,12 @@
 
 import contextlib
 import time
+from copy import deepcopy
 
 import msgpack
 import pytest
 
-from mount_driver.bus import CanLinkError, Reception, _check_socketcan, open_bus
+from mount_driver.bus import CanLinkError, Frame, Reception, _check_socketcan, open_bus
 from mount_driver.can_library import can
 
 
@@ -41,16 +42,10 @@ def test_a_frame_tells_when_it_arrived_not_when_it_was_read(pair):
 
 def test_frames_with_other_identifiers_are_filtered_out(pair):
     far, near = pair
+    near.send(frame(0x210))  # its own does not come back
     for number in (0x211, 0x213, 0x212):
         far.send(frame(number))
     assert near.recv(10.0).arbitration_id == 0x212
-    assert near.recv(0.0) is None
-
-
-def test_own_frames_do_not_come_back(pair):
-    far, near = pair
-    near.send(frame(0x210))
-    assert far.recv(10.0).arbitration_id == 0x210
     assert near.recv(0.0) is None
 
 
@@ -76,25 +71,10 @@ def test_error_frames_pass_the_filter(multicast):
 
 
 FIELDS = {'arbitration_id': 0x210, 'data': bytes(24), 'dlc': 24, 'is_extended_id': False, 'is_fd': True}
-FOREIGN = {
-    'nothing': b'',
-    'no msgpack': b'\xc1',
-    'cut off': msgpack.packb(FIELDS)[:-3],
-    'a list': msgpack.packb([1, 2, 3]),
-    'a text': msgpack.packb('no frame'),
-    'a number': msgpack.packb(7),
-    'none': msgpack.packb(None),
-    'deeply nested': b'\x91' * 4000,
-    'a list longer than the datagram': b'\xdd\xff\xff\xff\xff',
-    'unknown fields': msgpack.packb(FIELDS | {'colour': 'red'}),
-    'no data': msgpack.packb({'arbitration_id': 0x210}),
-    'an identifier that is a text': msgpack.packb(FIELDS | {'arbitration_id': 'x'}),
-    'data that are a number': msgpack.packb(FIELDS | {'data': 1 << 40}),
-    'data that are a text': msgpack.packb(FIELDS | {'data': 'x' * 24}),
-}
+FOREIGN = [b'\xc1', msgpack.packb([1, 2, 3]), msgpack.packb(FIELDS | {'data': 'x' * 24})]
 
 
-@pytest.mark.parametrize('datagram', FOREIGN.values(), ids=FOREIGN)
+@pytest.mark.parametrize('datagram', FOREIGN)
 def test_a_datagram_that_is_no_frame_is_counted_and_the_next_frame_comes(multicast, datagram):
     group, port = multicast
     with (
@@ -117,34 +97,18 @@ def test_a_bus_that_reads_nothing_any_more_is_lost(multicast):
             Reception().frame(near, 0.0)
 
 
-def test_python_cans_own_multicast_interface_can_listen_in(multicast):
-    group, port = multicast
-    options = {'channel': group, 'port': port, 'hop_limit': 0, 'fd': True}
-    try:
-        foreign = can.Bus(interface='udp_multicast', ignore_config=True, **options)
-    except can.CanInitializationError:
-        pytest.skip("python-can's own interface needs a network route for multicast, ours does not")
-    with foreign, open_bus('udp_multicast', group, port=port) as near:
-        near.send(frame(0x211))
-        assert foreign.recv(10.0).arbitration_id == 0x211
-        foreign.send(frame(0x210))
-        assert near.recv(10.0).arbitration_id == 0x210
-
-
 @pytest.mark.parametrize(
     ('interface', 'channel', 'sentence'),
     [
         ('udp_multicast', '192.0.2.1', 'no multicast address; the channel must be an IPv4 multicast address'),
         ('udp_multicast', 'can0', 'the channel must be an IPv4 multicast address such as 239'),
-        ('socketcan', 'no-such-can', 'ip link set no-such-can up type can bitrate 250000 dbitrate 1000000'),
-        ('carrier_pigeon', 'x', "interface 'carrier_pigeon'.*known interfaces are .*socketcan"),
-        ('pcan', 'PCAN_USBBUS1', 'is the adapter plugged in, its driver installed'),
-        ('kvaser', '0', 'is the adapter plugged in, its driver installed'),
+        ('socketcan', 'no-such-can', 'ip link set no-such-can up type can bitrate 500000 dbitrate 2000000'),
+        ('pcan', 'PCAN_USBBUS1', 'known interfaces are socketcan, .*: an adapter has a socketcan interface'),
     ],
 )
 def test_a_bus_that_does_not_open_says_what_was_tried_and_the_remedy(interface, channel, sentence):
     with pytest.raises(CanLinkError, match=sentence) as caught:
-        open_bus(interface, channel, bitrate=250_000, data_bitrate=1_000_000)
+        open_bus(interface, channel)
     assert f"CAN interface '{interface}', channel '{channel}'" in str(caught.value)
 
 
@@ -152,7 +116,6 @@ def test_a_bus_that_does_not_open_says_what_was_tried_and_the_remedy(interface, 
     ('state', 'mtu', 'sentence'),
     [
         ('up', 72, ''),
-        ('unknown', 72, ''),
         ('down', 72, 'is down'),
         ('up', 16, 'not in CAN FD mode: its MTU is 16'),
         ('missing', 72, 'no such'),
@@ -168,3 +131,13 @@ def test_a_socketcan_interface_is_refused_only_where_it_cannot_carry_fd_frames(
         (folder / 'mtu').write_text(f'{mtu}\n')
     with pytest.raises(OSError, match=sentence) if sentence else contextlib.nullcontext():
         _check_socketcan('can0', tmp_path)
+
+
+def test_a_deep_copy_of_our_frame_is_equal_and_shares_nothing():
+    ours = Frame(0x123, bytearray(range(24)))
+    ours.timestamp = 5.0
+    copied = deepcopy(ours)
+    assert copied.equals(ours, timestamp_delta=0.0)
+    ours.data[0] = 99
+    assert copied.data == bytearray(range(24))
+    assert (ours.is_extended_id, ours.is_fd, ours.bitrate_switch) == (False, True, True)

@@ -1,11 +1,13 @@
-"""Frames in, samples out; setpoints in, frames out; and 0 A on every way out."""
+"""Frames in, samples out; setpoints in, frames out; and 0 A on every way out, whatever the bus raises."""
 
-import math
+import itertools
 import subprocess
 import sys
 import textwrap
+import threading
 
 import pytest
+from car import MS, Steady
 from far_end import CODEC, FarEnd, sample
 from ros_testing import LIMIT, wait_until
 
@@ -18,287 +20,180 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import Setpoint
 
 OFF = Setpoint(0.0, 0xFFFF, False)
-MS = 1_000_000
+RAISED = [can.CanOperationError('no buffer'), OSError('gone'), ValueError('what?'), KeyboardInterrupt()]
+_channels = itertools.count()
 
 
-class Samples(list):
-    """Takes what the exchange hands out."""
+class FailingBus:
+    """A virtual bus whose calls of `method` with the numbers `failing` raise."""
 
-    take = list.append
+    def __init__(self, bus, method, failing, error):
+        self._bus = bus
+        self.calls = dict.fromkeys(('recv', 'send', 'shutdown'), 0)
+        self._method, self._failing, self._error = method, failing, error
 
-    def wait_for(self, count):
-        wait_until(lambda: len(self) >= count, f'{count} samples')
+    def recv(self, timeout):
+        self._count('recv')
+        return self._bus.recv(timeout)
+
+    def send(self, message):
+        self._count('send')
+        self._bus.send(message)
+
+    def shutdown(self):
+        self._bus.shutdown()
+        self._count('shutdown')
+
+    def _count(self, method):
+        number = self.calls[method]
+        self.calls[method] += 1
+        if method == self._method and number in self._failing:
+            raise self._error
 
 
 @pytest.fixture
-def samples():
-    return Samples()
+def make(monkeypatch):
+    """Return a function that starts an exchange, on a bus that fails as told; it returns also its far end."""
+    genuine, opened = exchange_module.open_bus, []
 
+    def start(*failing, take=lambda stamped: None, lockstep=False, threaded=True, **parameters):
+        channel = f'test_exchange_{next(_channels)}'
+        far = FarEnd('virtual', channel, 0)
 
-@pytest.fixture
-def make(multicast, samples):
-    """Return a function that starts an exchange, and returns it with the far end of its bus."""
-    group, port = multicast
-    opened = []
+        def opening(*arguments, **options):
+            bus = genuine(*arguments, **options)
+            return FailingBus(bus, *failing) if failing else bus
 
-    def start(*, interface='udp_multicast', lockstep=True, take=samples.take, threaded=True, **parameters):
-        channel = group if interface == 'udp_multicast' else f'exchange-{port}'
-        chosen = DriverParameters(interface=interface, channel=channel, port=port)._replace(**parameters)
-        far = FarEnd(interface, channel, port)
-        opened.append(far.close)
+        monkeypatch.setattr(exchange_module, 'open_bus', opening)
+        chosen = DriverParameters(interface='virtual', channel=channel)._replace(**parameters)
         clock = CounterClock() if lockstep else ElectronicsClock(0)
-        exchange = Exchange(chosen, CODEC, clock, take)
+        exchange = Exchange(chosen, CODEC, clock, take, steady=Steady())
         exchange.start(threaded=threaded)
-        opened.append(exchange.stop)
+        opened.append((exchange, far))
         return exchange, far
 
     yield start
-    for close in reversed(opened):
-        close()
+    for exchange, far in opened:
+        exchange.stop()
+        far.close()
 
 
-@pytest.mark.parametrize('interface', ['udp_multicast', 'virtual'])
-def test_a_sample_is_handed_out_with_its_stamp(make, samples, interface):
-    _, far = make(interface=interface)
-    far.send(sample(7))
-    samples.wait_for(1)
-    assert samples == [(7 * MS, sample(7))]
+@pytest.fixture
+def udp(multicast):
+    """Return an exchange that receives in a thread, its far end, and the samples that it hands on."""
+    group, port = multicast
+    samples, far = [], FarEnd('udp_multicast', group, port)
+    exchange = Exchange(DriverParameters(channel=group, port=port), CODEC, CounterClock(), samples.append)
+    exchange.start()
+    yield exchange, far, samples
+    exchange.stop()
+    far.close()
 
 
-def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activation(make, samples):
-    exchange, far = make(interface='virtual', threaded=False, sample_rate=2000.0)
-    for index in range(30):
-        far.send(sample(index))
+def polled(exchange, far, *samples):
+    for each in samples:
+        far.send(each)
         assert exchange.poll()
+
+
+def off_frames(far):
+    """Return how many setpoint frames have come, all of which must switch off."""
+    frames = far.setpoints()
+    assert not any(setpoint.enable for setpoint in frames)
+    return len(frames)
+
+
+def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activation(make):
+    exchange, far = make(lockstep=True, threaded=False, sample_rate=2000.0)
+    for index in range(30):
+        polled(exchange, far, sample(index))
         exchange.send_setpoint(index * MS, 1.0)
     assert 'sample every 1000 us, but sample_rate (2000 Hz) means 500 us' in exchange.link.fault
     assert exchange.link.last_refusal is Refusal.SWITCHED_OFF
-    setpoints = [far.setpoint() for _ in range(exchange.link.counts.setpoints)]
-    assert far.setpoint()._replace(answered_counter=0) == Setpoint(0.0, 0, False)
-    assert len(setpoints) < 20
+    *setpoints, off = far.setpoints()
+    assert off._replace(answered_counter=0) == Setpoint(0.0, 0, False)
+    assert len(setpoints) == exchange.link.counts.setpoints < 20
 
 
-def test_a_refused_setpoint_does_not_leave(make, samples):
-    exchange, far = make()
-    far.send(sample(0))
-    samples.wait_for(1)
-    assert not exchange.send_setpoint(0, math.nan)
-    assert not exchange.send_setpoint(12345, 1.0)
-    assert exchange.send_setpoint(0, 0.75)
-    assert far.setpoint().current == 0.75
-
-
-@pytest.mark.parametrize('interface', ['udp_multicast', 'virtual'])
 @pytest.mark.parametrize(
     'odd',
     [
         {'data': bytes(8)},
         {'data': bytes(64), 'dlc': 64},
-        {'data': b'', 'is_fd': False},
         {'data': b'', 'is_fd': False, 'is_remote_frame': True, 'dlc': 8},
         {'data': bytes(24), 'is_extended_id': True},
         {'data': bytes(8), 'is_fd': False, 'is_error_frame': True},
     ],
-    ids=['short', 'long', 'empty', 'remote', 'extended', 'error'],
 )
-def test_a_frame_of_another_form_costs_itself_alone(make, samples, interface, odd):
-    exchange, far = make(interface=interface)
+def test_a_frame_of_another_form_costs_itself_alone(udp, odd):
+    exchange, far, samples = udp
     far.send_raw(CODEC.measurement.frame_id, **odd)
     far.send(sample(1))
-    samples.wait_for(1)
-    assert [measurement.sample_counter for _, measurement in samples] == [1]
-    assert exchange.failure == exchange.trouble == ''
-    assert exchange.link.counts.recoveries == 0
+    wait_until(lambda: samples, 'the sample')
+    assert samples == [(MS, sample(1))]
+    assert exchange.failure == ''
 
 
-def test_when_setpoints_stop_0_ampere_is_sent_while_samples_go_on(make, samples):
-    exchange, far = make(lockstep=False)
-    far.stream()
-    samples.wait_for(1)
-    wait_until(lambda: exchange.send_setpoint(samples[-1][0], 0.05), 'a setpoint in time')
-    answered = far.setpoint_where(lambda setpoint: setpoint.enable)
-    assert answered.current == 0.05
-    off = far.setpoint_where(lambda setpoint: not setpoint.enable)
-    assert (off.current, off.answered_counter) == (0.0, answered.answered_counter)
-    assert exchange.link.counts.setpoint_timeouts == 1
-
-
-def test_when_setpoints_and_samples_stop_0_ampere_is_sent(make, samples):
-    exchange, far = make(lockstep=False)
-    far.send(sample(0))
-    samples.wait_for(1)
-    exchange.send_setpoint(samples[0][0], 2.0)
-    assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 2.0
-    assert far.setpoint_where(lambda setpoint: not setpoint.enable).current == 0.0
-
-
-def test_in_lock_step_the_wall_clock_switches_nothing_off(make, samples):
-    exchange, far = make()
-    assert far.nothing_for(0.05)
-    far.send(sample(0))
-    samples.wait_for(1)
-    exchange.send_setpoint(0, 2.0)
-    assert far.setpoint().enable
-    assert far.nothing_for(0.1)  # five times the timeout
-
-
-def test_in_lock_step_the_stamps_switch_off(make, samples):
-    exchange, far = make()
-    assert far.nothing_for(0.03)  # time begins with the first sample, not before
-    far.send(sample(100))
-    samples.wait_for(1)
+def test_in_lock_step_the_stamps_switch_off_and_no_other_clock(make):
+    exchange, far = make(lockstep=True, threaded=False)
+    exchange._steady.now += 1000 * MS
+    assert not exchange.poll()
+    polled(exchange, far, sample(100))
     exchange.send_setpoint(100 * MS, 2.0)
-    assert far.setpoint().enable
-    far.send(sample(120))
-    samples.wait_for(2)
-    assert far.nothing_for(0.02)
-    far.send(sample(121))
-    assert far.setpoint() == Setpoint(0.0, 100, False)
+    exchange._steady.now += 1000 * MS
+    polled(exchange, far, sample(120))
+    assert far.setpoints() == [Setpoint(2.0, 100, True)]
+    polled(exchange, far, sample(121))
+    assert far.setpoints() == [Setpoint(0.0, 100, False)]
 
 
-def test_a_sample_sent_again_gets_its_answer_again(make, samples):
-    exchange, far = make()
-    far.send(sample(5))
-    samples.wait_for(1)
+def test_a_sample_sent_again_gets_its_answer_again_if_it_has_one(make):
+    samples = []
+    exchange, far = make(lockstep=True, threaded=False, take=samples.append)
+    polled(exchange, far, sample(5), sample(5))
     exchange.send_setpoint(5 * MS, 1.5)
-    first = far.bus.recv(LIMIT)
-    far.send(sample(5))
-    again = far.bus.recv(LIMIT)
-    assert (
-        CODEC.decode_setpoint(again.data)[1] == CODEC.decode_setpoint(first.data)[1] == Setpoint(1.5, 5, True)
-    )
-    assert again.data[2] == first.data[2] + 1  # a frame of its own by its alive counter
-    assert len(samples) == 1
-
-
-def test_a_sample_sent_again_before_its_answer_is_counted_alone(make, samples):
-    exchange, far = make()
-    far.send(sample(5))
-    far.send(sample(5))
-    wait_until(lambda: exchange.link.counts.resent == 1, 'the second frame')
-    exchange.send_setpoint(5 * MS, 1.5)
-    assert far.setpoint() == Setpoint(1.5, 5, True)
-    assert far.nothing_for(0.02)
-    assert len(samples) == 1
-
-
-def test_stopping_sends_0_ampere_several_times_and_nothing_after(make, samples):
-    exchange, far = make()
-    far.send(sample(9))
-    samples.wait_for(1)
-    exchange.send_setpoint(9 * MS, 2.0)
-    exchange.stop()
-    assert not exchange.send_setpoint(9 * MS, 2.0)
-    frames = [far.setpoint() for _ in range(4)]
-    assert frames == [Setpoint(2.0, 9, True)] + [Setpoint(0.0, 9, False)] * 3
-    assert far.nothing_for(0.0)
-
-
-def test_stopping_twice_does_nothing(make):
-    exchange, far = make()
-    exchange.stop()
-    exchange.stop()
-    assert [far.setpoint() for _ in range(3)] == [OFF] * 3
-    assert far.nothing_for(0.0)
+    polled(exchange, far, sample(5))
+    first, again = far.bus.recv(0.0).data, far.bus.recv(0.0).data
+    assert CODEC.setpoint.decode(again)[1] == CODEC.setpoint.decode(first)[1] == Setpoint(1.5, 5, True)
+    assert again[2] == first[2] + 1  # a frame of its own by its alive counter
+    assert far.bus.recv(0.0) is None
+    assert (len(samples), exchange.link.counts.resent) == (1, 2)
 
 
 @pytest.mark.parametrize('threaded', [True, False])
-def test_an_error_where_samples_are_received_sends_0_ampere_and_is_kept(make, threaded):
+@pytest.mark.parametrize(
+    ('error', 'failure'),
+    [
+        (RuntimeError('no context'), 'RuntimeError: no context'),
+        (RAISED[0], 'CAN bus lost (no buffer): activate mount_driver again when it is back'),
+    ],
+)
+def test_an_error_where_frames_are_received_ends_the_exchange_at_0_ampere(make, threaded, error, failure):
     def fail(stamped):
-        raise RuntimeError('the middleware is gone')
+        raise error
 
-    exchange, far = make(interface='virtual', take=fail, threaded=threaded)
+    exchange, far = make(take=fail, threaded=threaded)
     far.send(sample(0))
     assert threaded or not exchange.poll()
-    assert far.setpoint() == OFF
     wait_until(lambda: exchange.failure, 'a failure')
-    assert exchange.failure == 'RuntimeError: the middleware is gone'
-    far.send(sample(1))
-    assert threaded or not exchange.poll()
+    assert exchange.failure == failure
+    wait_until(lambda: not exchange._accepting, 'the end')
+    assert off_frames(far) == 3
     assert not exchange.send_setpoint(0, 1.0)
+    assert exchange.link.last_refusal is Refusal.BUS_LOST
 
 
-def test_bus_off_drops_setpoints_until_a_sample_comes_again(make, samples):
-    exchange, far = make()
+def test_bus_off_drops_setpoints_until_a_sample_comes_again(udp):
+    exchange, far, samples = udp
     far.send(sample(0))
     far.send_raw(0x40, bytes(8), is_error_frame=True, is_fd=False)
     wait_until(lambda: exchange.bus_off, 'bus off')
     assert not exchange.send_setpoint(0, 1.0)
     assert exchange.link.last_refusal is Refusal.BUS_LOST
     far.send(sample(1))
-    samples.wait_for(2)
+    wait_until(lambda: len(samples) == 2, 'a sample')
     assert exchange.send_setpoint(1 * MS, 1.0)
-    assert far.setpoint().current == 1.0
     assert exchange.link.counts.error_frames == 1
-
-
-class BreakingBus:
-    """A bus whose next reception fails, and its end too."""
-
-    def __init__(self, bus):
-        self._bus = bus
-
-    def recv(self, timeout):
-        raise can.CanOperationError('network is down')
-
-    def shutdown(self):
-        self._bus.shutdown()
-        raise OSError('bad file descriptor')
-
-    def __getattr__(self, name):
-        return getattr(self._bus, name)
-
-
-def break_bus(monkeypatch, failures):
-    """Let the first bus break when it receives; then `failures` attempts to open it again fail."""
-    genuine, calls = exchange_module.open_bus, []
-
-    def opening(*arguments, **options):
-        calls.append(arguments)
-        if len(calls) == 1:
-            return BreakingBus(genuine(*arguments, **options))
-        if len(calls) <= 1 + failures:
-            raise exchange_module.CanLinkError('still down')
-        return genuine(*arguments, **options)
-
-    monkeypatch.setattr(exchange_module, 'open_bus', opening)
-    monkeypatch.setattr(exchange_module, '_REOPEN_PERIOD', 0.001)
-
-
-def test_a_lost_bus_is_opened_again(make, samples, monkeypatch):
-    break_bus(monkeypatch, failures=3)
-    exchange, far = make()
-    wait_until(lambda: exchange.link.counts.recoveries == 1, 'recovery')
-    far.send(sample(0))
-    samples.wait_for(1)
-    assert exchange.send_setpoint(0, 1.0)
-    assert far.setpoint().current == 1.0
-    assert exchange.trouble == exchange.failure == ''
-
-
-def test_a_bus_that_stays_lost_is_given_up_with_a_sentence(make, monkeypatch):
-    break_bus(monkeypatch, failures=10**9)
-    exchange, _ = make(recovery_time=0.01)
-    wait_until(lambda: exchange.failure, 'giving up')
-    assert exchange.failure.startswith('still down; given up after 0.01 s')
-    assert not exchange.send_setpoint(0, 1.0)
-    assert exchange.link.last_refusal is Refusal.BUS_LOST
-
-
-def test_a_bus_that_does_not_take_frames_is_counted(make, samples, monkeypatch):
-    exchange, far = make()
-    far.send(sample(0))
-    samples.wait_for(1)
-
-    def refuse(message, timeout=None):
-        raise can.CanOperationError('Transmit buffer full')
-
-    monkeypatch.setattr(exchange._bus, 'send', refuse)
-    assert not exchange.send_setpoint(0, 1.0)
-    assert exchange.link.counts.unsent == 1
-    assert exchange.unsent_reason == 'CanOperationError: Transmit buffer full'
-    with pytest.raises(exchange_module.CanLinkError, match=r'3 of 3 frames with 0 A .* \(.*buffer full\)'):
-        exchange.stop()
 
 
 def test_a_process_that_ends_by_an_exception_sends_0_ampere(multicast):
@@ -315,9 +210,75 @@ def test_a_process_that_ends_by_an_exception_sends_0_ampere(multicast):
         exchange.start()
         raise SystemError('crash')
         """
-    ended = subprocess.run(
-        [sys.executable, '-c', textwrap.dedent(program)], capture_output=True, timeout=60, check=False
-    )
+    ended = subprocess.run([sys.executable, '-c', textwrap.dedent(program)], capture_output=True, timeout=60)
     assert b'SystemError: crash' in ended.stderr
     assert far.setpoint() == OFF
     far.close()
+
+
+@pytest.mark.parametrize('error', RAISED, ids=lambda error: type(error).__name__)
+@pytest.mark.parametrize(
+    ('method', 'numbers'),
+    [('send', {0}), ('send', {1}), ('send', {2}), ('send', {0, 1, 2}), ('shutdown', {0})],
+)
+def test_whatever_one_step_raises_the_other_frames_the_join_and_the_close_happen(
+    make, error, method, numbers
+):
+    exchange, far = make(method, numbers, error)
+    threads, bus = [*exchange._threads], exchange._bus
+    with pytest.raises((exchange_module.CanLinkError, type(error))) as raised:
+        exchange.stop()
+    assert (bus.calls['send'], bus.calls['shutdown']) == (3, 1)
+    assert off_frames(far) == 3 - len(numbers) * (method == 'send')
+    assert threads
+    assert not any(thread.is_alive() for thread in threads)
+    if isinstance(error, Exception) and method == 'send':
+        assert f'{len(numbers)} of 3 frames with 0 A' in str(raised.value)
+        assert f'({type(error).__name__}: {error})' in str(raised.value)
+    else:
+        assert raised.value is error
+    exchange.stop()  # nothing is left to do
+    assert (bus.calls['send'], bus.calls['shutdown']) == (3, 1)
+
+
+@pytest.mark.parametrize('error', RAISED[:-1], ids=lambda error: type(error).__name__)
+def test_a_frame_that_the_bus_does_not_take_ends_neither_the_exchange_nor_its_caller(make, error):
+    exchange, far = make('send', {0, 1}, error, threaded=False)
+    exchange.watch()
+    exchange._steady.now += 20 * MS + 1
+    exchange.watch()  # 0 A is due and not taken
+    far.send(sample(0))
+    assert exchange._attempt(0.0)
+    assert not exchange.send_setpoint(exchange.link.latest.stamp, 1.0)
+    assert exchange.link.counts.unsent == 2
+    assert exchange.unsent_reason == f'{type(error).__name__}: {error}'
+    assert exchange.failure == ''
+    exchange.stop()
+    assert off_frames(far) == 3
+
+
+def test_what_ends_the_process_while_it_receives_leaves_0_ampere_behind(make):
+    exchange, far = make('recv', {0}, KeyboardInterrupt(), threaded=False)
+    with pytest.raises(KeyboardInterrupt):
+        exchange._attempt(0.0)
+    assert off_frames(far) == 3
+    assert exchange.failure == 'KeyboardInterrupt: '
+
+
+def test_a_controller_that_hangs_holds_up_neither_the_watch_nor_its_0_ampere(make):
+    answered, hanging = threading.Event(), threading.Event()
+
+    def answer(stamped):
+        exchange.send_setpoint(stamped.stamp, 3.0)
+        answered.set()
+        hanging.wait(LIMIT)
+
+    exchange, far = make(take=answer)
+    far.send(sample(0))
+    assert answered.wait(LIMIT)
+    assert exchange.watch() == pytest.approx(0.020)
+    exchange._steady.now += 20 * MS + 1
+    assert far.setpoint_where(lambda setpoint: setpoint.answered_counter == 0).current == 3.0
+    assert far.setpoint() == Setpoint(0.0, 0, False)
+    assert not hanging.is_set()
+    hanging.set()

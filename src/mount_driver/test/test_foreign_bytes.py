@@ -1,6 +1,5 @@
 """Whatever bytes come in as a frame or a datagram: a sound frame is used, all else costs itself alone."""
 
-import msgpack
 from far_end import CODEC, sample
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,20 +15,10 @@ SEEDS = st.integers(0, 1 << 62)
 SOUND = bytes(CODEC.encode_measurement(sample(1), 1))
 HEALTH = bytes(CODEC.encode_status(Status(13.5, 40.0), 1))
 DATAGRAM = pack_message(Frame(CODEC.measurement.frame_id, SOUND))
-PLAIN = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers(-(1 << 63), (1 << 64) - 1)
-    | st.floats()
-    | st.text()
-    | st.binary(),
-    lambda parts: st.lists(parts, max_size=3) | st.dictionaries(st.text(), parts, max_size=3),
-    max_leaves=8,
-)
 
 
 def link():
-    return Link(CODEC, CounterClock(), 20_000_000)
+    return Link(CODEC, CounterClock())
 
 
 @given(SEEDS)
@@ -39,7 +28,7 @@ def test_a_mutated_frame_is_used_only_if_it_is_the_one_that_was_sent(seed):
         used.take(CODEC.encode_measurement(sample(number), number), number)
     sound = bytes(CODEC.encode_measurement(sample(5), 5))
     found = used.take(mutated(sound, seed), 5)
-    assert found is None or found.sample == CODEC.decode_measurement(sound)[1]
+    assert found is None or found.sample == CODEC.measurement.decode(sound)[1]
 
 
 @given(SEEDS)
@@ -56,19 +45,9 @@ def test_a_mutated_datagram_is_a_frame_of_bytes_or_refused(seed):
     _check(mutated(DATAGRAM, seed))
 
 
-@given(PLAIN)
-def test_a_datagram_of_other_content_is_a_frame_of_bytes_or_refused(content):
-    _check(msgpack.packb(content))
-
-
-@given(st.dictionaries(st.sampled_from(['arbitration_id', 'data', 'dlc', 'is_error_frame', 'is_fd']), PLAIN))
-def test_a_datagram_with_other_values_is_a_frame_of_bytes_or_refused(fields):
-    _check(msgpack.packb({'arbitration_id': 0x210, 'data': SOUND} | fields))
-
-
 def _check(datagram):
     try:
-        message = _message(datagram, 0.0)
+        message = _message(datagram)
     except Exception:  # whatever: it is counted where frames are received
         return
     assert isinstance(message.arbitration_id, int)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_driver.clock import CounterClock, ElectronicsClock
-from mount_driver.link import Arrival, Link, Refusal
+from mount_driver.clock import ElectronicsClock
+from mount_driver.link import Link, Refusal
 from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
 
 CODEC = MountCodec()
@@ -21,7 +21,7 @@ def link():
 
 
 def new_link():
-    return Link(CODEC, ElectronicsClock(0), 20 * MS)
+    return Link(CODEC, ElectronicsClock(0))
 
 
 def frame(index, alive, **changes):
@@ -31,38 +31,16 @@ def frame(index, alive, **changes):
 
 def feed(link, indices, first_alive=0):
     """Let samples arrive and be stamped: sample k at k ms, in one frame after the other."""
-    arrivals = []
-    for alive, index in enumerate(indices, first_alive):
-        link.take(frame(index, alive), index * MS)
-        arrivals.append(link.arrival)
-    return arrivals
-
-
-def test_samples_in_order_are_new_across_the_wrap_of_their_counter(link):
-    assert set(feed(link, range(65_500, 65_600))) == {Arrival.NEW}
-    assert link.counts.lost == 0
-
-
-def test_in_lock_step_the_stamps_alone_make_a_sample_old():
-    link = Link(CODEC, CounterClock(), 20 * MS)
-    for index in range(30):
-        link.take(frame(index, index), received=60_000 * MS * index)
-    assert link.answer(9 * MS, 1.0, link.clock.now(10**15)) is not None
-    assert link.answer(8 * MS, 1.0, link.clock.now(10**15)) is None
-    assert link.last_refusal is Refusal.STALE
+    return [
+        link.take(frame(index, alive), index * MS) is not None
+        for alive, index in enumerate(indices, first_alive)
+    ]
 
 
 @pytest.mark.parametrize('missing', [1, 3, 500])
 def test_missing_samples_are_counted_by_their_number(link, missing):
     feed(link, [10, 11, 12 + missing])
     assert link.counts.lost == missing
-
-
-def test_the_alive_counter_alone_could_not_have_counted_300_missing_samples(link):
-    feed(link, [10])
-    assert feed(link, range(311, 314), first_alive=301) == [Arrival.DISORDERED] * 3
-    feed(link, [314], first_alive=304)
-    assert (link.counts.lost, link.samples.lost) == (303, 0)  # 300 and the three that were not believed
 
 
 def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
@@ -73,21 +51,9 @@ def test_the_same_sample_again_with_other_values_is_a_contradiction(link):
     assert (link.contradictions, link.counts.resent) == (1, 2)
 
 
-def test_the_same_frame_again_is_no_sample_at_all(link):
-    feed(link, [10, 11])
-    assert link.take(frame(11, alive=1), 12 * MS) is None
-    assert (link.counts.resent, link.counts.repeated) == (0, 1)
-    assert link.arrival is Arrival.DISORDERED
-
-
 def test_a_late_sample_is_not_handed_on(link):
-    assert feed(link, [10, 12, 11, 13]) == [Arrival.NEW, Arrival.NEW, Arrival.LATE, Arrival.NEW]
-
-
-def test_a_restart_of_the_electronics_loses_nothing_and_goes_on(link):
-    feed(link, range(30_000, 30_010))
-    assert feed(link, range(10)) == [Arrival.DISORDERED] * 3 + [Arrival.NEW] * 7
-    assert link.counts.lost == 0
+    assert feed(link, [10, 12, 11, 13]) == [True, True, False, True]
+    assert link.counts.late == 1
 
 
 @pytest.mark.parametrize(
@@ -108,30 +74,13 @@ def test_a_restart_or_a_pause_is_counted_once_and_not_as_lost_samples(link, befo
     assert link.clock.restarts + link.clock.gaps == (after != 65_400)
 
 
-def test_displacements_that_are_not_valid_are_counted(link):
-    stamped = link.take(frame(0, 0, displacement=math.nan), 0)
-    assert math.isnan(stamped.sample.displacement)
-    assert link.counts.invalid_displacements == 1
-
-
 def test_a_status_is_kept_and_a_corrupt_one_is_not(link):
-    link.take_status(CODEC.encode_status(Status(13.5, 40.0), 0))
+    link.take_status(CODEC.encode_status(Status(13.5, 40.0, e2e_error=True), 0))
     damaged = CODEC.encode_status(Status(1.5, 99.0), 1)
     damaged[3] ^= 1
     link.take_status(damaged)
-    assert link.status == Status(13.5, 40.0)
-    assert link.counts.corrupt == 1
-
-
-def test_statuses_that_tell_of_doubtful_setpoints_are_counted(link):
-    for alive, e2e_error in enumerate([False, True, False, True]):
-        link.take_status(CODEC.encode_status(Status(13.5, 40.0, e2e_error=e2e_error), alive))
-    assert link.counts.setpoint_errors == 2
-
-
-def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
-    feed(link, range(65_530, 65_540))
-    assert link.answer(65_537 * MS, 1.25, now=65_539 * MS) == Setpoint(1.25, 1, True)
+    assert link.status == Status(13.5, 40.0, e2e_error=True)
+    assert (link.counts.corrupt, link.counts.setpoint_errors) == (1, 1)
 
 
 @pytest.mark.parametrize(
@@ -144,35 +93,16 @@ def test_a_setpoint_carries_the_number_of_the_sample_that_it_answers(link):
         (100 * MS, 1.0, Refusal.UNKNOWN_SAMPLE),
         (20 * MS, 1.0, Refusal.UNKNOWN_SAMPLE),
         (78 * MS, 1.0, Refusal.STALE),
+        (80 * MS, 1.0, Refusal.SUPERSEDED),
     ],
 )
 def test_a_doubtful_setpoint_is_refused_counted_and_the_reason_kept(link, stamp, current, reason):
-    feed(link, range(100))
-    assert link.answer(stamp, current, now=99 * MS) is None
+    feed(link, range(65_500, 65_600))
+    stamp += 65_500 * MS
+    assert link.answer(65_581 * MS, 2.0, now=65_599 * MS) == Setpoint(2.0, 45, True)
+    assert link.answer(stamp, current, now=65_599 * MS) is None
     assert link.last_refusal is reason
-    assert (link.counts.refused, link.counts.setpoints) == (1, 0)
-
-
-def test_a_setpoint_20_ms_old_is_still_sent(link):
-    feed(link, range(100))
-    assert link.answer(79 * MS, 1.0, now=99 * MS) is not None
-
-
-def test_age_is_that_of_the_clock_and_not_that_of_the_newest_sample(link):
-    assert link.answer(0, 1.0, now=0) is None
-    assert link.last_refusal is Refusal.UNKNOWN_SAMPLE  # before the first one
-    feed(link, [0])
-    assert link.answer(0, 1.0, now=20 * MS + 1) is None
-    assert link.answer(0, 1.0, now=60_000 * MS) is None
-    assert (link.counts.refused, link.last_refusal) == (3, Refusal.STALE)
-    assert not link.driving
-
-
-def test_a_setpoint_for_an_older_sample_than_the_last_answered_is_refused(link):
-    feed(link, range(100))
-    link.answer(99 * MS, 1.0, now=99 * MS)
-    assert link.answer(98 * MS, 2.0, now=99 * MS) is None
-    assert link.last_refusal is Refusal.SUPERSEDED
+    assert (link.counts.refused, link.counts.setpoints) == (1, 1)
 
 
 @pytest.mark.parametrize('current', [3.001, 100.0, math.inf])
@@ -180,26 +110,6 @@ def test_more_than_3_ampere_is_limited_and_counted(link, current):
     feed(link, [0])
     assert link.answer(0, current, now=0).current == 3.0
     assert link.counts.limited == 1
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.floats(allow_nan=True, allow_infinity=True), st.integers(-200 * MS, 200 * MS))
-def test_no_setpoint_outside_0_to_3_ampere_ever_leaves(current, stamp):
-    link = new_link()
-    feed(link, range(100))
-    setpoint = link.answer(stamp, current, now=99 * MS)
-    assert setpoint is None or 0.0 <= setpoint.current <= 3.0
-
-
-def test_off_is_due_when_setpoints_stop_for_longer_than_the_timeout(link):
-    feed(link, [0])
-    assert not link.off_is_due(0)
-    link.answer(0, 1.0, now=5 * MS)
-    assert not link.off_is_due(20 * MS)  # after the sample, however late its answer came
-    assert link.off_is_due(20 * MS + 1)
-    assert link.off() == Setpoint(0.0, 0, False)
-    assert link.counts.setpoint_timeouts == 1
-    assert not link.driving
 
 
 def test_off_is_repeated_once_per_timeout_and_counted_once(link):
@@ -212,14 +122,6 @@ def test_off_is_repeated_once_per_timeout_and_counted_once(link):
             due.append(now // MS)
     assert due == [21, 42, 63, 84]
     assert link.counts.setpoint_timeouts == 1
-
-
-def test_without_any_setpoint_off_is_sent_but_no_timeout_is_counted(link):
-    feed(link, [0])
-    assert not link.off_is_due(0)
-    assert link.off_is_due(21 * MS)
-    assert link.off().answered_counter != 0
-    assert link.counts.setpoint_timeouts == 0
 
 
 def test_the_last_setpoint_is_given_again_only_for_the_sample_that_it_answered(link):

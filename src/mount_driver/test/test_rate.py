@@ -15,7 +15,7 @@ REFUSED = (
 
 def first_doubt(rate, period, counters, jitter=lambda k: 0, start=0):
     """Return (place, sentence) of the first doubt in samples of these counters, `period` us apart."""
-    link = Link(CODEC, CounterClock(), 20_000_000, sample_time_ns(rate))
+    link = Link(CODEC, CounterClock(), sample_time_ns(rate))
     for place, k in enumerate(counters):
         microseconds = (start + k * period + jitter(k)) % 2**32
         taken = sample(0)._replace(sample_counter=k % 65536, microseconds=microseconds)
@@ -32,10 +32,6 @@ def test_another_rate_is_refused_after_ten_samples(rate, period, limit):
     place, sentence = first_doubt(rate, period, range(7, 100))
     assert place <= 11
     assert sentence == REFUSED.format(period, f'{rate:g}', round(1e6 / rate), limit)
-
-
-def test_it_is_seen_behind_lost_frames_too():
-    assert first_doubt(1000.0, 500, range(0, 300, 3)) is not None
 
 
 @pytest.mark.parametrize('rate', [500.0, 625.0, 1000.0, 2000.0])

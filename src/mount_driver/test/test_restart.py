@@ -3,37 +3,21 @@
 import re
 
 import pytest
-from car import GOOD, MS, Car
-from far_end import CODEC, sample
+from car import GOOD, MS
+from far_end import sample
 
-from mount_driver.bus import Frame
 from mount_driver.link import Refusal
-from mount_driver.protocol import AliveCounter, Setpoint, Status
-
-BEGIN = GOOD * MS
-
-
-@pytest.fixture
-def car():
-    made = Car()
-    made.drive(GOOD, made.answer)
-    assert made.on_bus() == Setpoint(3.0, GOOD, True)
-    yield made
-    made.exchange.stop()
-    made.far.close()
+from mount_driver.protocol import AliveCounter, Status
 
 
 def restarted(car, pause):
     """Return electronics that are silent for `pause` ms, then count from 0 again."""
-    alive = AliveCounter()
+    car.far._measurement_alive = AliveCounter()
 
     def electronics(index):
         k = index - GOOD - 1 - pause
         if k >= 0:
-            measured = sample(k, coil_current=car.on_bus().current)
-            car.far.bus.send(
-                Frame(CODEC.measurement.frame_id, CODEC.encode_measurement(measured, alive.next()))
-            )
+            car.far.send(sample(k, coil_current=car.on_bus().current))
 
     return electronics
 
@@ -42,7 +26,7 @@ def restarted(car, pause):
 def test_a_restart_gives_0_ampere_for_good_and_needs_nothing_but_an_initialisation(car, pause):
     car.drive(900, car.answer, electronics=restarted(car, pause))
     link = car.exchange.link
-    assert car.off_since() <= BEGIN + min(pause + 4, 21) * MS
+    assert car.off_since() <= GOOD * MS + min(pause + 4, 21) * MS
     assert link.last_refusal is Refusal.SWITCHED_OFF
     assert link.needs_initialisation
     told = r"the electronics' counters .* begun anew, as at a restart \(1 times, limit 0\): check their"
@@ -53,26 +37,16 @@ def test_a_restart_gives_0_ampere_for_good_and_needs_nothing_but_an_initialisati
 @pytest.mark.parametrize(
     ('number', 'microseconds'),
     [
-        (1, 500_000),  # the clock jumps ahead
-        (1, 0),  # and stands still
-        (0, 1000),  # the counter of samples stands still
-        (300, 1000),  # and jumps
+        (1, 0),  # the clock stands still
+        (300, 1000),  # the counter of samples jumps
     ],
 )
 def test_counters_that_contradict_each_other_do_so_too(car, number, microseconds):
-    alive = AliveCounter()
-    for _ in range(GOOD):
-        alive.next()
-
-    def electronics(index):
-        k = index - GOOD - 1
-        told = sample(GOOD, coil_current=3.0)._replace(
-            sample_counter=GOOD + number + k, microseconds=GOOD * 1000 + microseconds + 1000 * k
-        )
-        car.far.bus.send(Frame(CODEC.measurement.frame_id, CODEC.encode_measurement(told, alive.next())))
-
-    car.drive(1, car.answer, electronics=electronics)
-    assert car.off_since() == BEGIN + MS
+    told = sample(GOOD, coil_current=3.0)._replace(
+        sample_counter=GOOD + number, microseconds=GOOD * 1000 + microseconds
+    )
+    car.drive(1, car.answer, electronics=lambda index: car.far.send(told))
+    assert car.off_since() == GOOD * MS + MS
     assert "the electronics' counters contradict each other" in car.exchange.link.fault
     assert car.exchange.link.needs_initialisation
 

@@ -4,28 +4,31 @@ Every doubt is a refusal.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 
-from mount_init.errors import CurrentNotFollowingError, InitialisationError
-from mount_init.estimate import ContactGap, Dwell, InductanceCurve, RestGap
+from mount_init.errors import InitialisationError
+from mount_init.estimate import ContactGap, RestGap
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
 from mount_init.supply import RampSupply
-from mount_models.actuator.law import checked_force
-from mount_models.coil.resistance import resistance_at
+from mount_models.actuator import checked_force
+from mount_models.coil.copper import resistance_at
 from mount_models.specimen import Specimen
 
 _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses in a ramp
+_BIN = 0.05  # A, chosen: some ten samples each
+_FEWEST_IN_BIN = 3
 _WORKING_CELSIUS = -40.0, 180.0  # degC, chosen: ISO 16750-4, insulation class H
 
 
-def check_rest_current(specimen: Specimen, dwell: Dwell, parameters: InitParameters) -> None:
-    """Raise `CurrentNotFollowingError` unless the mean current of a dwell is the rest current."""
-    if abs(dwell.current - specimen.rest_current) > parameters.rest_current_tolerance:
-        raise CurrentNotFollowingError(
-            f'coil current at rest ({dwell.current:.4f} A) must lie within '
+def check_rest_current(specimen: Specimen, current: FloatArray, parameters: InitParameters) -> None:
+    """Raise `InitialisationError` unless the median of the currents (A) of a dwell is the rest current."""
+    median = float(np.nanmedian(current))
+    if abs(median - specimen.rest_current) > parameters.rest_current_tolerance:
+        raise InitialisationError(
+            f'coil current at rest ({median:.4f} A) must lie within '
             f'{parameters.rest_current_tolerance * 1e3:.1f} mA of {specimen.rest_current:.3f} A, for which '
             'the gap curve is calibrated; check the current control of the electronics'
         )
@@ -75,37 +78,50 @@ def check_resistance(
     )
 
 
-def check_single_crossing(curve: InductanceCurve, specimen: Specimen) -> None:
-    """Raise `InitialisationError` unless L_i falls through its level exactly once above the rest current.
+def check_single_crossing(way: str, current: FloatArray, inductance: FloatArray, level: float) -> None:
+    """Raise `InitialisationError` unless the medians of L_i (H) fall through their level exactly once.
 
-    Below the crossing L_i may rise and fall again while the halves close; it must only stay above the level.
+    Below the crossing they may rise and fall again while the halves close; they must only stay above it.
     """
-    level = specimen.crossing_inductance
-    for name, current, inductance in _known_parts(curve, specimen.rest_current):
-        changes = _level_changes(inductance, level)
-        if len(changes) != 1 or not inductance[0] > level:
-            places = ', '.join(f'{0.5 * (current[k] + current[k + 1]):.2f} A' for k in changes) or 'nowhere'
-            reach = f'{np.min(inductance) * 1e3:.1f} .. {np.max(inductance) * 1e3:.1f} mH'
+    above = inductance > level
+    places = np.flatnonzero(above[1:] != above[:-1])
+    if places.size != 1 or not above[0]:
+        where = ', '.join(f'{0.5 * (current[k] + current[k + 1]):.2f} A' for k in places) or 'nowhere'
+        raise InitialisationError(
+            f'inductance on the way {way} must fall through {level * 1e3:.1f} mH exactly once; it crosses '
+            f'{where} (range {np.min(inductance) * 1e3:.1f} .. {np.max(inductance) * 1e3:.1f} mH): do the '
+            'pads close and stay closed? Check the sensors'
+        )
+
+
+def check_steady_fall(
+    way: str, current: FloatArray, inductance: FloatArray, crossing: float, half_width: float
+) -> None:
+    """Raise `InitialisationError` unless the medians of L_i (H) fall steadily around the crossing (A)."""
+    near = np.flatnonzero(np.abs(current - crossing) <= half_width)
+    for k in near[:-1]:
+        if inductance[k + 1] >= inductance[k]:
             raise InitialisationError(
-                f'inductance on the way {name} must fall through {level * 1e3:.1f} mH exactly once; it '
-                f'crosses {places} (range {reach}): do the pads close and stay closed? Check the sensors'
+                f'inductance on the way {way} must fall steadily within {half_width:.2f} A of the crossing; '
+                f'from {current[k]:.2f} to {current[k + 1]:.2f} A it rises from {inductance[k] * 1e3:.2f} to '
+                f'{inductance[k + 1] * 1e3:.2f} mH: do the pads bounce? Check pads and ripple sensors'
             )
 
 
-def check_steady_fall(curve: InductanceCurve, specimen: Specimen, parameters: InitParameters) -> None:
-    """Raise `InitialisationError` unless L_i falls from bin to bin around its only crossing."""
-    for name, current, inductance in _known_parts(curve, specimen.rest_current):
-        (place,) = _level_changes(inductance, specimen.crossing_inductance)
-        centre = 0.5 * (current[place] + current[place + 1])
-        near = np.flatnonzero(np.abs(current - centre) <= parameters.monotone_half_width)
-        for k in near[:-1]:
-            if inductance[k + 1] >= inductance[k]:
-                raise InitialisationError(
-                    f'inductance on the way {name} must fall steadily within '
-                    f'{parameters.monotone_half_width:.2f} A of the crossing; from {current[k]:.2f} to '
-                    f'{current[k + 1]:.2f} A it rises from {inductance[k] * 1e3:.2f} to '
-                    f'{inductance[k + 1] * 1e3:.2f} mH: do the pads bounce? Check pads and ripple sensors'
-                )
+def known_medians(
+    way: str, current: FloatArray, inductance: FloatArray, lowest: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return centres (A) and medians (H) of the bins above a `lowest` current (A) with enough readings."""
+    finite = np.isfinite(current) & np.isfinite(inductance)
+    bins, values = np.floor(current[finite] / _BIN).astype(int), inductance[finite]
+    places, counts = np.unique(bins, return_counts=True)
+    known = places[(counts >= _FEWEST_IN_BIN) & (_BIN * (places + 0.5) > lowest)]
+    if known.size < 2:
+        raise InitialisationError(
+            f'inductance on the way {way} is known at {known.size} currents above {lowest:.2f} A, needed '
+            'are 2; check the ripple sensors'
+        )
+    return _BIN * (known + 0.5), np.array([np.median(values[bins == place]) for place in known])
 
 
 def check_contact(
@@ -157,27 +173,9 @@ def check_peak_force(table: FloatArray, parameters: InitParameters) -> None:
         )
 
 
-def _known_parts(curve: InductanceCurve, rest_current: float) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-    """Yield name, currents (A) and inductances (H) of each ramp, without empty bins and those at rest."""
-    for name, inductance in (('up', curve.up), ('down', curve.down)):
-        known = np.isfinite(inductance) & (curve.current > rest_current)
-        if known.sum() < 2:
-            raise InitialisationError(
-                f'inductance on the way {name} is known at {int(known.sum())} currents above '
-                f'{rest_current:.2f} A, needed are 2; check the ripple sensors'
-            )
-        yield name, curve.current[known], inductance[known]
-
-
-def _level_changes(inductance: FloatArray, level: float) -> list[int]:
-    """Return the places before which and behind which the inductance lies on different sides of the level."""
-    above = inductance > level
-    return np.flatnonzero(above[1:] != above[:-1]).tolist()
-
-
-def check_rate(duration: int, count: int, parameters: InitParameters) -> None:
-    """Raise `InitialisationError` unless the `count` samples of a ramp took the right time (ns)."""
-    rate = 1e9 * (count - 1) / max(1, duration)
+def check_rate(stamps: Sequence[int], parameters: InitParameters) -> None:
+    """Raise `InitialisationError` unless the samples of a ramp, at `stamps` (ns), took the right time."""
+    rate = 1e9 * (len(stamps) - 1) / max(1, stamps[-1] - stamps[0])
     if abs(rate - parameters.sample_rate) > _RATE_TOLERANCE * parameters.sample_rate:
         raise InitialisationError(
             f'coil_ripple came at {rate:.0f} Hz, but sample_rate of mount_init is {parameters.sample_rate:g} '

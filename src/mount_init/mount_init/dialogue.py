@@ -17,10 +17,7 @@ from mount_init.initialisation import OFF, Initialisation
 
 _CHECK_PERIOD = 0.05  # s: how soon silence, a timeout or the end of the process is noticed
 _LONGEST_AGE = 2.0  # s, chosen: every node publishes its verdict once a second
-_VERDICT_PERIOD = 0.02  # s, chosen: how soon a verdict is noticed
-
-
-_Sample = tuple[int, float, float, float]  # stamp (ns), current (A), slopes of current and flux density
+_VERDICT_PATIENCE = 0.3  # s, chosen: the driver judges itself ten times a second
 
 
 class CoilDialogue:
@@ -32,8 +29,8 @@ class CoilDialogue:
         self._over = threading.Event()
         self._ramp: Initialisation | None = None
         self._ramp_start: int | None = None  # stamp of the first sample of the ramp
-        self._intruder: InitialisationError | None = None
-        self._newest: _Sample | None = None
+        self._intruder = ''
+        self._newest: tuple[int, float, float, float] | None = None  # as `take_ripple` takes them
         self._newest_arrival = -math.inf  # s, steady clock
         self._answered: int | None = None  # stamp of the newest sample that we answered
         self._last_setpoint = OFF
@@ -53,8 +50,7 @@ class CoilDialogue:
                     self._answered = self._foreign_stamp = None  # the electronics' time has started anew
             self._newest = (stamp, current, current_rate, flux_rate)
             self._newest_arrival = time.monotonic()
-            if self._ramp is not None:
-                self._answer(self._ramp, self._newest)
+            self._answer()
 
     def take_setpoint(self, stamp: int, current: float) -> None:
         """Take a setpoint (A) seen on the topic, ours or another node's, in answer to sample `stamp`."""
@@ -73,7 +69,7 @@ class CoilDialogue:
         """End the ramp, if one runs, because of what `sentence` says; `run` raises it."""
         with self._lock:
             if self._ramp is not None:
-                self._intruder = InitialisationError(sentence)
+                self._intruder = sentence
                 self._end()
 
     # What the transition does.
@@ -89,48 +85,45 @@ class CoilDialogue:
 
         A node that has just been deactivated is given the time to fall silent.
         """
-        if (remaining := self._foreign_arrival + duration - time.monotonic()) > 0.0:
-            ending.wait(remaining)
-        if (remaining := self._foreign_arrival + duration - time.monotonic()) > 0.0:
+        ending.wait(max(0.0, self._foreign_arrival + duration - time.monotonic()))
+        if (silent := time.monotonic() - self._foreign_arrival) < duration:
             raise InitialisationError(
-                f'another node sent a current_setpoint {(duration - remaining) * 1e3:.0f} ms ago, needed '
-                f'are {duration * 1e3:.0f} ms without any; deactivate mount_control first'
+                f'another node sent a current_setpoint {silent * 1e3:.0f} ms ago, needed are '
+                f'{duration * 1e3:.0f} ms without any; deactivate mount_control first'
             )
 
     def run(
-        self,
-        ramp: Initialisation,
-        silence_timeout: float,
-        total_timeout: float,
-        ending: threading.Event,
-        objection: Callable[[], str] = str,
+        self, ramp: Initialisation, ending: threading.Event, check: Callable[[], None] = lambda: None
     ) -> None:
         """Answer samples until `ramp` is finished; an unanswered sample that is already here comes first.
 
-        Raises `InitialisationError` after `silence_timeout` (s) without a sample, after `total_timeout` (s),
-        if another node answers too, if there is an `objection`, and if the process is ending. Leaves 0 A
-        behind in every case.
+        Raises `InitialisationError` after the timeouts of its parameters, if another node answers too, and
+        if the process is ending; calls `check` meanwhile. Leaves 0 A behind in every case.
         """
+        parameters, readings = ramp.parameters, ramp.readings
         try:
             self._begin(ramp)
             start = time.monotonic()
             while not self._over.wait(_CHECK_PERIOD):
-                now = time.monotonic()
+                check()
+                now, reason = time.monotonic(), ''
                 if ending.is_set():
-                    raise InitialisationError(
-                        'the ramp was given up because the process is ending; start it again'
+                    reason = 'the ramp was given up because the process is ending; start it again'
+                elif now - max(start, self._newest_arrival) > parameters.silence_timeout:
+                    reason = (
+                        f'air gap not estimated: {readings.valid} of {ramp.length} ripple samples, none in '
+                        f'the last {parameters.silence_timeout:.1f} s; is mount_driver active?'
                     )
-                if now - max(start, self._newest_arrival) > silence_timeout:
-                    raise ramp.silence(silence_timeout)
-                if now - start > total_timeout:
-                    raise InitialisationError(
-                        f'air gap not estimated: {ramp.readings.received} of {ramp.length} ripple samples in '
-                        f'{total_timeout:.1f} s; is mount_driver overloaded, or the measurement rate too low?'
+                elif now - start > parameters.total_timeout:
+                    reason = (
+                        f'air gap not estimated: {readings.received} of {ramp.length} ripple samples in '
+                        f'{parameters.total_timeout:.1f} s; is mount_driver overloaded, or the measurement '
+                        'rate too low?'
                     )
-                if reason := objection():
+                if reason:
                     raise InitialisationError(reason)
-            if self._intruder is not None:
-                raise self._intruder
+            if self._intruder:
+                raise InitialisationError(self._intruder)
         finally:
             self.switch_off()
 
@@ -144,19 +137,21 @@ class CoilDialogue:
     def _begin(self, ramp: Initialisation) -> None:
         with self._lock:
             self._over.clear()
-            self._intruder = None
+            self._intruder = ''
             self._own.clear()  # those that never came back
             self._ramp, self._ramp_start = ramp, None
             answers = self._answered, self._foreign_stamp
             if self._newest is not None and all(a is None or self._newest[0] > a for a in answers):
-                self._answer(ramp, self._newest)
+                self._answer()
 
-    def _answer(self, ramp: Initialisation, sample: _Sample) -> None:
-        if self._ramp_start is None:
-            self._ramp_start = sample[0]
-        self._answered = sample[0]
-        self._send(sample[0], ramp.step(*sample))
-        if ramp.finished:
+    def _answer(self) -> None:
+        """Answer the newest sample if a ramp runs."""
+        if self._ramp is None or self._newest is None:
+            return
+        self._answered = stamp = self._newest[0]
+        self._ramp_start = self._ramp_start or stamp
+        self._send(stamp, self._ramp.step(*self._newest))
+        if self._ramp.finished:
             self._end()
 
     def _send(self, stamp: int, setpoint: float) -> None:
@@ -170,44 +165,29 @@ class CoilDialogue:
 
 
 class DriverReport:
-    """The newest verdict of the driver; for any thread. `peak_current` (A) is what the ramp needs."""
+    """Why the driver lets no ramp through; for any thread. `peak_current` (A) is what the ramp needs."""
 
     def __init__(self, peak_current: float):
-        self._peak = peak_current
-        self._refusal = ''
-        self.late_setpoints: int | None = None
-        """How many setpoints came too late since its activation; None where it has not reported any count."""
-        self._arrival = 0.0  # s, steady clock
+        self._peak, self._refusal = peak_current, ''
+        self._arrival = -math.inf  # s, steady clock
 
     def take(self, refuses: bool, sentence: str, figures: Mapping[str, str]) -> None:
-        """Take a verdict; `refuses`: it keeps the coil at 0 A."""
+        """Take a report; `refuses`: the driver keeps the coil at 0 A."""
         allowed = float(figures.get('current_limit', self._peak))
         self._refusal = ''
         if refuses:
             self._refusal = f'mount_driver keeps the coil at 0 A: {sentence}'
         elif allowed < self._peak:
-            needed = f'the ramp needs {self._peak:.3f} A'
-            self._refusal = f'mount_driver lets the coil carry {allowed:.3f} A, {needed}: {sentence}'
-        self.late_setpoints = int(figures['late_setpoints']) if 'late_setpoints' in figures else None
+            self._refusal = (
+                f'mount_driver lets the coil carry {allowed:.3f} A, the ramp needs {self._peak:.3f} A: '
+                f'{sentence}'
+            )
         self._arrival = time.monotonic()
 
-    @property
-    def refusal(self) -> str:
-        """Why the driver lets no ramp through now; empty where it has not reported that within 2 s."""
-        return self._refusal if time.monotonic() - self._arrival < _LONGEST_AGE else ''
-
-    def wait_for_next(self, timeout: float, ending: threading.Event) -> None:
-        """Return when another verdict has come, or after `timeout` s."""
+    def refusal(self, ending: threading.Event) -> str:
+        """Return its reason of the last 2 s as soon as there is one; empty where none comes."""
         begin = time.monotonic()
-        _wait_until(lambda: self._arrival > begin, timeout, ending)
-
-    def settled(self, refusing: bool, timeout: float, ending: threading.Event) -> str:
-        """Return `refusal` as soon as there is one, or none, as `refusing` says, or after `timeout` s."""
-        _wait_until(lambda: bool(self.refusal) is refusing, timeout, ending)
-        return self.refusal
-
-
-def _wait_until(condition: Callable[[], bool], timeout: float, ending: threading.Event) -> None:
-    end = time.monotonic() + timeout
-    while not condition() and time.monotonic() < end and not ending.wait(_VERDICT_PERIOD):
-        """Wait on."""
+        while not self._refusal or time.monotonic() - self._arrival > _LONGEST_AGE:
+            if time.monotonic() - begin > _VERDICT_PATIENCE or ending.wait(_CHECK_PERIOD):
+                return ''
+        return self._refusal

@@ -9,6 +9,7 @@ rest averaged; the crossing is a parabola fitted with Tukey's bisquare weights (
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,15 +19,14 @@ from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray
 from mount_init.supply import crossing_at_curves, inductance_at_curves
-from mount_models.actuator.law import checked_force
-from mount_models.arithmetic.averages import mean, standard_deviation
+from mount_models.actuator import checked_force, zero_current_rest_gap
+from mount_models.arithmetic.sums import mean, standard_deviation
 from mount_models.coil.gap import (
     gap_from_crossing_current,
     gap_per_crossing_current,
     gap_per_inductance,
     rest_gap_from_inductance,
 )
-from mount_models.force_table import zero_current_rest_gap
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 
@@ -35,8 +35,6 @@ _KEPT = 256  # readings, chosen: at 10 Hz those of the longest ramp
 _MAD_TO_STD = 1.4826  # of a normal distribution
 _FARTHEST = 4.0  # chosen: of 500 good readings one in 30 runs is left out
 _ROUNDING = 1e-6  # chosen: quantisation of readings without noise is no outlier
-_BIN = 0.05  # A, chosen: some ten samples each
-_FEWEST_IN_BIN = 3
 _GAP_STEP = 1e-8  # m
 _CURRENT_STEP = 1e-5  # A
 
@@ -78,25 +76,6 @@ def coil_temperature(readings: TemperatureReadings, stamp: int | None, given: fl
 
 
 @dataclass(frozen=True)
-class Dwell:
-    """One dwell at the rest current: mean inductance and its standard deviation (H), mean current (A)."""
-
-    inductance: float
-    inductance_std: float
-    current: float
-    rejected: int
-
-
-@dataclass(frozen=True)
-class InductanceCurve:
-    """L_i over current, shape (M,): bin centres (A), medians on the way up and down (H); NaN where empty."""
-
-    current: FloatArray
-    up: FloatArray
-    down: FloatArray
-
-
-@dataclass(frozen=True)
 class RestGap:
     """Gap (m) at the rest current, gap at 0 A, and the standard deviation of the latter."""
 
@@ -115,29 +94,23 @@ class ContactGap:
     std: float
 
 
-def dwell_inductance(current: FloatArray, inductance: FloatArray, parameters: InitParameters) -> Dwell:
-    """Return the mean over one dwell, outliers left out; raises `InitialisationError` if they are many.
+def dwell_inductance(inductance: FloatArray, parameters: InitParameters) -> tuple[float, float]:
+    """Return the mean inductance (H) of one dwell and its standard deviation, outliers left out.
 
-    The standard deviation takes the ripples as independent.
+    The standard deviation takes the ripples as independent. Raises `InitialisationError` for many outliers.
     """
-    finite = np.isfinite(inductance)
-    values = inductance[finite]
-    deviation = np.abs(values - np.median(values))
+    values = inductance[np.isfinite(inductance)]
+    median = float(np.median(values))
+    deviation = np.abs(values - median)
     scatter = _MAD_TO_STD * float(np.median(deviation))
-    kept = deviation <= max(_FARTHEST * scatter, _ROUNDING * float(np.median(values)))
-    rejected = int(inductance.size - kept.sum())
-    if rejected - int((~finite).sum()) > parameters.rejected_share * values.size:
+    good = values[deviation <= max(_FARTHEST * scatter, _ROUNDING * median)]
+    rejected = values.size - good.size
+    if rejected > parameters.rejected_share * values.size:
         raise InitialisationError(
-            f'{values.size - int(kept.sum())} of {values.size} inductances at rest are outliers, more than '
+            f'{rejected} of {values.size} inductances at rest are outliers, more than '
             f'{parameters.rejected_share:.0%}; check the ripple sensors and their cables'
         )
-    good = values[kept]
-    return Dwell(
-        inductance=mean(good),
-        inductance_std=standard_deviation(good) / math.sqrt(good.size),
-        current=float(np.median(current[finite])),
-        rejected=rejected,
-    )
+    return mean(good), standard_deviation(good) / math.sqrt(good.size)
 
 
 def rest_gap(specimen: Specimen, inductance: float, inductance_std: float, celsius: float) -> RestGap:
@@ -190,38 +163,22 @@ def contact_gap(
     return ContactGap(gap, normal_force, gap + normal_force / pads, std)
 
 
-def inductance_curve(
-    current: FloatArray, inductance: FloatArray, up: slice, down: slice, current_high: float
-) -> InductanceCurve:
-    """Return the medians of L_i (H) in bins of 0.05 A from 0 A to `current_high` (A), for both ramps."""
-    edges = np.arange(0.0, current_high + 0.5 * _BIN, _BIN)
-    return InductanceCurve(
-        current=0.5 * (edges[1:] + edges[:-1]),
-        up=_binned_medians(edges, current[up], inductance[up]),
-        down=_binned_medians(edges, current[down], inductance[down]),
-    )
-
-
-def _binned_medians(edges: FloatArray, current: FloatArray, inductance: FloatArray) -> FloatArray:
-    finite = np.isfinite(current) & np.isfinite(inductance)
-    places = np.digitize(current[finite], edges) - 1
-    values = inductance[finite]
-    return np.array(
-        [
-            np.median(values[places == place]) if np.sum(places == place) >= _FEWEST_IN_BIN else np.nan
-            for place in range(edges.size - 1)
-        ]
-    )
+def _slope(law: Callable[[float], float], place: float, step: float, low: float, high: float) -> float:
+    """Return the slope of a law about `place` inside its range, from the side that lies inside."""
+    begin, end = max(place - step, low), min(place + step, high)
+    return (law(end) - law(begin)) / (end - begin)
 
 
 def _force_per_gap(specimen: Specimen, current: float, gap: float) -> float:
-    """Return dF/d(gap) (N/m) inside the law's range, from the side that lies inside."""
+    """Return dF/d(gap) (N/m)."""
     law = specimen.force_law
-    low, high = max(gap - _GAP_STEP, law.gap_low), min(gap + _GAP_STEP, law.gap_high)
-    return float(checked_force(law, current, high) - checked_force(law, current, low)) / (high - low)
+    return _slope(
+        lambda at: float(checked_force(law, current, at)), gap, _GAP_STEP, law.gap_low, law.gap_high
+    )
 
 
 def _force_per_current(specimen: Specimen, current: float, gap: float) -> float:
     law = specimen.force_law
-    low, high = max(current - _CURRENT_STEP, 0.0), min(current + _CURRENT_STEP, law.current_high)
-    return float(checked_force(law, high, gap) - checked_force(law, low, gap)) / (high - low)
+    return _slope(
+        lambda at: float(checked_force(law, at, gap)), current, _CURRENT_STEP, 0.0, law.current_high
+    )

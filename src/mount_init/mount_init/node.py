@@ -1,7 +1,6 @@
 """ROS 2 node of the initialisation: at each activation one current ramp, then gaps and table, latched."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 from mount_init.dialogue import CoilDialogue, DriverReport
@@ -21,12 +20,8 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 
-_DRIVER_TIMEOUT = 0.3  # s, chosen: the driver judges itself ten times a second
-_VERDICT_TIMEOUT = 1.2  # s, chosen: it publishes its figures once a second
 _GAPS = ('rest_gap', 'contact_gap', 'rest_gap_std', 'contact_gap_std')
 _WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
-_SKIPPED_SHARE = 0.02  # chosen
-_OF_LIMIT = 0.5  # chosen: a standard deviation this near to its limit is worth a look
 
 
 class MountInit(SafeLifecycleNode):
@@ -68,29 +63,29 @@ class MountInit(SafeLifecycleNode):
         if self._unsubscribed:
             self._dialogue.forget_streams()
             self._subscribe_streams()
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
-        if reason := self._driver.settled(False, _DRIVER_TIMEOUT, self.ending):
-            raise InitialisationError(reason)
-        ramp = Initialisation(self._specimen, self._init_parameters, self._temperatures)
+        parameters = self._init_parameters
+        if self.lockstep:  # only silence can tell a stalled chain from a slow machine
+            parameters = parameters._replace(total_timeout=math.inf)
+        ramp = Initialisation(self._specimen, parameters, self._temperatures)
         try:
-            result = self._ramp(ramp)
+            # The diagnostics pause meanwhile, so it is looked for other writers here.
+            self._dialogue.run(ramp, self.ending, self._path.publisher_watch.check)
+            result = ramp.result()
         except InitialisationError as error:
-            if reason := self._driver.settled(True, _DRIVER_TIMEOUT, self.ending):
-                raise InitialisationError(reason) from error
-            raise
-        assert ramp.last_stamp is not None
-        table = table_message(ramp.last_stamp, result.table)
+            raise InitialisationError(self._driver.refusal(self.ending) or str(error)) from error
+        stamp = ramp.stamps[-1]
         numbers = [getattr(result, name) for name in self._air_gap.names]
-        self._send_air_gap(self._air_gap.pack(ramp.last_stamp, numbers))
-        self._send_table(table)
+        self._send_air_gap(self._air_gap.pack(stamp, numbers))
+        self._send_table(table_message(stamp, result.table))
         self.get_logger().info(_summary(result))
         if not self.lockstep:  # there the sample that waits for the next ramp must not be missed
             # No sample is answered any more: without subscriptions there is less to do.
             for topic in (topics.COIL_RIPPLE, topics.CURRENT_SETPOINT, topics.DIAGNOSTICS):
                 self._path.unsubscribe(topic)
             self._unsubscribed = True
-        self._result = (ramp.last_stamp, result)
+        self._result = stamp, result
 
     def deactivate(self) -> None:
         self._result = None
@@ -106,26 +101,8 @@ class MountInit(SafeLifecycleNode):
     def judge(self) -> Verdict:
         assert self._result is not None
         stamp, result = self._result
-        found = verdict(result, self._specimen, self._init_parameters)
-        figures = {**found.figures, 'messages_malformed': self._path.refused, 'last_stamp': stamp}
-        return replace(found, figures=figures)
-
-    def _ramp(self, ramp: Initialisation) -> InitialisationResult:
-        parameters = self._init_parameters
-        # in lock-step only silence can tell a stalled chain from a slow machine
-        total_timeout = math.inf if self.lockstep else parameters.total_timeout
-        before = self._driver.late_setpoints or 0
-        self._dialogue.run(ramp, parameters.silence_timeout, total_timeout, self.ending, self._objection)
-        if ramp.disturbed:
-            self._driver.wait_for_next(_VERDICT_TIMEOUT, self.ending)
-            late = self._driver.late_setpoints
-            if late is not None:
-                ramp.note_late(late - before if late >= before else late)
-        return ramp.result()
-
-    def _objection(self) -> str:
-        self._path.publisher_watch.check()  # the diagnostics pause meanwhile
-        return self._driver.refusal
+        found = verdict(result, self._specimen)
+        return replace(found, figures={**found.figures, 'last_stamp': stamp})
 
     def _subscribe_streams(self) -> None:
         self._path.subscribe(topics.COIL_RIPPLE, self._on_ripple)
@@ -154,7 +131,7 @@ class MountInit(SafeLifecycleNode):
         self._dialogue.take_setpoint(stamp, current)
 
 
-def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Verdict:
+def verdict(result: InitialisationResult, specimen: Specimen) -> Verdict:
     """Return the verdict on a latched result; a pure function."""
     evidence, supply = result.evidence, result.evidence.supply
     figures = {
@@ -165,17 +142,14 @@ def verdict(result: InitialisationResult, specimen: Specimen, parameters: InitPa
         'coil_temperature_celsius': f'{evidence.temperature.celsius:.1f}',
         'coil_temperature_from': evidence.temperature.source,
         'resistance_ohm': f'{supply.whole.ohm:.3f}',
-        'resistance_std_ohm': f'{supply.whole.std:.4f}',
         'link_voltage_V': f'{supply.whole.link_voltage:.2f}',
-        'link_voltage_lowest_V': f'{supply.lowest:.2f}',
-        'link_voltage_highest_V': f'{supply.highest:.2f}',
-        'carried_to_voltage_of_curves': supply.carried,
         'wear_reserve_um': f'{wear_reserve(result, specimen) * 1e6:.1f}',
         'samples_used': evidence.samples,
         'samples_invalid': evidence.skipped,
     }
-    found = [Finding(Level.WARN, 'result', each) for each in _warnings(result, specimen, parameters)]
-    return verdict_on(found[:1], _summary(result), figures)
+    warning = _warning(result, specimen)
+    findings = [Finding(Level.WARN, 'result', warning)] if warning else []
+    return verdict_on(findings, _summary(result), figures)
 
 
 def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
@@ -184,35 +158,21 @@ def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
     return float(pressed_gap - specimen.force_law.gap_low)
 
 
-def _warnings(result: InitialisationResult, specimen: Specimen, parameters: InitParameters) -> Iterator[str]:
-    """Yield what a result that holds is warned of, gravest first."""
-    evidence, reserve = result.evidence, wear_reserve(result, specimen)
+def _warning(result: InitialisationResult, specimen: Specimen) -> str:
+    """Return what a result that holds is warned of, empty where it is nothing."""
+    reserve = wear_reserve(result, specimen)
     if reserve < _WEAR_RESERVE:
-        yield (
+        return (
             f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
             f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
         )
-    for name, std, largest in (
-        ('rest gap', result.rest_gap_std, parameters.largest_rest_gap_std),
-        ('contact gap', result.contact_gap_std, parameters.largest_contact_gap_std),
-    ):
-        if std > _OF_LIMIT * largest:
-            yield (
-                f'standard deviation of the {name} ({std * 1e6:.2f} um) is more than half of its limit '
-                f'{largest * 1e6:.2f} um; check the ripple sensors'
-            )
-    total = evidence.samples + evidence.skipped
-    if evidence.skipped > _SKIPPED_SHARE * total:
-        yield (
-            f'{evidence.skipped} of {total} ripple samples were invalid, more than {_SKIPPED_SHARE:.0%}; '
-            'check the coil ripple measurement'
-        )
-    if specimen.temperature is not None and math.isnan(evidence.temperature.celsius):
-        yield (
+    if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
+        return (
             f'{_summary(result)}; not compensated for the coil temperature, which is unknown: right at '
             f'{specimen.temperature.calibration_celsius:.0f} degC only; do the electronics report it '
             '(topic coil_temperature)? Else set coil_temperature_celsius'
         )
+    return ''
 
 
 def _summary(result: InitialisationResult) -> str:

@@ -13,7 +13,6 @@ from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_models.coil.gap import measured_inductance
 
-_APPROACH = 0.25  # chosen: share of `ramp_duration` for the way from 0 A to the peak
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -64,23 +63,6 @@ def current_ramp(parameters: InitParameters, rest_current: float) -> Ramp:
     )
 
 
-def approach(parameters: InitParameters, ramp: Ramp, place: int) -> list[float]:
-    """Return the setpoints (A) from 0 A to that of the sample number `place`, at whose end the halves rest.
-
-    Behind the peak they come from there, as in the ramp itself.
-    """
-    target, peak = float(ramp.setpoints[place]), float(ramp.setpoints[ramp.down.start - 1])
-    rest = [target] * _count(parameters, parameters.settle_duration)
-
-    def way(begin: float, end: float) -> list[float]:
-        duration = _APPROACH * parameters.ramp_duration * abs(end - begin) / peak
-        return [*(begin + (end - begin) * _smooth_step(max(1, _count(parameters, duration))))]
-
-    if place < ramp.down.start:
-        return [*way(0.0, target), *rest]
-    return [*way(0.0, peak), *([peak] * len(rest)), *way(peak, target), *rest]
-
-
 class Readings:
     """Current (A), slopes of current (A/s) and flux density (T/s), by sample number; NaN where invalid."""
 
@@ -94,12 +76,6 @@ class Readings:
     def valid(self) -> int:
         """Number of samples received with all three readings finite."""
         return self.received - self.skipped
-
-    def forget(self, number: int) -> None:
-        """Take back the samples from `number` on."""
-        self.skipped -= int(np.isnan(self.current[number : self.received]).sum())
-        self._rows[:, number:] = np.nan
-        self.received = number
 
     def add(self, *sample: float) -> bool:
         """Store the next sample; return whether it is valid. What is not finite is skipped and counted."""

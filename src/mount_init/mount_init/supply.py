@@ -14,17 +14,23 @@ import numpy as np
 from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 from mount_init.ramp import FloatArray, Ramp, Readings
-from mount_models.coil.crossing import Crossing, find_crossing
-from mount_models.coil.duty import at_calibrated_duty, duty, gap_reluctance, skin_ratio
-from mount_models.coil.gap import ScaledPolynomial, evaluate
-from mount_models.coil.resistance import (
+from mount_models.coil.copper import (
     CoilResistance,
     DriftingResistance,
     measured_resistance,
     resistance_at,
     resistance_beside_drift,
 )
-from mount_models.coil.temperature import crossing_at_calibration, inductance_at_calibration
+from mount_models.coil.correction import (
+    at_calibrated_duty,
+    crossing_at_calibration,
+    duty,
+    gap_reluctance,
+    inductance_at_calibration,
+    skin_ratio,
+)
+from mount_models.coil.crossing import Crossing, find_crossing
+from mount_models.coil.gap import ScaledPolynomial, evaluate
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import Specimen
 
@@ -41,8 +47,7 @@ class RampSupply(NamedTuple):
     """Lowest and highest voltage of the bridge in the ramp (V), and what that tells of the resistance.
 
     `whole` is that of a voltage which stays the same. Where it changed, `parts` holds those of the way up and
-    down, none of a part in which it changed too unevenly to tell. `carried`: the inductances were carried to
-    the voltage of the gap curves.
+    down, none of a part in which it changed too unevenly to tell.
     """
 
     lowest: float
@@ -50,7 +55,6 @@ class RampSupply(NamedTuple):
     steady: bool
     whole: CoilResistance
     parts: tuple[DriftingResistance, ...]
-    carried: bool
 
 
 def inductance_at_supply_of_curves(
@@ -81,7 +85,7 @@ def inductance_at_supply_of_curves(
         voltage = _smooth(volts + resistance * current, driven, parameters)
     lowest, highest = float(voltage[driven].min()), float(voltage[driven].max())
     parts = () if steady else _parts(specimen, ramp, readings, lowest)
-    supply = RampSupply(lowest, highest, steady, whole, parts, carried=False)
+    supply = RampSupply(lowest, highest, steady, whole, parts)
     bridge, name, compensation = specimen.bridge, specimen.name, specimen.temperature
     _check_range(
         supply,
@@ -123,7 +127,7 @@ def inductance_at_supply_of_curves(
         with contextlib.suppress(OutsideLawError):
             found = crossing_at_curves(specimen, found, celsius)
         carry(moved, _within(curves.gap_of_crossing_current, found))
-    return result, supply._replace(carried=True)
+    return result, supply
 
 
 def inductance_crossing(

@@ -9,7 +9,6 @@ from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings, coil_temperature
 from mount_init.node import verdict
 from mount_init.parameters import InitParameters
-from mount_models.specimen import Specimen
 from mount_ros.nodes.diagnostics import Level
 
 SECOND = 1_000_000_000  # ns
@@ -23,29 +22,22 @@ def readings(*pairs):
     return made
 
 
-def at(made, time):
-    return made.at(round(time * SECOND))
-
-
-def test_the_newest_reading_up_to_then_counts():
-    made = readings((1.0, 30.0), (1.1, 31.0), (1.2, 32.0))
-    assert at(made, 1.15) == 31.0
-    assert at(made, 1.2) == 32.0
-    assert math.isnan(at(made, 0.9))
-    assert at(readings((1.0, 30.0), (1.1, math.nan)), 1.2) == 30.0  # NaN is no reading
-    made = readings(*((0.1 * k, 20.0 + 0.1 * k) for k in range(340)))  # 10 Hz over the longest ramp
-    assert at(made, 17.0) == pytest.approx(37.0)
-
-
-def test_a_reading_that_is_too_old_does_not_count():
-    assert at(readings((1.0, 30.0)), 6.0) == 30.0
-    assert math.isnan(at(readings((1.0, 30.0)), 6.001))
-
-
-def test_readings_from_before_the_time_started_anew_are_gone():
-    """A new stream may come to the stamps of the old one before it has a reading of its own there."""
-    assert math.isnan(at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 7.5))
-    assert at(readings((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 9.0) == 20.0
+@pytest.mark.parametrize(
+    ('pairs', 'time', 'expected'),
+    [
+        (((1.0, 30.0), (1.1, 31.0), (1.2, 32.0)), 1.15, 31.0),  # the newest up to then
+        (((1.0, 30.0), (1.1, 31.0), (1.2, 32.0)), 1.2, 32.0),
+        (((1.0, 30.0),), 0.9, math.nan),
+        (((1.0, 30.0), (1.1, math.nan)), 1.2, 30.0),  # NaN is no reading
+        (tuple((0.1 * k, 20.0 + 0.1 * k) for k in range(340)), 17.0, 37.0),  # 10 Hz over the longest ramp
+        (((1.0, 30.0),), 6.0, 30.0),
+        (((1.0, 30.0),), 6.001, math.nan),  # too old
+        (((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 7.5, math.nan),  # the time started anew
+        (((7.0, 60.0), (9.0, 61.0), (8.0, 20.0)), 9.0, 20.0),
+    ],
+)
+def test_the_newest_reading_up_to_then_counts(pairs, time, expected):
+    assert readings(*pairs).at(round(time * SECOND)) == pytest.approx(expected, nan_ok=True)
 
 
 def test_what_is_measured_comes_before_what_is_given_and_that_before_nothing():
@@ -67,10 +59,6 @@ def warm(simulated_actuator, celsius):
     return plant
 
 
-def judged(result, specimen: Specimen):
-    return verdict(result, specimen, PARAMETERS)
-
-
 def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
     simulated_actuator, specimen, run_initialisation
 ):
@@ -81,7 +69,7 @@ def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
     expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, given)
     assert (measured.rest_gap, measured.contact_gap) == (expected.rest_gap, expected.contact_gap)
     assert measured.evidence.temperature == (60.0, 'measured')
-    said = judged(measured, specimen)
+    said = verdict(measured, specimen)
     assert said.level == Level.OK
     assert said.figures['coil_temperature_celsius'] == '60.0'
     assert said.figures['coil_temperature_from'] == 'measured'
@@ -96,7 +84,7 @@ def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warn
     expected = run_initialisation(warm(simulated_actuator, 60.0), of_any_resistance, calibrated)
     assert (result.rest_gap, result.contact_gap) == (expected.rest_gap, expected.contact_gap)
     assert abs(result.rest_gap - 508e-6) > 20e-6  # what the warning is for
-    said = judged(result, specimen)
+    said = verdict(result, specimen)
     assert said.level == Level.WARN
     assert said.sentence.startswith('rest gap ')
     assert 'not compensated for the coil temperature, which is unknown: right at 20 degC' in said.sentence
@@ -108,7 +96,7 @@ def test_a_specimen_without_compensation_asks_for_no_temperature(
     simulated_actuator, specimen, run_initialisation
 ):
     plain = replace(specimen, temperature=None)
-    assert judged(run_initialisation(simulated_actuator(), plain, PARAMETERS), plain).level == Level.OK
+    assert verdict(run_initialisation(simulated_actuator(), plain, PARAMETERS), plain).level == Level.OK
 
 
 def test_a_measured_temperature_beyond_the_compensation_is_refused(

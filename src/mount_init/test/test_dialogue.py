@@ -1,11 +1,11 @@
 """Each sample is answered at most once, nobody else is disturbed, and the end is 0 A."""
 
-import math
 import threading
+import time
 
 import pytest
 
-from mount_init.dialogue import CoilDialogue
+from mount_init.dialogue import CoilDialogue, DriverReport
 from mount_init.errors import InitialisationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
@@ -19,13 +19,20 @@ class Bench:
 
     def __init__(self, specimen):
         self.setpoints = []
+        self.specimen = specimen
         self.dialogue = CoilDialogue(lambda stamp, current: self.setpoints.append((stamp, current)))
-        self.ramp = Initialisation(specimen, InitParameters(sample_rate=100.0))
         self.ending = threading.Event()
         self.outcome = None
-        self._thread = None
+        self.thread = None
 
-    def start(self, silence=LONG, total=math.inf):
+    @property
+    def numbers(self):
+        """The numbers of the samples that were answered."""
+        return [stamp // STEP for stamp, _ in self.setpoints]
+
+    def start(self, silence_timeout=LONG, total_timeout=LONG):
+        parameters = InitParameters(100.0, silence_timeout=silence_timeout, total_timeout=total_timeout)
+        self.ramp = Initialisation(self.specimen, parameters)
         begun = threading.Event()
         begin = self.dialogue._begin
 
@@ -35,186 +42,132 @@ class Bench:
 
         def run():
             try:
-                self.dialogue.run(self.ramp, silence, total, self.ending)
+                self.dialogue.run(self.ramp, self.ending)
             except InitialisationError as error:
-                self.outcome = error
+                self.outcome = str(error)
 
         self.dialogue._begin = begin_and_tell
-        self._thread = threading.Thread(target=run)
-        self._thread.start()
+        self.thread = threading.Thread(target=run)
+        self.thread.start()
         assert begun.wait(LONG)
 
     def join(self):
-        self._thread.join(LONG)
-        assert not self._thread.is_alive()
+        self.thread.join(LONG)
+        assert not self.thread.is_alive()
         return self.outcome
 
-    def sample(self, number):
-        """Deliver the sample of this number, with the current of the last setpoint."""
-        current = self.setpoints[-1][1] if self.setpoints else 0.0
-        self.dialogue.take_ripple(number * STEP, current, 300.0, 100.0)
-
-    def echo(self):
-        """Deliver the last setpoint as it comes back from the topic."""
-        self.dialogue.take_setpoint(*self.setpoints[-1])
+    def sample(self, *numbers, echo=False):
+        """Deliver the samples of these numbers, each with the current of the last setpoint."""
+        for number in numbers:
+            current = self.setpoints[-1][1] if self.setpoints else 0.0
+            self.dialogue.take_ripple(number * STEP, current, 300.0, 100.0)
+            if echo:  # the setpoint, as it comes back from the topic
+                self.dialogue.take_setpoint(*self.setpoints[-1])
 
 
 @pytest.fixture
 def bench(specimen):
-    return Bench(specimen)
+    made = Bench(specimen)
+    yield made
+    made.ending.set()
+    if made.thread:
+        made.join()
 
 
 def test_every_sample_of_the_ramp_is_answered_once_with_its_own_stamp(bench):
     bench.start()
-    for number in range(1, bench.ramp.length + 1):
-        bench.sample(number)
-        bench.echo()
+    ramp = range(1, bench.ramp.length + 1)
+    bench.sample(*ramp, echo=True)
     assert bench.join() is None
-    assert [stamp for stamp, _ in bench.setpoints] == [n * STEP for n in range(1, bench.ramp.length + 1)]
+    assert bench.numbers == [*ramp]
     assert [current for _, current in bench.setpoints] == bench.ramp.ramp.setpoints.tolist()
-    assert bench.ramp.last_stamp == bench.ramp.length * STEP
-    bench.sample(bench.ramp.length + 1)
-    assert len(bench.setpoints) == bench.ramp.length
+    bench.sample(bench.ramp.length + 1)  # no ramp runs
+    bench.ending.set()  # a wait would end at once, and the second look would refuse
+    bench.dialogue.await_quiet(100.0, bench.ending)  # its own setpoints are not those of others
+    bench.ending.clear()
+    bench.start()
+    assert bench.numbers == [*ramp, bench.ramp.length + 1]
 
 
-def test_without_a_ramp_nothing_is_answered(bench):
-    for number in range(1, 10):
-        bench.sample(number)
-    bench.dialogue.switch_off()
+@pytest.mark.parametrize(
+    ('samples', 'foreign', 'answered'),
+    [
+        ((6, 7), None, [7, 8]),  # one waits
+        ((7,), 7, [8]),  # another node has answered it
+        ((7,), 6, [7, 8]),
+        ((1000, 1), None, [1, 8]),  # the electronics began anew
+    ],
+)
+def test_the_newest_sample_that_nobody_has_answered_is_answered_first(bench, samples, foreign, answered):
+    bench.sample(*samples)
+    if foreign is not None:
+        bench.dialogue.take_setpoint(foreign * STEP, 0.0)
     assert bench.setpoints == []
-
-
-def test_a_waiting_sample_is_answered_first(bench):
-    bench.sample(6)
-    bench.sample(7)
     bench.start()
-    assert [stamp for stamp, _ in bench.setpoints] == [7 * STEP]
     bench.sample(8)
-    assert [stamp for stamp, _ in bench.setpoints] == [7 * STEP, 8 * STEP]
-    bench.ending.set()
-    bench.join()
+    assert bench.numbers == answered
 
 
-def test_a_waiting_sample_that_another_node_has_answered_is_left_alone(bench):
-    bench.sample(7)
-    bench.dialogue.take_setpoint(7 * STEP, 0.0)
+def test_the_last_sample_of_one_ramp_is_not_answered_again_by_the_next(bench):
     bench.start()
-    assert bench.setpoints == []
-    bench.sample(8)
-    assert [stamp for stamp, _ in bench.setpoints] == [8 * STEP]
-    bench.ending.set()
+    bench.sample(*range(1, bench.ramp.length + 1))
     bench.join()
-
-
-def test_a_waiting_sample_newer_than_the_last_answer_of_others_is_answered(bench):
-    bench.dialogue.take_setpoint(6 * STEP, 0.0)
-    bench.sample(7)
     bench.start()
-    assert [stamp for stamp, _ in bench.setpoints] == [7 * STEP]
-    bench.ending.set()
-    bench.join()
-
-
-def test_the_last_sample_of_one_ramp_is_not_answered_again_by_the_next(bench, specimen):
-    bench.start()
-    for number in range(1, bench.ramp.length + 1):
-        bench.sample(number)
-        bench.echo()
-    bench.join()
-    count = len(bench.setpoints)
-    bench.ramp = Initialisation(specimen, InitParameters(sample_rate=100.0))
-    bench.start()
-    assert len(bench.setpoints) == count
-    bench.sample(bench.ramp.length + 1)
-    assert len(bench.setpoints) == count + 1
-    bench.ending.set()
-    bench.join()
+    bench.sample(bench.ramp.length, bench.ramp.length + 1)
+    assert bench.numbers == [*range(1, bench.ramp.length + 2)]
 
 
 def test_repeated_and_late_samples_are_not_answered(bench):
     bench.start()
-    for number in (1, 2, 2, 1, 3):
-        bench.sample(number)
-    assert [stamp // STEP for stamp, _ in bench.setpoints] == [1, 2, 3]
+    bench.sample(1, 2, 2, 1, 3)
+    assert bench.numbers == [1, 2, 3]
     assert bench.ramp.readings.received == 3
-    bench.ending.set()
-    bench.join()
 
 
-def test_electronics_that_start_anew_are_answered(bench):
-    bench.sample(1000)
-    bench.dialogue.take_setpoint(1000 * STEP, 0.0)
-    bench.sample(1)
-    bench.start()
-    assert [stamp // STEP for stamp, _ in bench.setpoints] == [1]
-    bench.ending.set()
-    bench.join()
+@pytest.mark.parametrize(
+    ('end', 'sentence'),
+    [
+        (lambda bench: None, '99 of 275 ripple samples, none in the last 0.1 s; is mount_driver active?'),
+        (lambda bench: bench.ending.set(), 'the process is ending'),
+        (
+            lambda bench: bench.dialogue.take_setpoint(99 * STEP, 1.234),
+            '1.234 A during the ramp; deactivate mount_control',
+        ),
+        (lambda bench: bench.dialogue.give_way('another node publishes'), 'another node publishes'),
+    ],
+)
+def test_whatever_ends_a_ramp_ends_it_at_0_ampere_with_its_reason(bench, end, sentence):
+    bench.start(silence_timeout=0.1)
+    bench.sample(*range(1, 100), echo=True)
+    assert bench.setpoints[-1][1] > 0.0
+    end(bench)
+    assert sentence in bench.join()
+    assert bench.setpoints[-1] == (99 * STEP, 0.0)
 
 
-def test_silence_ends_the_ramp_with_zero_current(bench):
-    bench.start(silence=0.1)
-    for number in range(1, 38):
-        bench.sample(number)
-    error = bench.join()
-    assert isinstance(error, InitialisationError)
-    assert '37 of 275 ripple samples, none in the last 0.1 s; is mount_driver active?' in str(error)
-    assert bench.setpoints[-2][1] > 0.0
-    assert bench.setpoints[-1] == (37 * STEP, 0.0)
-
-
-@pytest.mark.parametrize('number', [0, 1])
-def test_silence_from_the_start_and_a_sample_that_only_comes_again_end_the_ramp(bench, number):
-    bench.start(silence=0.1)
-    for _ in range(400):  # 2 s
-        if number:
-            bench.sample(number)
-        bench._thread.join(0.005)
-    assert not bench._thread.is_alive()
-    assert f'{number} of 275 ripple samples, none in the last 0.1 s' in str(bench.join())
-    assert [current for _, current in bench.setpoints if current > 0.01] == []
-    assert number or bench.setpoints == []
+@pytest.mark.parametrize(
+    ('step', 'timeouts', 'sentence'),
+    [
+        (0, {'silence_timeout': 0.1}, '1 of 275 ripple samples, none in the last 0.1 s'),  # it only repeats
+        (1, {'total_timeout': 0.1}, 'of 275 ripple samples in 0.1 s'),
+    ],
+)
+def test_samples_that_repeat_or_come_too_slowly_end_the_ramp(bench, step, timeouts, sentence):
+    bench.start(**timeouts)
+    for number in range(200):  # 1 s
+        bench.sample(1 + step * number)
+        bench.thread.join(0.005)
+    assert not bench.thread.is_alive()
+    assert sentence in bench.join()
+    assert bench.setpoints[-1][1] < 0.01
 
 
 def test_a_late_setpoint_of_another_node_for_a_sample_before_the_ramp_ends_no_ramp(bench):
     bench.start()
     bench.sample(10)
     bench.dialogue.take_setpoint(9 * STEP, 0.0)
-    for number in range(11, 10 + bench.ramp.length):
-        bench.sample(number)
+    bench.sample(*range(11, 10 + bench.ramp.length))
     assert bench.join() is None
-
-
-def test_a_ramp_that_takes_too_long_is_given_up(bench):
-    bench.start(total=0.1)
-    number = 0
-    while bench._thread.is_alive() and number < 200:
-        number += 1
-        bench.sample(number)
-        bench._thread.join(0.005)
-    assert 'of 275 ripple samples in 0.1 s' in str(bench.join())
-    assert bench.setpoints[-1][1] == 0.0
-
-
-def test_the_end_of_the_process_ends_the_ramp_with_zero_current(bench):
-    bench.start()
-    for number in range(1, 100):
-        bench.sample(number)
-    bench.ending.set()
-    assert 'the process is ending' in str(bench.join())
-    assert bench.setpoints[-2][1] > 0.0
-    assert bench.setpoints[-1] == (99 * STEP, 0.0)
-
-
-def test_a_setpoint_of_another_node_ends_the_ramp_with_zero_current(bench):
-    bench.start()
-    for number in range(1, 100):
-        bench.sample(number)
-        bench.echo()
-    bench.dialogue.take_setpoint(99 * STEP, 1.234)
-    error = bench.join()
-    assert isinstance(error, InitialisationError)
-    assert '1.234 A during the ramp; deactivate mount_control' in str(error)
-    assert bench.setpoints[-1] == (99 * STEP, 0.0)
 
 
 def test_setpoints_of_others_within_the_quiet_time_are_refused(bench):
@@ -244,16 +197,21 @@ def test_after_a_time_without_listening_it_is_waited_for_quiet_and_no_old_sample
     bench.dialogue.await_quiet(0.02, bench.ending)
     bench.start()
     bench.sample(2)
-    assert [stamp // STEP for stamp, _ in bench.setpoints] == [2]
-    bench.ending.set()
-    bench.join()
+    assert bench.numbers == [2]
 
 
-def test_own_setpoints_do_not_count_as_those_of_others(bench):
-    bench.start()
-    for number in range(1, bench.ramp.length + 1):
-        bench.sample(number)
-        bench.echo()
-    assert bench.join() is None
-    bench.ending.set()  # a wait would end at once, and the second look would refuse
-    bench.dialogue.await_quiet(100.0, bench.ending)
+@pytest.mark.parametrize(
+    ('refuses', 'limit', 'reason'),
+    [
+        (False, 3.0, ''),
+        (True, 3.0, 'mount_driver keeps the coil at 0 A: why'),
+        (False, 0.4, 'mount_driver lets the coil carry 0.400 A, the ramp needs 3.000 A: why'),
+    ],
+)
+def test_the_reason_of_the_driver_counts_for_two_seconds(monkeypatch, refuses, limit, reason):
+    driver, ending, now = DriverReport(3.0), threading.Event(), time.monotonic()
+    ending.set()
+    driver.take(refuses, 'why', {'current_limit': str(limit)})
+    assert driver.refusal(ending) == reason
+    monkeypatch.setattr(time, 'monotonic', lambda: now + 3.0)
+    assert driver.refusal(ending) == ''

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mount_init.errors import InitialisationError
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 
@@ -98,19 +97,6 @@ def test_prototype_of_the_paper_is_found(simulated_actuator, specimen, run_initi
     assert result.table[0, 0] == pytest.approx(0.4725, rel=0.01)
 
 
-def test_the_same_samples_give_the_same_result_to_the_bit(recorded, specimen):
-    samples = with_ripple_noise(recorded(349, 508)[0], 1)
-    first, second = estimate(samples, specimen), estimate(samples, specimen)
-    assert np.array_equal(first.table, second.table)
-    assert (first.rest_gap, first.contact_gap, first.rest_gap_std, first.contact_gap_std) == (
-        second.rest_gap,
-        second.contact_gap,
-        second.rest_gap_std,
-        second.contact_gap_std,
-    )
-    assert first.offset_current == second.offset_current
-
-
 def test_outliers_do_not_pull_the_estimates(recorded, specimen):
     samples = with_ripple_noise(recorded(349, 508)[0], 1)
     random = np.random.default_rng(2)
@@ -132,11 +118,6 @@ def test_samples_with_nan_are_skipped_and_counted(recorded, specimen):
     assert result.contact_gap * 1e6 == pytest.approx(349.0, abs=0.2)
 
 
-def test_light_pressure_sets_the_offset_current(simulated_actuator, specimen, run_initialisation):
-    firm = run_initialisation(simulated_actuator(), specimen, InitParameters(light_pressure=10.0))
-    assert firm.offset_current == pytest.approx(0.570, rel=0.01)
-
-
 @pytest.mark.parametrize('celsius', [-20.0, 80.0])
 def test_gaps_are_compensated_for_the_temperature_of_the_coil(
     simulated_actuator, specimen, run_initialisation, celsius
@@ -152,9 +133,3 @@ def test_gaps_are_compensated_for_the_temperature_of_the_coil(
     result = run_initialisation(plant, specimen, parameters)
     assert result.rest_gap == pytest.approx(508e-6, abs=3e-6)
     assert result.contact_gap == pytest.approx(349e-6, abs=6e-6)
-
-
-def test_a_coil_too_hot_for_the_compensation_is_refused(simulated_actuator, specimen, run_initialisation):
-    parameters = InitParameters(coil_temperature_celsius=150.0)
-    with pytest.raises(InitialisationError, match=r'coil temperature \(150\.0 degC\)'):
-        run_initialisation(simulated_actuator(), specimen, parameters)

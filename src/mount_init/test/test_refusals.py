@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from mount_init.errors import CurrentNotFollowingError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.initialisation import OFF, Initialisation
 from mount_init.parameters import InitParameters
 
@@ -162,35 +162,32 @@ def test_a_fault_is_refused_with_value_limit_and_remedy(refusal, fault, sentence
     assert sentence in (WORN, OUTSIDE) or any(word in refused.lower() for word in remedies)
 
 
-def test_silence_is_told_with_the_number_of_samples(specimen, simulated_actuator):
-    initialisation = Initialisation(specimen, InitParameters())
+@pytest.mark.parametrize(
+    ('since', 'reading', 'ends', 'sentence'),
+    [
+        (1000, math.nan, 1101, '101 ripple samples in a row were invalid'),
+        (0, 0.0, 56, r'0\.000 A\) must follow .*is the coil connected'),
+        (1000, 0.0, 1021, r'must follow its setpoint .* did setpoints come too late'),
+        (9999, 0.0, 2750, None),
+    ],
+)
+def test_a_ramp_that_cannot_go_on_ends_at_once_and_from_its_end_on_only_zero_is_answered(
+    specimen, simulated_actuator, run_ramp, since, reading, ends, sentence
+):
+    plant = simulated_actuator(distort=current_from(since, lambda _: reading))
+    initialisation = run_ramp(plant, specimen)
+    assert plant.number == initialisation.stamps[-1] // 1_000_000 == ends
+    assert initialisation.step(10**12, 2.4, 1.0, 1.0) == OFF
+    if sentence:
+        with pytest.raises(InitialisationError, match=sentence):
+            initialisation.result()
+
+
+def test_a_ramp_that_has_not_ended_has_no_result(specimen):
     with pytest.raises(
         InitialisationError, match='0 of 2750 ripple samples received; is mount_driver active'
     ):
-        initialisation.result()
-    for stamp in range(37):
-        initialisation.step(stamp, *simulated_actuator().sample())
-    assert str(initialisation.silence(1.0)) == (
-        'air gap not estimated: 37 of 2750 ripple samples, none in the last 1.0 s; is mount_driver active?'
-    )
-
-
-def test_samples_that_stay_invalid_switch_the_coil_off_at_once(specimen, simulated_actuator, run_ramp):
-    plant = simulated_actuator(distort=current_from(1000, lambda _: np.nan))
-    initialisation = run_ramp(plant, specimen)
-    assert plant.number == 1101
-    assert plant.state[0] < 2.5  # on the way to 0 A
-    assert initialisation.step(0, *plant.sample()) == OFF
-    with pytest.raises(InitialisationError, match='101 ripple samples in a row were invalid'):
-        initialisation.result()
-
-
-def test_an_open_coil_is_refused_early(specimen, simulated_actuator, run_ramp):
-    initialisation = run_ramp(simulated_actuator(distort=current_from(0, lambda _: 0.0)), specimen)
-    with pytest.raises(CurrentNotFollowingError, match=r'0\.000 A\) must follow .*is the coil connected'):
-        initialisation.result()
-    assert initialisation.readings.received < 100
-    assert initialisation.step(0, 2.4, 1.0, 1.0) == OFF
+        Initialisation(specimen, InitParameters()).result()
 
 
 @pytest.mark.parametrize(
@@ -203,14 +200,6 @@ def test_an_open_coil_is_refused_early(specimen, simulated_actuator, run_ramp):
 def test_a_specimen_that_does_not_fit_the_ramp_is_refused(specimen, changes, sentence):
     with pytest.raises(InitialisationError, match=sentence):
         Initialisation(dataclasses.replace(specimen, **changes), InitParameters())
-
-
-def test_after_the_end_only_zero_is_answered(specimen, simulated_actuator, run_ramp):
-    plant = simulated_actuator()
-    initialisation = run_ramp(plant, specimen)
-    assert initialisation.finished
-    assert initialisation.step(10**12, *plant.sample()) == OFF
-    assert initialisation.last_stamp == 2750 * 1_000_000
 
 
 def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused(specimen, simulated_actuator):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mount_init.errors import CurrentNotFollowingError, InitialisationError
+from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
 
 NOISE = 0.01 * 0.5**0.5  # of each slope: 1 % on L_i
@@ -45,7 +45,6 @@ def test_gaps_are_right_at_any_supply_that_the_driver_allows(initialise_at, volt
     result = initialise_at(lambda _: volts)
     assert result.rest_gap * 1e6 == pytest.approx(508.0, abs=0.7)  # 507.4 at 14 V
     assert result.contact_gap * 1e6 == pytest.approx(349.0, abs=0.1)
-    assert result.evidence.supply.carried == (volts != 14.0)
     assert result.evidence.supply.whole.link_voltage == pytest.approx(volts, abs=0.01)
 
 
@@ -78,7 +77,6 @@ def test_at_the_supply_of_the_curves_readings_are_used_as_they_are_to_the_bit(in
     elsewhere = dataclasses.replace(specimen, bridge=specimen.bridge._replace(sample_phase=0.2))
     other = initialise_at(lambda _: 14.0, seed=1, specimen=elsewhere)
     assert (result.rest_gap, result.contact_gap) == (other.rest_gap, other.contact_gap)
-    assert not result.evidence.supply.carried
 
 
 @pytest.mark.parametrize('volts', [7.9, 18.2])
@@ -87,11 +85,12 @@ def test_a_supply_beyond_the_range_of_the_curves_is_refused(initialise_at, volts
         initialise_at(lambda _: volts)
 
 
-@pytest.mark.parametrize(('volts', 'error'), [(7.9, CurrentNotFollowingError), (9.3, InitialisationError)])
-def test_a_supply_that_cannot_drive_the_ramp_is_named(initialise_at, volts, error):
+@pytest.mark.parametrize('volts', [7.9, 9.3])
+def test_a_supply_that_cannot_drive_the_ramp_is_named(initialise_at, volts):
     hot = COLD._replace(coil_temperature_celsius=90.0)
     with pytest.raises(
-        error, match=r'supply drives no more than [\d.]+ A through the coil: .* lower peak_current'
+        InitialisationError,
+        match=r'supply drives no more than [\d.]+ A through the coil: .* lower peak',
     ):
         initialise_at(lambda _: volts, resistance=3.18, parameters=hot)
 

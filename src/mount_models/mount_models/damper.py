@@ -5,12 +5,10 @@ the pads do not stick (Sec. 5). `damper_curve` turns a name, a law or points of 
 uniform grid; what a parameter says, it says as a text, and here alone texts are understood.
 """
 
-import csv
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -19,11 +17,10 @@ import yaml
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
-from mount_models.arithmetic.interpolation import each_interpolated
-from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
+from mount_models.arithmetic.sums import each_interpolated
+from mount_models.arrays import FloatArray
+from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError, Quantity, check_name, checked
-
-FloatArray = npt.NDArray[np.float64]
 
 SMALLEST_DEAD_ZONE = 0.0001
 """A dead zone is none at all or at least this wide (m/s, chosen), because it sets the grid of the table."""
@@ -32,8 +29,7 @@ LONGEST_VELOCITY_STEP = 0.0005
 STEP_OF_POINTS = 0.0001
 """Grid of the table of an own characteristic (m/s, chosen), whose corners lie anywhere."""
 COLUMNS = ('velocity', 'force')
-"""Names of the columns, m/s and N, in a file and in a mapping."""
-FILE_ENDINGS = ('.csv', '.yaml', '.yml')
+"""Names of the columns, m/s and N."""
 HIGHEST_VELOCITY = 1.0
 """A characteristic ends here (m/s, chosen): twenty times the peak velocity of 8 Hz with 1 mm."""
 HIGHEST_FORCE = 1e4
@@ -129,25 +125,22 @@ DAMPER_LAWS: dict[str, Any] = {
 }
 
 DAMPERS: dict[str, Any] = {
-    'viscous_1000': ViscousDamper(1000.0),
-    'viscous_2000': ViscousDamper(2000.0),
-    'viscous_3000': ViscousDamper(3000.0),
-    'viscous_4000': ViscousDamper(4000.0),
+    **{f'viscous_{slope}000': ViscousDamper(1000.0 * slope) for slope in range(1, 5)},
     'degressive': DegressiveDamper(),
     'progressive': ProgressiveDamper(),
 }
 """The characteristics with a name of their own."""
 
 _KNOWN = (
-    f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, points '
-    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}, or a file of points ({", ".join(FILE_ENDINGS)})'
+    f'{", ".join(DAMPERS)}, viscous_<N s/m>, a law such as {{law: viscous, dead_zone: 0.002}}, or points '
+    f'{{{COLUMNS[0]}: [0, 0.1], {COLUMNS[1]}: [0, 200]}}'
 )
 
 
 def damper_curve(choice: Any) -> DamperCurve:
     """Return the curve of a text, a law, or a mapping: of a law and its parameters, or of points.
 
-    A text is a name in `DAMPERS`, `viscous_<N s/m>`, a mapping in YAML, or the path of a file of points.
+    A text is a name in `DAMPERS`, `viscous_<N s/m>`, or a mapping in YAML.
     A mapping is such as {'law': 'viscous', 'dead_zone': 0.002}; what it leaves out has its default; or
     {'velocity': [...], 'force': [...]} in m/s and N, joined by straight lines and constant behind the last.
     Raises `ParameterError` if it is unknown or unusable, `ParameterError` for a value outside its range.
@@ -156,15 +149,13 @@ def damper_curve(choice: Any) -> DamperCurve:
         return _curve_of_text(choice)
     if isinstance(choice, Mapping):
         if 'law' not in choice and set(choice) & set(COLUMNS):
-            return _curve_of_points('points', choice)
+            return _curve_of_points('points', *_checked_points(choice))
         return _tabulated(str(choice.get('law')), _law_of(choice))
     return _tabulated(type(choice).__name__, choice)
 
 
 def damper_text(choice: str | Mapping[str, Any]) -> str:
-    """Return a text that means what `choice` means, also where a file that it names is not there."""
-    if isinstance(choice, str) and _is_file(choice):
-        choice = _points_in(Path(choice).expanduser())
+    """Return the text, in one line, that means what `choice` means."""
     if isinstance(choice, Mapping):
         return yaml.safe_dump(dict(choice), default_flow_style=True, sort_keys=False, width=1 << 30).strip()
     return choice
@@ -175,9 +166,6 @@ def _curve_of_text(text: str) -> DamperCurve:
         return _tabulated(text, DAMPERS[text])
     if viscous_text := _VISCOUS.fullmatch(text):
         return _tabulated(text, ViscousDamper(float(viscous_text[1])))
-    if _is_file(text):
-        path = Path(text).expanduser()
-        return _curve_of_points(path.stem, _points_in(path))
     try:
         mapping = plain_yaml(text)
     except YamlError as error:
@@ -187,12 +175,7 @@ def _curve_of_text(text: str) -> DamperCurve:
     raise ParameterError(f'no damper curve is called {text!r:.60}; known are {_KNOWN}')
 
 
-def _is_file(text: str) -> bool:
-    return text.endswith(FILE_ENDINGS)
-
-
-def _curve_of_points(name: str, columns: Mapping[str, Any]) -> DamperCurve:
-    velocity, force = _checked_points(columns)
+def _curve_of_points(name: str, velocity: FloatArray, force: FloatArray) -> DamperCurve:
     grid = np.arange(math.floor(velocity[-1] / STEP_OF_POINTS * (1.0 + 1e-12)) + 1) * STEP_OF_POINTS
     table = each_interpolated(grid, velocity, force)
     if not table.max() > 0.0:
@@ -242,19 +225,6 @@ def _velocity_step(dead_zone: float) -> float:
     return dead_zone / math.ceil(dead_zone / LONGEST_VELOCITY_STEP)
 
 
-def _points_in(path: Path) -> dict[str, list[float]]:
-    """Return {'velocity': m/s, 'force': N} of a file CSV or YAML; raises `ParameterError`."""
-    try:
-        text = text_of_file(path)
-        columns = _columns_of_csv(text) if path.suffix == '.csv' else plain_yaml(text)
-        velocity, force = _checked_points(columns)
-    except YamlError as error:
-        raise ParameterError(f'damper file {path} {error}') from None
-    except (ParameterError, csv.Error) as error:
-        raise ParameterError(f'damper file {path}: {error}') from None
-    return {'velocity': velocity.tolist(), 'force': force.tolist()}
-
-
 def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
     """Return velocities (m/s) and forces (N), (n,), of a mapping with both columns; raises `ParameterError`.
 
@@ -265,12 +235,11 @@ def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
             f'the points of a damper must have the columns {" and ".join(COLUMNS)}, m/s and N'
         )
     velocity, force = (_numbers(name, columns[name]) for name in COLUMNS)
-    if velocity.size != force.size:
+    if velocity.size != force.size or not 2 <= velocity.size <= MOST_POINTS:
         raise ParameterError(
-            f'velocity ({velocity.size} numbers) and force ({force.size} numbers) must be equally long'
+            f'velocity ({velocity.size} numbers) and force ({force.size} numbers) must be equally long, '
+            f'2 to {MOST_POINTS} points'
         )
-    if not 2 <= velocity.size <= MOST_POINTS:
-        raise ParameterError(f'a damper needs 2 to {MOST_POINTS} points; instead received {velocity.size}')
     if velocity[0] < 0.0 or velocity[-1] > HIGHEST_VELOCITY or not (np.diff(velocity) > 0.0).all():
         raise ParameterError(
             f'velocity ({velocity[0]:g} .. {velocity[-1]:g} m/s) must rise strictly within '
@@ -288,30 +257,9 @@ def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
 
 def _numbers(name: str, values: Any) -> FloatArray:
     try:
-        if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
-            raise TypeError
-        numbers = np.array([float(value) for value in values])
+        numbers = np.array(values, float)
     except (TypeError, ValueError):
-        raise ParameterError(f'{name} must be a list of numbers; instead received {values!r:.60}') from None
-    if not np.isfinite(numbers).all():
-        place = int(np.flatnonzero(~np.isfinite(numbers))[0])
-        raise ParameterError(f'{name} must be finite; number {place + 1} is {numbers[place]:g}')
+        numbers = np.empty(())
+    if numbers.ndim != 1 or not np.isfinite(numbers).all():
+        raise ParameterError(f'{name} must be a list of finite numbers; instead received {values!r:.60}')
     return numbers
-
-
-def _columns_of_csv(text: str) -> dict[str, list[float]]:
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
-    rows = list(csv.reader(lines))
-    header = [name.strip() for name in rows[0]] if rows else []
-    if sorted(header) != sorted(COLUMNS):
-        raise ParameterError(
-            f'its first line must be {",".join(COLUMNS)}; instead it is {",".join(header)!r}'
-        )
-    columns: dict[str, list[float]] = {name: [] for name in header}
-    for row in rows[1:]:
-        try:
-            for name, value in zip(header, row, strict=True):
-                columns[name].append(float(value))
-        except ValueError:
-            raise ParameterError(f'{",".join(row)!r} is not a line of two numbers') from None
-    return columns

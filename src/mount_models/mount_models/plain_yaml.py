@@ -4,7 +4,7 @@ Scanner, parser and the rules of scalars are PyYAML's. What changes a meaning un
 time without bound (references to references, numbers of a million digits, nesting) is refused, with its line.
 """
 
-import functools
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,6 @@ _WHOLE_NUMBERS = 1 << 63  # the range of an int64, in which every number of a me
 _TAG = 'tag:yaml.org,2002:'
 _NUMBERS = (_TAG + 'int', _TAG + 'float')
 _SCALARS = (*_NUMBERS, _TAG + 'str', _TAG + 'bool', _TAG + 'null', _TAG + 'timestamp')
-_SHORT = 100  # characters, chosen: of scalars that are remembered; nearly all are shorter
 # The same rules in C, many times as fast.
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
@@ -60,15 +59,13 @@ def plain_yaml(text: str, *, words: bool = False) -> Any:
     if len(text) > LONGEST_TEXT:
         raise YamlError(f'is longer than {LONGEST_TEXT} characters; give a shorter text')
     try:
-        return _Composition(text, words).document()
+        return _Reader(text, words).document()
     except yaml.YAMLError as error:
         reason = getattr(error, 'problem', None) or str(error).splitlines()[0]
-        raise YamlError(
-            f'is not valid YAML{_place(getattr(error, "problem_mark", None))}: {reason}'
-        ) from error
-    except ValueError as error:
-        if isinstance(error, YamlError):
-            raise
+        mark = getattr(error, 'problem_mark', None)
+        place = f' in line {mark.line + 1}' if mark else ''
+        raise YamlError(f'is not valid YAML{place}: {reason}') from error
+    except UnicodeError as error:
         raise YamlError(f'is not valid YAML: {error}') from error  # a character that cannot be encoded
 
 
@@ -77,112 +74,79 @@ def excerpt(value: Any) -> str:
     return repr(value) if len(repr(value)) < 60 else f'{type(value).__name__} {repr(value)[:50]}...'
 
 
-class _Open:
-    """A list or mapping whose end has not come."""
-
-    def __init__(self, content: Any, anchor: str | None):
-        self.content, self.anchor = content, anchor
-        self.parts = 1
-        self.key: str | None = None
-
-    def add(self, value: Any, parts: int, event: Any) -> None:
-        self.parts += parts
-        if isinstance(self.content, list):
-            self.content.append(value)
-        elif self.key is not None:
-            self.content[self.key] = value
-            self.key = None
-        elif not isinstance(value, str):
-            raise _refused(event, f'the key {excerpt(value)} is no text; put it in quotes')
-        elif value in self.content:
-            raise _refused(event, f'the key {excerpt(value)} stands there twice; keep one of them')
-        else:
-            self.key = value
+class _Rules(SafeConstructor, Resolver):
+    """What PyYAML takes a scalar for."""
 
 
-class _Composition:
-    """Puts one document together from the events of PyYAML's parser."""
+class _Reader:
+    """Makes plain data of the events of PyYAML's parser."""
 
     def __init__(self, text: str, words: bool):
-        self._loader = _LOADER(text)
-        self._words = words
-        self._open = [_Open([], None)]
+        self._loader, self._rules, self._words = _LOADER(text), _Rules(), words
+        self._parts = 0
         self._anchors: dict[str, tuple[Any, int]] = {}
 
     def document(self) -> Any:
-        try:
-            while not isinstance(event := self._loader.get_event(), yaml.StreamEndEvent):
-                self._take(event)
-        finally:
-            self._loader.dispose()
-        documents = self._open[0].content
-        if len(documents) > 1:
-            raise YamlError(f'has {len(documents)} documents; leave the first alone')
-        return documents[0] if documents else None
+        self._loader.get_event()  # the begin of the stream
+        if isinstance(self._loader.get_event(), yaml.StreamEndEvent):
+            return None
+        content = self._value(self._loader.get_event(), 0)
+        self._loader.get_event()  # the end of the document
+        if not isinstance(behind := self._loader.get_event(), yaml.StreamEndEvent):
+            raise _refused(behind, 'a second document begins; leave the first alone')
+        return content
 
-    def _take(self, event: Any) -> None:
+    def _value(self, event: Any, depth: int) -> Any:
+        before = self._parts
+        self._parts += 1
+        if depth > DEEPEST:
+            raise _refused(event, f'is nested deeper than {DEEPEST} levels')
         if isinstance(event, yaml.ScalarEvent):
-            self._close(event, self._scalar(event), 1, event.anchor)
-        elif isinstance(event, yaml.CollectionStartEvent):
-            if event.tag not in (None, '!', _TAG + 'map', _TAG + 'seq'):
-                raise _refused(event, f'{event.tag!r} is not known here; leave it out')
-            if len(self._open) > DEEPEST:
-                raise _refused(event, f'is nested deeper than {DEEPEST} levels')
-            self._open.append(_Open({} if isinstance(event, yaml.MappingStartEvent) else [], event.anchor))
-        elif isinstance(event, yaml.CollectionEndEvent):
-            ended = self._open.pop()
-            self._close(event, ended.content, ended.parts, ended.anchor)
+            value = event.value if self._words else self._scalar(event)
         elif isinstance(event, yaml.AliasEvent):
             if event.anchor not in self._anchors:
                 raise _refused(event, f'*{event.anchor} refers to nothing before it; write the value')
-            self._close(event, *self._anchors[event.anchor], None)
-
-    def _close(self, event: Any, value: Any, parts: int, anchor: str | None) -> None:
-        if anchor is not None:
-            self._anchors[anchor] = value, parts
-        self._open[-1].add(value, parts, event)
-        if self._open[-1].parts > MOST_PARTS:
+            value, parts = self._anchors[event.anchor]
+            self._parts += parts
+        elif event.tag not in (None, '!', _TAG + 'map', _TAG + 'seq'):
+            raise _refused(event, f'{event.tag!r} is not known here; leave it out')
+        elif isinstance(event, yaml.SequenceStartEvent):
+            value = [self._value(part, depth + 1) for part in self._parts_within()]
+        else:
+            value = {}
+            for part in self._parts_within():
+                key = self._value(part, depth + 1)
+                if not isinstance(key, str):
+                    raise _refused(part, f'the key {excerpt(key)} is no text; put it in quotes')
+                if key in value:
+                    raise _refused(part, f'the key {excerpt(key)} stands there twice; keep one of them')
+                value[key] = self._value(self._loader.get_event(), depth + 1)
+        if self._parts > MOST_PARTS:
             raise _refused(event, f'more than {MOST_PARTS} values, written out')
+        if event.anchor is not None:
+            self._anchors[event.anchor] = value, self._parts - before
+        return value
+
+    def _parts_within(self) -> Iterator[Any]:
+        while not isinstance(event := self._loader.get_event(), yaml.CollectionEndEvent):
+            yield event
 
     def _scalar(self, event: Any) -> Any:
-        if self._words:
-            return event.value
-        value_of = _short_value if len(event.value) <= _SHORT else _value
+        tag, text = event.tag, event.value
+        if tag in (None, '!'):
+            tag = self._rules.resolve(yaml.ScalarNode, text, event.implicit)
+        if tag not in _SCALARS:
+            raise _refused(event, f'{excerpt(text)} ({tag!r}) is not known here; put it in quotes')
+        if tag in _NUMBERS and len(text) > _LONGEST_NUMBER:
+            raise _refused(event, f'a number of {len(text)} characters; at most {_LONGEST_NUMBER}')
         try:
-            return value_of(event.tag, event.value, event.implicit)
-        except ValueError as error:
-            raise _refused(event, str(error)) from error
-
-
-class _Rules(SafeConstructor, Resolver):
-    """What PyYAML takes a scalar for, apart from the text in which it stands."""
-
-
-def _value(tag: str | None, text: str, implicit: tuple[bool, bool]) -> Any:
-    """Return what a scalar means, which depends on nothing else; raises `ValueError` with the remedy."""
-    rules = _Rules()
-    if tag is None or tag == '!':
-        tag = rules.resolve(yaml.ScalarNode, text, implicit)
-    if tag not in _SCALARS:
-        raise ValueError(f'{excerpt(text)} ({tag!r}) is not known here; put it in quotes')
-    if tag in _NUMBERS and len(text) > _LONGEST_NUMBER:
-        raise ValueError(f'a number of {len(text)} characters; at most {_LONGEST_NUMBER}')
-    try:
-        value = _LOADER.yaml_constructors[tag](rules, yaml.ScalarNode(tag, text))
-    except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
-        raise ValueError(f'{excerpt(text)} is no value ({error}); put it in quotes') from error
-    if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
-        raise ValueError(f'{excerpt(text)} does not fit into 64 bits; write 1.0e+30 for 1e30')
-    return value
-
-
-# Recordings tell the same names and parameters again and again; what is returned cannot be changed.
-_short_value = functools.lru_cache(maxsize=4096)(_value)
+            value = _LOADER.yaml_constructors[tag](self._rules, yaml.ScalarNode(tag, text))
+        except (ValueError, LookupError) as error:  # a date that is none; `!!int x`, `!!int ''`
+            raise _refused(event, f'{excerpt(text)} is no value ({error}); put it in quotes') from error
+        if isinstance(value, int) and not -_WHOLE_NUMBERS <= value < _WHOLE_NUMBERS:
+            raise _refused(event, f'{excerpt(text)} does not fit into 64 bits; write 1.0e+30 for 1e30')
+        return value
 
 
 def _refused(event: Any, sentence: str) -> YamlError:
-    return YamlError(f'is refused{_place(event.start_mark)}: {sentence}')
-
-
-def _place(mark: Any) -> str:
-    return '' if mark is None else f' in line {mark.line + 1}'
+    return YamlError(f'is refused in line {event.start_mark.line + 1}: {sentence}')

@@ -134,11 +134,15 @@ def _checked_value(name: str, value: Any, kind: Any, quantity: Quantity | None) 
         raise ParameterError(f'{name} must be a number; instead received {value!r}')
     if kind is int and int(value) != value:
         raise ParameterError(f'{name} must be a whole number; instead received {value!r}')
-    if quantity is not None and not quantity.low <= value <= quantity.high:
-        if quantity.may_be_unknown and math.isnan(value):
-            return kind(value)
+    if quantity is not None and not (quantity.may_be_unknown and math.isnan(value)):
+        check_range(name, value, quantity)
+    return kind(value)
+
+
+def check_range(name: str, value: float, quantity: Quantity) -> None:
+    """Raise `ParameterError` where the value called `name` lies outside the range of its quantity."""
+    if not quantity.low <= value <= quantity.high:
         raise ParameterError(
             f'{name} ({value:g} {quantity.unit}) must lie within '
             f'{quantity.low:g} .. {quantity.high:g} {quantity.unit}: {quantity.meaning}'
         )
-    return kind(value)

@@ -12,16 +12,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from mount_models.actuator.law import ForceLaw, check_force_law
-from mount_models.coil.duty import Bridge
+from mount_models.actuator import ForceLaw, check_force_law
+from mount_models.coil.copper import CoilHeating, check_heating
+from mount_models.coil.correction import Bridge, TemperatureCompensation, check_compensation
 from mount_models.coil.gap import GapCurves, check_gap_curves
-from mount_models.coil.heating import CoilHeating, check_heating
-from mount_models.coil.temperature import TemperatureCompensation, check_compensation
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact, check_coefficients
+from mount_models.friction.contact import FrictionContact, check_friction
 from mount_models.plain_yaml import YamlError, excerpt, plain_yaml, text_of_file
-from mount_models.provenance import check_provenance
-from mount_models.quantity import Quantity, quantities
+from mount_models.quantity import Quantity, check_name, check_range, quantities
 from mount_models.sampling import HIGHEST_CURRENT
 
 SCHEMA_VERSION = 2
@@ -98,10 +96,6 @@ def chosen_specimen(parameters_file: str, name: str = '') -> Specimen:
 
     With a `name`, another specimen than that is refused; raises `SpecimenError`.
     """
-    if '/' in name or name.endswith(('.yaml', '.yml')):
-        raise SpecimenError(
-            f'specimen ({name!r}) must be a name; give the path of its file as parameters_file'
-        )
     return load_specimen(parameters_file or DEFAULT_SPECIMEN, name)
 
 
@@ -129,25 +123,31 @@ def specimen_from_mapping(content: Any) -> Specimen:
 
 def checked_specimen(specimen: Specimen) -> Specimen:
     """Return `specimen` if all values agree with their limits and each other, or raise `SpecimenError`."""
-    parts = {'': specimen, **{name: getattr(specimen, name) for name in _PARTS}}
-    for where, part in parts.items():
+    try:
+        _check(specimen)
+    except SpecimenError:
+        raise
+    except ValueError as error:
+        raise SpecimenError(str(error)) from error
+    return specimen
+
+
+def _check(specimen: Specimen) -> None:
+    for where, part in {'': specimen, **{f'{name}.': getattr(specimen, name) for name in _PARTS}}.items():
         for name, quantity in quantities(type(part)).items():
-            _check_limits(getattr(part, name), quantity, f'{where}.{name}' if where else name)
-    _check_friction(specimen.friction)
-    compensation: list[Any] = [('', check_compensation, specimen.temperature, specimen.gap_curves)]
-    checks: list[Any] = [
-        ('', check_force_law, specimen.force_law),
-        ('', check_gap_curves, specimen.gap_curves),
-        *(compensation if specimen.temperature is not None else []),
-        ('heating: ', check_heating, specimen.heating),
-        ('friction: ', check_coefficients, friction_coefficients(specimen.friction)),
-        ('', check_provenance, specimen.provenance),
-    ]
-    for where, check, *values in checks:
-        try:
-            check(*values)
-        except ValueError as error:
-            raise SpecimenError(f'{where}{error}') from error
+            value = getattr(part, name)
+            if isinstance(value, (int, float)):
+                check_range(f'{where}{name}', value, quantity)
+    known = {**quantities(FrictionCoefficients), **quantities(FrictionContact)}
+    for name, value in specimen.friction.items():
+        check_name('friction', name, known)
+        check_range(f'friction.{name}', value, known[name])
+    check_force_law(specimen.force_law)
+    check_gap_curves(specimen.gap_curves)
+    if specimen.temperature is not None:
+        check_compensation(specimen.temperature, specimen.gap_curves)
+    check_heating(specimen.heating)
+    check_friction(friction_coefficients(specimen.friction), friction_contact(specimen.friction))
     bridge = specimen.bridge
     if not bridge.lowest_voltage <= bridge.link_voltage <= bridge.highest_voltage:
         raise SpecimenError(
@@ -164,7 +164,9 @@ def checked_specimen(specimen: Specimen) -> Specimen:
             f'current_limit ({specimen.current_limit:.2f} A) must not exceed force_law.current_high '
             f'({specimen.force_law.current_high:.2f} A); lower it, or calibrate up to it'
         )
-    return specimen
+    parts = _mapping(specimen.provenance.get('parts', {}), 'provenance.parts')
+    for name, part in parts.items():
+        _text(_mapping(part, f'provenance.parts.{name}').get('specimen'), f'provenance.parts.{name}.specimen')
 
 
 _PARTS = ('force_law', 'temperature', 'heating', 'bridge')
@@ -190,14 +192,6 @@ def _check_version(content: Any) -> None:
         )
 
 
-def _check_friction(friction: Mapping[str, float]) -> None:
-    known = {**quantities(FrictionCoefficients), **quantities(FrictionContact)}
-    for name, value in friction.items():
-        if name not in known:
-            raise SpecimenError(f'friction.{name} is unknown; known are {", ".join(known)}')
-        _check_limits(value, known[name], f'friction.{name}')
-
-
 def _named_in(values: Mapping[str, float], kind: Any) -> Any:
     return kind(**{name: value for name, value in values.items() if name in kind._fields})
 
@@ -216,7 +210,7 @@ def _complete(content: Any, names: list[str], where: str) -> dict[str, Any]:
 
 
 def _mapping(value: Any, where: str) -> dict[str, Any]:
-    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+    if not isinstance(value, Mapping):
         raise SpecimenError(
             f'{where} must be a mapping of names to values; instead received {excerpt(value)}'
         )
@@ -227,26 +221,29 @@ def _converted(value: Any, kind: Any, where: str) -> Any:
     """Return `value` from a file as the declared `kind`."""
     if get_origin(kind) is types.UnionType:
         return None if value is None else _converted(value, get_args(kind)[0], where)
-    if isinstance(kind, type) and issubclass(kind, tuple):
-        hints = get_type_hints(kind)
-        parts = _complete(value, list(hints), where)
-        return kind(
-            **{name: _converted(parts[name], hint, f'{where}.{name}') for name, hint in hints.items()}
-        )
+    if kind is str:
+        return _text(value, where)
+    if get_origin(kind) is dict:
+        of = get_args(kind)[1]
+        return {
+            name: part if of is Any else _number(part, f'{where}.{name}')
+            for name, part in _mapping(value, where).items()
+        }
     if get_origin(kind) is tuple:
         if not isinstance(value, (list, tuple)) or not value:
             raise SpecimenError(f'{where} must be a list of numbers; instead received {excerpt(value)}')
         return tuple(_number(part, f'{where}[{k}]') for k, part in enumerate(value))
-    if get_origin(kind) is dict:
-        value = _mapping(value, where)
-        if get_args(kind)[1] is float:
-            return {name: _number(part, f'{where}.{name}') for name, part in value.items()}
-        return value
-    if kind is str:
-        if not isinstance(value, str) or not value:
-            raise SpecimenError(f'{where} must be a text; instead received {excerpt(value)}')
-        return value
-    return _number(value, where)
+    if kind is float:
+        return _number(value, where)
+    hints = get_type_hints(kind)
+    parts = _complete(value, list(hints), where)
+    return kind(**{name: _converted(parts[name], hint, f'{where}.{name}') for name, hint in hints.items()})
+
+
+def _text(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise SpecimenError(f'{where} must be a text; instead received {excerpt(value)}')
+    return value
 
 
 def _number(value: Any, where: str) -> float:
@@ -254,11 +251,3 @@ def _number(value: Any, where: str) -> float:
         remedy = ' (YAML reads 1e-6 as a text: write 1.0e-6)' if isinstance(value, str) else ''
         raise SpecimenError(f'{where} must be a finite number; instead received {excerpt(value)}{remedy}')
     return float(value)
-
-
-def _check_limits(value: Any, quantity: Quantity, where: str) -> None:
-    if isinstance(value, (int, float)) and not quantity.low <= value <= quantity.high:
-        raise SpecimenError(
-            f'{where} ({value:g} {quantity.unit}) must lie within {quantity.low:g} .. {quantity.high:g} '
-            f'{quantity.unit}: {quantity.meaning}'
-        )

@@ -7,15 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mount_models.actuator.law import force
-from mount_models.arithmetic.interpolation import interpolated
-from mount_models.force_table import (
+from mount_models.actuator import (
     ForceTableError,
-    checked_table,
     contact_force,
     current_force_table,
+    force,
     offset_current,
 )
+from mount_models.arithmetic.sums import interpolated
 from mount_models.quantity import OutsideLawError
 from mount_models.specimen import default_specimen
 
@@ -46,7 +45,6 @@ def test_the_table_rises_strictly_in_steps_of_half_a_newton():
     assert (np.diff(TABLE) > 0.0).all()
     assert np.diff(TABLE[1])[:-1] == pytest.approx(0.5)
     assert np.diff(TABLE[1])[-1] <= 0.51
-    assert current_force_table(LAW, SPRING, PADS, REST, CONTACT, step=2.0).shape[1] < TABLE.shape[1] / 3.9
 
 
 def test_each_entry_balances_magnet_spring_and_pads():
@@ -95,26 +93,3 @@ def test_a_spring_that_the_current_cannot_overcome_is_refused():
         current_force_table(LAW, SPRING, PADS, REST, CONTACT, current_high=0.4)
     with pytest.raises(OutsideLawError):
         offset_current(LAW, 50.0 * SPRING, REST, CONTACT, 2.0)
-
-
-@pytest.mark.parametrize('step', [0.0, -0.5, math.nan])
-def test_a_step_that_is_not_positive_is_refused(step):
-    with pytest.raises(ForceTableError, match='must be positive'):
-        current_force_table(LAW, SPRING, PADS, REST, CONTACT, step=step)
-
-
-@pytest.mark.parametrize(
-    ('table', 'sentence'),
-    [
-        (np.ones((3, 4)), r'shape \(2, N >= 2\); instead received \(3, 4\)'),
-        (np.ones(4), 'shape'),
-        ([[0.5, 1.0, math.nan], [0.0, 1.0, 2.0]], 'finite'),
-        ([[0.5, 0.4], [0.0, 1.0]], 'current of the current-force table must rise strictly; entries 0 and 1'),
-        ([[0.5, 0.6, 0.7], [0.0, 1.0, 1.0]], 'normal force of the current-force table must rise strictly'),
-        ([[0.5, 0.6], [1.0, 2.0]], 'must start at 0 N'),
-        ([[-0.5, 0.6], [0.0, 2.0]], 'must start at 0 N'),
-    ],
-)
-def test_a_table_that_is_none_is_refused(table, sentence):
-    with pytest.raises(ForceTableError, match=sentence):
-        checked_table(table)

@@ -93,110 +93,53 @@ def test_points_are_joined_by_straight_lines_and_constant_behind_the_last():
     assert curve.force(-0.05) == pytest.approx(-90.0)
 
 
-@pytest.mark.parametrize(
-    ('name', 'text'),
-    [
-        ('own.csv', '# measured\nvelocity, force\n0, 0\n0.004, 0\n0.05, 90\n\n0.2, 150\n'),
-        ('own.csv', '\ufeffforce,velocity\r\n0,0\r\n0,0.004\r\n90,0.05\r\n150,0.2\r\n'),
-        ('own.yaml', 'velocity: [0, 4e-3, 0.05, 0.2]\nforce: [0, 0, 90, 150]\n'),
-    ],
-)
-def test_a_file_holds_the_same_points(tmp_path, name, text):
-    file = tmp_path / name
-    file.write_text(text, encoding='utf-8')
-    curve = damper_curve(str(file))
-    assert np.array_equal(curve.table, damper_curve(POINTS).table)
-    assert curve.name == 'own'
-    kept = damper_text(str(file))
-    file.unlink()
-    assert np.array_equal(damper_curve(kept).table, curve.table)
-
-
-@pytest.mark.parametrize(
-    ('name', 'text', 'reason'),
-    [
-        ('own.csv', '', 'its first line must be velocity,force'),
-        ('own.csv', 'v,F\n0,0\n', "its first line must be velocity,force; instead it is 'v,F'"),
-        ('own.csv', 'velocity,force\n0,0\n0.1,ten\n', "'0.1,ten' is not a line of two numbers"),
-        ('own.csv', 'velocity,force\n0,0\n0.1\n', "'0.1' is not a line of two numbers"),
-        ('own.csv', 'velocity,force\n0,0\n0.1,nan\n', 'force must be finite; number 2 is nan'),
-        ('own.yaml', 'velocity: [0', 'damper file'),
-        ('own.yaml', '- 3', 'must have the columns velocity and force'),
-    ],
-)
-def test_a_file_that_holds_no_points_is_refused_and_named(tmp_path, name, text, reason):
-    file = tmp_path / name
-    file.write_text(text)
-    with pytest.raises(ParameterError, match=reason) as refused:
-        damper_curve(str(file))
-    assert f'damper file {file}' in str(refused.value)
-
-
 def test_unknown_velocity_gives_unknown_force():
     curve = damper_curve('viscous_2000')
     assert np.isnan(damper_force(curve.table, curve.velocity_step, np.nan))
 
 
 @pytest.mark.parametrize(
-    ('choice', 'error', 'sentence'),
+    ('choice', 'sentence'),
     [
-        ('soft', ParameterError, "no damper curve is called 'soft'; known are viscous_1000"),
+        ('soft', "no damper curve is called 'soft'; known are viscous_1000"),
         (
             'viscous_5x',
-            ParameterError,
-            'known are .* viscous_<N s/m>, a law such as .*, points .*, or a file',
+            'known are .* viscous_<N s/m>, a law such as .*, or points',
         ),
         (
             '{law: viscous',
-            ParameterError,
             "damper '{law: viscous' is not valid YAML in line 2: .*known .* viscous_1000",
         ),
-        ('{law: viscous, law: degressive}', ParameterError, "line 1: the key 'law' stands there twice"),
-        ('viscous_0.5', ParameterError, r'damping_coefficient \(0.5 N s/m\) must lie within 1 \.\. 100000'),
-        ('{velocity: [0, 1]}', ParameterError, 'must have the columns velocity and force, m/s and N'),
+        ('{law: viscous, law: degressive}', "line 1: the key 'law' stands there twice"),
+        ('viscous_0.5', r'damping_coefficient \(0.5 N s/m\) must lie within 1 \.\. 100000'),
+        ('{velocity: [0, 1]}', 'must have the columns velocity and force, m/s and N'),
         (
             {'velocity': [0, 1], 'force': 3},
-            ParameterError,
-            'force must be a list of numbers; instead received 3',
+            'force must be a list of finite numbers; instead received 3',
         ),
-        ({'velocity': [0, 1], 'force': [0, 'x']}, ParameterError, 'force must be a list of numbers'),
-        ({'velocity': [0, 1, 2], 'force': [0, 1]}, ParameterError, r'\(3 numbers\) and force \(2 numbers\)'),
-        ({'velocity': [0], 'force': [0]}, ParameterError, 'needs 2 to 10000 points; instead received 1'),
+        ({'velocity': [0, 1, 2], 'force': [0, 1]}, r'\(3 numbers\) and force \(2 numbers\)'),
         (
             {'velocity': [0, np.nan], 'force': [0, 1]},
-            ParameterError,
-            'velocity must be finite; number 2 is nan',
+            'velocity must be a list of finite numbers',
         ),
         (
             {'velocity': [0, 0.1, 0.1], 'force': [0, 1, 2]},
-            ParameterError,
             'must rise strictly within 0 .. 1 m/s',
         ),
-        ({'velocity': [-0.1, 0.1], 'force': [0, 1]}, ParameterError, 'give magnitudes'),
-        ({'velocity': [0, 2], 'force': [0, 1]}, ParameterError, r'velocity \(0 \.\. 2 m/s\)'),
-        ({'velocity': [0, 1], 'force': [5, 9]}, ParameterError, r'force \(5 N at first.* must begin at 0 N'),
-        ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, ParameterError, 'friction only opposes motion'),
-        ({'velocity': [0, 1], 'force': [0, 1e5]}, ParameterError, r'within 0 \.\. 10000 N'),
-        ({'velocity': [0, 1], 'force': [0, 0]}, ParameterError, 'must be greater than 0 N somewhere'),
-        (
-            'nowhere.csv',
-            ParameterError,
-            r'damper file nowhere.csv cannot be read \(No such file or directory\)',
-        ),
-        ({'law': 'magic'}, ParameterError, "no damper law is called 'magic'; known are viscous"),
-        ({'damping_coefficient': 5.0}, ParameterError, 'no damper law is called None'),
-        ({'law': 'viscous', 'slope': 5.0}, ParameterError, "'slope' is no parameter of the viscous damper"),
-        (ViscousDamper(-5.0), ParameterError, r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),
-        (ViscousDamper(2000.0, dead_zone=-0.001), ParameterError, r'dead_zone \(-0.001 m/s\)'),
+        ({'velocity': [0, 2], 'force': [0, 1]}, r'velocity \(0 \.\. 2 m/s\)'),
+        ({'velocity': [0, 1], 'force': [5, 9]}, r'force \(5 N at first.* must begin at 0 N'),
+        ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, 'friction only opposes motion'),
+        ({'velocity': [0, 1], 'force': [0, 0]}, 'must be greater than 0 N somewhere'),
+        ({'law': 'magic'}, "no damper law is called 'magic'; known are viscous"),
+        ({'law': 'viscous', 'slope': 5.0}, "'slope' is no parameter of the viscous damper"),
+        (ViscousDamper(-5.0), r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),
         (
             ViscousDamper(2000.0, dead_zone=1e-9),
-            ParameterError,
             r'dead_zone \(1e-09 m/s\) .* must be 0 or at least',
         ),
-        (ViscousDamper(2000.0, force_limit=float('nan')), ParameterError, r'force_limit \(nan N\)'),
-        (ViscousDamper(90000.0, force_limit=2.0), ParameterError, r'force_limit \(2 N\) of the damper'),
+        (ViscousDamper(90000.0, force_limit=2.0), r'force_limit \(2 N\) of the damper'),
     ],
 )
-def test_nonsense_is_refused_with_a_sentence(choice, error, sentence):
-    with pytest.raises(error, match=sentence):
+def test_nonsense_is_refused_with_a_sentence(choice, sentence):
+    with pytest.raises(ParameterError, match=sentence):
         damper_curve(choice)

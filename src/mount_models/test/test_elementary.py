@@ -86,13 +86,6 @@ def test_quarter_turns_and_the_zeros_are_met_exactly():
     )
 
 
-def test_odd_functions_are_odd_and_even_ones_even():
-    x = spread(0.0, 0.5, 3.0, 40.0)
-    assert np.array_equal(each(atan, -x), -each(atan, x))
-    assert np.array_equal(sines(-x), -sines(x))
-    assert np.array_equal(cosines(-x), cosines(x))
-
-
 def test_ends_of_the_range_and_what_is_no_number():
     assert [exp(x) for x in (-math.inf, -746.0, 710.0, math.inf)] == [0.0, 0.0, math.inf, math.inf]
     assert exp(-745.1) == 5e-324

@@ -32,7 +32,7 @@ REFUSED = {
     'nothing as key': ('null: 1', 'the key None is no text'),
     'a list as key': ('? [a]\n: 1', r"the key \['a'\] is no text"),
     'a key twice inside of a list': ('- {a: 1, b: 2}\n- {a: 1, a: 1}\n', 'line 2: the key'),
-    'references to references': (LAUGHS, 'line 6: more than 500000 values, written out'),
+    'references to references': (LAUGHS, 'more than 500000 values, written out'),
     'a reference to itself': ('&a [*a]', r'\*a refers to nothing before it'),
     'a mapping that is merged': (
         'a: &a {x: 1}\nb: {<<: *a, x: 2}\n',
@@ -49,7 +49,7 @@ REFUSED = {
     'a set': ('!!set {a, b}', 'not known here'),
     'a wrong tag': ('!!int x', "'x' is no value"),
     'a tag of nothing': ("!!int ''", "'' is no value"),
-    'several documents': ('a: 1\n---\nb: 2\n', 'has 2 documents; leave the first alone'),
+    'several documents': ('a: 1\n---\nb: 2\n', 'line 2: a second document begins; leave the first alone'),
     'an open bracket': ('a: [1, 2\nb: 3\n', 'is not valid YAML in line 2: did not find expected'),
     'a control character': ('a: \0', 'is not valid YAML: .*control characters'),
     'half a character': ('a: \ud800', 'is not valid YAML: .*surrogates'),

@@ -50,11 +50,7 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
         ('pad_stiffness', None, 'pad_stiffness is missing'),
         ('pad_stifness', 2e7, 'pad_stifness is unknown'),
         ('force_law.a3', None, 'force_law must hold exactly .* a3 is missing'),
-        ('force_law.a6', [1.0], 'a6 is unknown'),
-        ('gap_curves.inductance_of_gap.scale', None, 'gap_curves.inductance_of_gap .* scale is missing'),
-        ('force_law', [1.0, 2.0], 'force_law must be a mapping'),
         ('force_law.a1', 3.0, 'force_law.a1 must be a list of numbers; instead received 3.0'),
-        ('force_law.a1', [], 'force_law.a1 must be a list of numbers'),
         (
             'force_law.a1',
             [1.0, 'x', 0.0, 0.0],
@@ -65,31 +61,25 @@ def test_the_default_specimen_covers_the_gaps_of_new_and_worn_pads():
             '1e-1',
             r"turns_area must be a finite number; instead .*'1e-1' \(YAML reads 1e-6 as a text",
         ),
-        ('turns_area', True, 'turns_area must be a finite number; instead received True'),
-        ('turns_area', math.nan, 'turns_area must be a finite number; instead received nan'),
         ('spring_stiffness', -1.0, r'spring_stiffness \(-1 N/m\) must lie within 1000 \.\. 1e\+07 N/m'),
-        ('rest_current', 2.0, r'rest_current \(2 A\) must lie within 0\.01 \.\. 1 A'),
         (
             'current_limit',
             3.5,
             r'current_limit \(3\.50 A\) must not exceed force_law\.current_high \(3\.00 A\)',
         ),
         ('coil_resistance', 3.0, r'coil_resistance \(3 ohm\) and heating\.resistance \(2\.5 ohm\) are'),
-        ('force_law.gap_high', 1.0, r'force_law\.gap_high \(1 m\) must lie within'),
         ('force_law.gap_high', 900e-6, 'the force must'),
         ('gap_curves.gap_of_inductance.coefficients', [4e-4, 1e-4], 'must agree within'),
         ('gap_curves.gap_of_inductance.coefficients', [4e-4, 0.0], 'must be monotone'),
         ('name', 7, 'name must be a text'),
-        ('name', '', 'name must be a text'),
-        ('friction', [1.0], 'friction must be a mapping'),
         ('friction', {'a_p1': 'high'}, 'friction.a_p1 must be a finite number'),
         ('provenance', 'bench', 'provenance must be a mapping'),
+        ('provenance.parts', 3, r'provenance\.parts must be a mapping'),
+        ('provenance.parts.friction', 'by hand', r'provenance\.parts\.friction must be a mapping'),
+        ('provenance.parts.friction.specimen', '', r'parts\.friction\.specimen must be a text'),
         ('schema_version', 1, r'schema_version \(1\) must be 2; .* calibrate again'),
-        ('schema_version', None, r'schema_version \(None\) must be 2'),
-        ('friction', {'mu': 0.3}, 'friction.mu is unknown; known are b_offset'),
+        ('friction', {'mu': 0.3}, "'mu' is no parameter of friction; known are b_offset"),
         ('friction', {'a_p2': -1.0}, r'friction.a_p2 \(-1 1\) must lie within'),
-        ('temperature', 20.0, 'temperature must be a mapping'),
-        ('temperature.reference_celsius', None, 'reference_celsius is missing'),
         ('temperature.reference_celsius', 20.0, 'must differ from calibration_celsius'),
         ('temperature.highest_celsius', 400.0, r'temperature.highest_celsius \(400 degC\) must lie within'),
         ('temperature.reluctance_shift.coefficients', [-9.0, 9.0], 'must still fall with the gap'),
@@ -145,11 +135,6 @@ def test_no_value_of_the_file_can_be_edited_without_being_refused_or_seen(path):
             specimen_from_mapping(with_leaf(path, lambda old, new=nonsense: new if path != ('name',) else 7))
 
 
-def test_a_missing_file_is_refused():
-    with pytest.raises(SpecimenError, match='cannot be read'):
-        load_specimen('/nowhere/specimen.yaml')
-
-
 @pytest.mark.parametrize('text', ['a: [1, 2', '', '- 1\n- 2\n'])
 def test_a_file_that_is_no_specimen_is_refused(tmp_path, text):
     (tmp_path / 'none.yaml').write_text(text)
@@ -157,31 +142,10 @@ def test_a_file_that_is_no_specimen_is_refused(tmp_path, text):
         load_specimen(tmp_path / 'none.yaml')
 
 
-@pytest.mark.parametrize(
-    ('added', 'sentence'),
-    [
-        ('turns_area: 0.2\n', "line [0-9]+: the key 'turns_area' stands there twice; keep one of them"),
-        ('2026-05-04: 1\n', 'line [0-9]+: the key datetime.date.* is no text; put it in quotes'),
-        ('more: {mass: 9999999999999999999999}\n', 'does not fit into 64 bits'),
-    ],
-)
-def test_what_changes_the_meaning_of_a_file_is_refused_with_its_line(tmp_path, added, sentence):
-    file = tmp_path / 'changed.yaml'
-    file.write_text(DEFAULT_SPECIMEN.read_text(encoding='utf-8') + added)
-    with pytest.raises(SpecimenError, match=f'specimen file {file} is refused in .*{sentence}'):
-        load_specimen(file)
-
-
 def test_the_default_specimen_is_chosen_without_a_file():
     assert chosen_specimen('') == chosen_specimen('', 'default') == DEFAULT
-    with pytest.raises(SpecimenError, match=r"specimen \('a/left.yaml'\) must be a name; .* parameters_file"):
-        chosen_specimen('', 'a/left.yaml')
-
-
-def test_a_file_that_is_no_text_is_refused(tmp_path):
-    (tmp_path / 'x.yaml').write_bytes(b'name: \xff\xfe')
-    with pytest.raises(SpecimenError, match='is no text'):
-        load_specimen(tmp_path / 'x.yaml')
+    with pytest.raises(SpecimenError, match="is for the specimen 'default', 'left' is asked for"):
+        chosen_specimen('', 'left')
 
 
 def test_friction_parameters_pass_through():
@@ -192,12 +156,11 @@ def test_friction_parameters_pass_through():
 @pytest.mark.parametrize(
     ('friction', 'sentence'),
     [
-        ({'a_p1': -5.0}, r'coefficient of friction \(.* at \+10 mm/s'),
-        ({'a_n1': -5.0}, r'coefficient of friction \(0 at -10 mm/s and 40 N\) must lie within 0\.05'),
-        ({'a_p2': 5.0}, r'coefficient of friction .* must lie within 0\.05 \.\. 5'),
+        ({'a_p1': -5.0}, r'coefficient of friction .* must be greater than 0'),
+        ({'a_n1': -5.0}, r'coefficient of friction .* must be greater than 0'),
         ({'lowest_normal_force': 200.0}, r'lowest_normal_force \(200 N\) must not exceed'),
         ({'contact_stiffness': 1.0}, r'friction\.contact_stiffness \(1 N/m\) must lie within'),
-        ({'a_q1': 1.0}, r'friction\.a_q1 is unknown'),
+        ({'a_q1': 1.0}, "'a_q1' is no parameter of friction; did you mean a_"),
     ],
 )
 def test_friction_that_is_none_is_refused(friction, sentence):

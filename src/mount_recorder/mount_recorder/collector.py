@@ -20,7 +20,7 @@ from mount_ros.data_path import io_node
 from mount_ros.data_thread import DataThread, DataThreadEndedError, Poll
 from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import Taken, raw_taker
-from mount_ros.qos import publisher_qos, recording_qos
+from mount_ros.qos import publisher_qos
 from mount_ros.topics import Topic
 
 Receive = Callable[[bytes, int, int], None]
@@ -73,7 +73,7 @@ class Collector:
     def collect(self, topic: Topic, receive: Receive, qos: QoSProfile | None = None) -> Subscription:
         """Hand every message of `topic` to `receive`; with another `qos`, those that it brings."""
         subscription = self.node.create_subscription(
-            message_class(topic.type), topic.name, _never_called, qos or recording_qos(topic), raw=True
+            message_class(topic.type), topic.name, _never_called, qos or publisher_qos(topic), raw=True
         )
         self._receivers.append((subscription, raw_taker(subscription), receive))
         return subscription

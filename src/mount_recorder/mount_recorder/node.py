@@ -61,9 +61,7 @@ class MountRecorder(SafeLifecycleNode):
             self.declare_parameter(parameter, default, ParameterDescriptor(description=meaning))
         declare(self, RecorderParameters())
         self._recorder: Recorder | None = None
-        self._mark_service = self.create_service(
-            Trigger, '~/mark', self._on_mark, callback_group=self.transitions
-        )
+        self._mark_service = self.create_service(Trigger, '~/mark', self._on_mark)
 
     # What is set here exists until `cleanup`.
     def configure(self) -> None:

@@ -7,10 +7,9 @@ A topic between two nodes of a process costs two changes of thread by way of the
 a call, in the sender's thread and before the message is published for the recorder and all others.
 """
 
-import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -47,21 +46,10 @@ def io_node(owner: Node, name: str = '') -> Node:
         f'{name or owner.get_name()}_io',
         namespace=owner.get_namespace(),
         context=owner.context,
-        cli_args=['--ros-args', *_topic_remappings(sys.argv, owner.get_name())],
-        use_global_arguments=False,
+        cli_args=['--ros-args', '-r', f'__node:={name or owner.get_name()}_io'],
         start_parameter_services=False,
         enable_rosout=False,
     )
-
-
-def _topic_remappings(arguments: Sequence[str], node: str) -> list[str]:
-    """Return those of the command line's `arguments` that remap topics of `node`, without its name."""
-    kept: list[str] = []
-    for option, rule in pairwise(arguments):
-        *of_node, name = rule.partition(':=')[0].split(':')
-        if option in ('-r', '--remap') and of_node in ([], [node]) and not name.startswith('__'):
-            kept += ['-r', rule.removeprefix(f'{node}:')]
-    return kept
 
 
 class DataPath:
@@ -85,14 +73,13 @@ class DataPath:
         self.lockstep = lockstep
         self.refused, self.refusal = 0, ''
         self._thread = thread or DataThread(owner.context, on_failure)
-        self._direct = thread is not None and thread.shared and not lockstep
+        self._direct = thread is not None and not lockstep
         self.node = io_node(owner, name)
         self.publisher_watch = PublisherWatch(self.node, on_conflict)
         """Who publishes the subscribed topics; `on_conflict` is called when others begin or cease to."""
         self._serving, self._stopped = False, False
         self._publishers: list[Publisher] = []
-        self._sent_directly: list[LocalTopic] = []
-        self._received_directly: list[tuple[LocalTopic, Callable[[bytes, bool], None], threading.RLock]] = []
+        self._senders, self._receivers = ExitStack(), ExitStack()  # what passes directly, and ends with it
         self._polls: list[Poll] = []
 
     @property
@@ -120,8 +107,8 @@ class DataPath:
         if not self._direct:
             return publish
         local = self._thread.local_topics[publisher.topic_name]
-        local.senders += 1
-        self._sent_directly.append(local)
+        local.senders.append(publisher)
+        self._senders.callback(local.senders.remove, publisher)
 
         def send(raw: bytes) -> None:
             for receive in local.receivers:
@@ -137,13 +124,8 @@ class DataPath:
         """
 
         def create() -> None:
-            subscription = self.node.create_subscription(
-                message_class(topic.type),
-                topic.name,
-                callback,
-                control_qos(topic, lockstep=self.lockstep),
-                raw=True,
-            )
+            kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
+            subscription = self.node.create_subscription(kind, topic.name, callback, qos, raw=True)
             subscription.callback = self._receiver(topic, subscription, callback, directly and self._direct)
 
         if self._serving:
@@ -199,14 +181,10 @@ class DataPath:
             return
         self._stopped = True
         self.remove_polls()
-        for local, receive, one_at_a_time in self._received_directly:
-            local.receivers.remove(receive)
-            with one_at_a_time:
-                """Wait for the message that a sender hands over."""
+        self._receivers.close()
         if self._serving:
             self._thread.remove(self.node)
-        for local in self._sent_directly:
-            local.senders -= 1
+        self._senders.close()
         self.publisher_watch.remove(*TOPICS)
         self.node.destroy_node()
 
@@ -236,7 +214,10 @@ class DataPath:
 
         if directly:
             local.receivers.append(receive)
-            self._received_directly.append((local, receive, one_at_a_time))
+            # The end waits for the message that a sender hands over; the last step is the first.
+            self._receivers.callback(one_at_a_time.release)
+            self._receivers.callback(one_at_a_time.acquire)
+            self._receivers.callback(local.receivers.remove, receive)
         return receive
 
     def _guarded(self, poll: Poll) -> Poll:

@@ -8,11 +8,13 @@ from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from mount_ros.private_rclpy import raw_taker
 
@@ -36,7 +38,7 @@ class DataThreadEndedError(DataThreadError):
 class LocalTopic:
     """The ends of one topic among the nodes that share a data thread."""
 
-    senders: int = 0
+    senders: list[Publisher] = field(default_factory=list)
     receivers: list[Callable[[bytes, bool], None]] = field(default_factory=list)
 
 
@@ -57,12 +59,8 @@ class DataThread:
         self,
         context: Context,
         on_failure: Callable[[str], None] = lambda sentence: None,
-        *,
-        shared: bool = True,
     ):
         self.failure = ''
-        self.shared = shared
-        """Whether more than one node may be served."""
         self.local_topics: dict[str, LocalTopic] = defaultdict(LocalTopic)
         """By full name: messages pass directly between the nodes that share this thread."""
         self._context = context
@@ -144,8 +142,13 @@ class DataThread:
 
     def _apply_changes(self, executor: Executor) -> bool:
         """Return whether anything is left to serve or to poll."""
-        changes = self._changes.copy()
-        errors = [_error_of(make) for make, _ in changes]
+        changes, settled = self._changes.copy(), []
+        for make, made in changes:
+            try:
+                make()
+                settled.append(partial(made.set_result, None))
+            except Exception as error:  # it concerns the caller of `change`, not the thread
+                settled.append(partial(made.set_exception, error))
         served, wanted = set(executor.get_nodes()), set() if self._polls else set(self._nodes)
         for node in served - wanted:
             executor.remove_node(node)
@@ -157,11 +160,8 @@ class DataThread:
             serving = bool(self._nodes or self._polls or self._changes)
             if not serving:
                 self._executor = None
-        for (_, made), error in zip(changes, errors, strict=True):
-            if error is None:
-                made.set_result(None)
-            else:
-                made.set_exception(error)
+        for settle in settled:
+            settle()
         return serving
 
     def _poll_and_take(self) -> None:
@@ -179,15 +179,6 @@ class DataThread:
                     busy = True
             if not busy:
                 time.sleep(_IDLE_PERIOD)
-
-
-def _error_of(make: Callable[[], object]) -> Exception | None:
-    """Return what `make` raises: it concerns the caller of `change`, not the thread."""
-    try:
-        make()
-    except Exception as error:
-        return error
-    return None
 
 
 def _drain(executor: Executor) -> None:

@@ -5,7 +5,6 @@ Every default gives way to what the user has set.
 
 import os
 import socket
-import tempfile
 from pathlib import Path
 
 _NEIGHBOUR = ('127.0.0.1', 9)  # any port
@@ -19,9 +18,6 @@ def prepare_environment() -> None:
     os.environ.setdefault('FASTDDS_DEFAULT_PROFILES_FILE', str(profile))
     # One line per message, so that a supervisor can pass it on.
     os.environ.setdefault('RCUTILS_CONSOLE_OUTPUT_FORMAT', '[{severity}] [{name}]: {message}')
-    if not _can_log():  # the middleware refuses to start where it cannot
-        folder = Path(tempfile.gettempdir()) / f'engine_mount_log_{os.getuid()}'
-        os.environ.setdefault('ROS_LOG_DIR', str(folder))
 
 
 def loopback_refusal() -> str:
@@ -32,14 +28,3 @@ def loopback_refusal() -> str:
         except OSError as error:
             return f'the loopback interface is down ({error.strerror}): `ip link set lo up`'
     return ''
-
-
-def _can_log() -> bool:
-    """Return whether there is a folder for the logs of ROS, made where it lacks."""
-    home = os.environ.get('ROS_HOME') or (f'{os.environ["HOME"]}/.ros' if os.environ.get('HOME') else '')
-    folder = os.environ.get('ROS_LOG_DIR') or (f'{home}/log' if home else '')
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return bool(folder) and os.access(folder, os.W_OK)

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -49,21 +48,9 @@ def integer_as_float(node: Node, name: str) -> None:
 class OpenLifecycleNode(LifecycleNode):
     """A lifecycle node whose transitions can be overridden, and whose services end with it."""
 
-    def __init__(self, name: str, **arguments):
-        super().__init__(name, **arguments)
-        self.transitions = MutuallyExclusiveCallbackGroup()
-        """The callbacks that must not run beside a transition; what only asks is in the default group."""
-        service = self._service_change_state
-        service.callback_group = self.transitions
-        self.transitions.add_entity(service)
-
     def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         """Make a transition asked for by service or by call; raises where it is not valid in this state."""
         return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
-
-    def serve_transition(self, answer: Callable[[], Any]) -> Any:
-        """Return what `answer`, which makes the transition that a service asks for, returns."""
-        return answer()
 
     def destroy_node(self) -> None:
         """Destroy the node; rclpy leaves it in the graph until nothing refers to its services."""
@@ -72,7 +59,3 @@ class OpenLifecycleNode(LifecycleNode):
 
     def _LifecycleNodeMixin__change_state(self, transition_id: int) -> Any:  # noqa: N802
         return self.change_state(transition_id)
-
-    def _LifecycleNodeMixin__on_change_state(self, request: Any, response: Any) -> Any:  # noqa: N802
-        answer = super()._LifecycleNodeMixin__on_change_state  # type: ignore[misc]
-        return self.serve_transition(partial(answer, request, response))

@@ -18,10 +18,8 @@ from mount_ros.topics import Topic
 LONGEST_DOUBT = 6.0
 """How long two writers may bear one name, s: the lease of a killed one (5 s, `dds/`), and 1 s (chosen)."""
 
-NAMING_TIME = 1.0
-"""How long discovery may need to name the sender of a message, s, chosen: the name travels by itself."""
-
 _CHECK_PERIOD = 0.05  # s, chosen: while an activation waits
+_KILLED = f'a killed one is gone after {LONGEST_DOUBT:g} s'
 _NAMELESS = '_NODE_NAME_UNKNOWN_'  # rmw_fastrtps, until the name has come
 
 
@@ -78,7 +76,13 @@ class PublisherWatch:
             before = self.confirmed, self.suspected
             for topic, watched in self._watched.items():
                 watched.count = watched.subscription.get_publisher_count()
-                self._judge(topic, watched)
+                confirmed, suspected = self._others(topic)
+                now = time.monotonic()
+                watched.since = watched.since if watched.suspected else now
+                if now - watched.since > LONGEST_DOUBT:
+                    confirmed, suspected = confirmed or suspected, []
+                watched.confirmed = _sentence(topic, confirmed, 'end it')
+                watched.suspected = _sentence(topic, suspected, f'{_KILLED}, else end it')
             every = self._watched.values()
             self.confirmed = next((each.confirmed for each in every if each.confirmed), '')
             self.suspected = next((each.suspected for each in every if each.suspected), '')
@@ -102,16 +106,6 @@ class PublisherWatch:
             if self.confirmed or ending.wait(_CHECK_PERIOD):
                 raise PublisherConflictError(self.confirmed or self.suspected)
 
-    def _judge(self, topic: Topic, watched: WatchedTopic) -> None:
-        now = time.monotonic()
-        confirmed, suspected = self._others(topic)
-        watched.since = watched.since if watched.suspected else now
-        if now - watched.since > LONGEST_DOUBT:
-            confirmed, suspected = confirmed or suspected, []
-        killed = f'a killed one is gone after {LONGEST_DOUBT:g} s, else end it'
-        watched.confirmed = _sentence(topic, confirmed, 'end it')
-        watched.suspected = _sentence(topic, suspected, killed)
-
     def _others(self, topic: Topic) -> tuple[list[str], list[str]]:
         """Return the publishers of `topic` that are certainly not its own, and those that may not be."""
         names = Counter(
@@ -126,22 +120,6 @@ class PublisherWatch:
         others = names.keys() - {f'{space}/{writer}_io' for writer in topic.writers}
         nameless = {name for name in others if name.endswith(_NAMELESS)}
         return sorted(others - nameless), twice or sorted(nameless)
-
-
-class UnnamedPublisher:
-    """A second writer that is known by what it sends alone, until discovery names it."""
-
-    def __init__(self) -> None:
-        self._since: float | None = None  # s, steady clock
-
-    def is_awaited(self, nameless: bool) -> bool:
-        """Return whether its name may still come: within `NAMING_TIME` of the first call with `nameless`."""
-        now = time.monotonic()
-        if not nameless:
-            self._since = None
-            return False
-        self._since = now if self._since is None else self._since
-        return now - self._since < NAMING_TIME
 
 
 def present_nodes(seen_by: Node) -> list[tuple[str, str]]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 _MODULES = {
     'mount_supervisor': 'mount_bringup.graph.run',
-    'mount_prepare': 'mount_bringup.prepare',
 }
 """Modules of the executables; of any other one it is `node` in the package of the same name."""
 

@@ -12,13 +12,12 @@ from dataclasses import dataclass, field
 from mount_driver.protocol import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics.electronics import ElectronicsParameters, status_every
+from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
 
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
 _DISCHARGED = 0.01  # A, chosen: a coil with less carries no current
-_LOCKSTEP_WAIT = 0.1  # s: how often a loop in lock-step looks whether it shall end
 _DISCHARGE_LIMIT = 0.1  # s, chosen: the setpoint timeout, then several times what a sound coil needs
 _FORGOTTEN = 0.01  # chosen: of the longest time that the work took, from one sample to the next
 _RESERVE = 1.5  # chosen: times the work's longest time are kept for it
@@ -48,13 +47,11 @@ class ElectronicsLoop:
         self,
         mount: SimulatedMount,
         can_end: CanEnd,
-        electronics: ElectronicsParameters,
         publish: Callable[[int], None],
     ):
         self._mount = mount
         self._can_end = can_end
         self._status_every = status_every(mount.sample_rate)
-        self._electronics = electronics
         self._publish = publish
         self._sent_at = [math.nan] * _REMEMBERED
         self._asked: int | None = None  # lock-step: the sample that waits for its answer
@@ -86,14 +83,14 @@ class ElectronicsLoop:
         self._mount.advance(*self._taken)
         self.figures.samples += 1
 
-    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
-        """Take the next sample if the last one is answered within `wait` s; return whether it was.
+    def step_in_lockstep(self, patience: float) -> bool:
+        """Take the next sample if the last one is answered; return whether it was.
 
         Raises `NoAnswerError` when no answer came for `patience` s; the first sample waits for the
         activation of the node that answers it.
         """
         if self._asked is not None:
-            answer = self._can_end.wait_for_answer(self._asked, wait)
+            answer = self._can_end.answer_to(self._asked)
             if answer is None:
                 self._check_patience(self._asked, patience)
                 return False
@@ -181,8 +178,8 @@ class ElectronicsLoop:
         beyond, self._beyond_told = self._beyond_told, self._mount.beyond_range.samples
         return Status(
             displacement_sensor=self._beyond_told > beyond,
-            supply_voltage=self._electronics.supply_voltage,
-            coil_temperature_celsius=self._electronics.coil_temperature,
+            supply_voltage=self._mount.electronics.supply_voltage,
+            coil_temperature_celsius=self._mount.electronics.coil_temperature,
             setpoint_timeout=not self._mount.enabled,
             e2e_error=self._failed_told > failed,
         )
@@ -205,7 +202,7 @@ class CarLoop:
 
     def __init__(self, loops: Mapping[str, ElectronicsLoop], clock_drift: float, sample_rate: float):
         self._sample_rate = sample_rate
-        self._loops = list(loops.items())
+        self._loops, self._names = list(loops.values()), list(loops)
         self._clock_drift = clock_drift
         self._turn = 0  # lock-step: whose sample comes next
 
@@ -220,38 +217,33 @@ class CarLoop:
         # processor of their own; with two of them the simulator would take one from the graph.
         longest, begin = period, time.monotonic()
         for number, _ in enumerate(until_ending(ending, self._discharged), 1):
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.send_sample()
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.wait_for_answer(begin + number * period - _RESERVE * longest)
             answered = time.monotonic()
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.go_on()
             now = time.monotonic()
             longest = max(now - answered, (1.0 - _FORGOTTEN) * longest)
             remaining = begin + number * period - now
-            for _, loop in self._loops:
+            for loop in self._loops:
                 loop.figures.wall_time = now - begin
                 loop.figures.overruns += remaining <= 0.0  # the next samples follow at once: none is skipped
             if remaining > 0.0:
                 time.sleep(remaining)
 
     def _discharged(self) -> bool:
-        return all(loop.discharged() for _, loop in self._loops)
+        return all(loop.discharged() for loop in self._loops)
 
-    def run_in_lockstep(self, ending: threading.Event, patience: float) -> None:
-        """Sample as fast as all answers come; raise `NoAnswerError` after `patience` s without one."""
-        while not self.finished and not ending.is_set():
-            self.step_in_lockstep(patience, _LOCKSTEP_WAIT)
-
-    def step_in_lockstep(self, patience: float, wait: float = 0.0) -> bool:
+    def step_in_lockstep(self, patience: float) -> bool:
         """Take the next sample of the mount whose turn it is; as `ElectronicsLoop.step_in_lockstep`.
 
         A mount alone has no name; of several the name of the mount leads an error.
         """
-        name, loop = self._loops[self._turn]
+        name, loop = self._names[self._turn], self._loops[self._turn]
         try:
-            taken = loop.step_in_lockstep(patience, wait)
+            taken = loop.step_in_lockstep(patience)
         except NoAnswerError as error:
             raise NoAnswerError(f'{name}: {error}' if name else str(error)) from None
         if taken or loop.finished:
@@ -261,4 +253,4 @@ class CarLoop:
     @property
     def finished(self) -> bool:
         """Whether the run is over, in lock-step with all last samples answered."""
-        return all(loop.finished for _, loop in self._loops)
+        return all(loop.finished for loop in self._loops)

@@ -27,12 +27,12 @@ from mount_ros.nodes.real_time import RealTimeThreads
 from mount_ros.private_rclpy import given_at_start
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.faults.schedule import injected_faults, texts_of_mount
+from mount_sim.electronics.faults import injected_faults
 from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
-from mount_sim.plant.places import ALONE, general_name, mount_names, values_of_mount
-from mount_sim.plant.simulated_car import DivergedError, SimulatedCar, mount_parameters
+from mount_sim.plant.mounts import ALONE, general_name, mount_names, texts_of_mount, values_of_mount
+from mount_sim.plant.simulated_car import DivergedError, SimulatedCar
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
@@ -49,7 +49,7 @@ class MountSim(SafeLifecycleNode):
         declare(self, SimParameters())
         declare(self, DriverParameters(), only=('interface', 'channel', 'port'))
         declare(self, NodeParameters())
-        self.create_service(SetBool, '~/inject_fault', self._inject, callback_group=self.transitions)
+        self.create_service(SetBool, '~/inject_fault', self._inject)
         self._own = _declare_own(self)
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -59,6 +59,12 @@ class MountSim(SafeLifecycleNode):
         self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
 
     def configure(self) -> None:
+        interface = self.get_parameter('interface').value
+        if self.lockstep and interface != 'virtual':
+            raise ParameterError(
+                f'lock-step needs the virtual bus of one process; interface is {interface}: set it to '
+                'virtual, or drive with engine-mount drive --lockstep'
+            )
         self._settings = read(self, SimParameters())
         other = {name: self.get_parameter(name).value for name in ('channel', 'port', *self._own)}
         self._values = flattened(self._settings) | other
@@ -78,16 +84,16 @@ class MountSim(SafeLifecycleNode):
         rate, drift = self._settings.sample_rate, self._settings.electronics.clock_drift
         self._loops = {}
         for name, mount in self._mounts.items():
-            can_end = CanEnd(self._open_bus(interface, name), rate)
+            own = values_of_mount(self._values, name)
+            can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate)
             self._can_ends.append(can_end)
-            electronics = mount_parameters(self._values, name).electronics
-            self._loops[name] = ElectronicsLoop(mount, can_end, electronics, partial(self._publish, name))
+            self._loops[name] = ElectronicsLoop(mount, can_end, partial(self._publish, name))
         self._loop = CarLoop(self._loops, drift, rate)
         self._counted = SlidingWindow({})
         self._ending.clear()
         self._time_zero = 0 if self.lockstep else self.get_clock().now().nanoseconds
         self._patience = self.get_parameter('answer_patience').value
-        if self.lockstep and interface == 'virtual':
+        if self.lockstep:
             # Both ends of the bus are in this process: the answering node works in the data thread.
             self._path.add_poll(self._step)
         else:
@@ -136,21 +142,6 @@ class MountSim(SafeLifecycleNode):
             response.message = str(error)
         return response
 
-    def _open_bus(self, interface: str, name: str) -> can.BusABC:
-        """Return the bus of a mount; no two mounts may have the same."""
-        buses = {}
-        for other in self._names:
-            own = values_of_mount(self._values, other)
-            buses[other] = own['channel'], own['port']
-        channel, port = buses.pop(name)
-        for other, bus in buses.items():
-            if bus == (channel, port):
-                raise ParameterError(
-                    f'the mounts {other} and {name} have one CAN bus (channel {channel}, port {port}): give '
-                    f'each its own, as in mount_{name}.port'
-                )
-        return open_bus(interface, channel, port=port)
-
     def _prepare_mounts(self) -> None:
         self._mounts = SimulatedCar(self._values, self._excitation).mounts
         for mount in SimulatedCar({**self._values, 'faults': ()}, self._excitation).mounts.values():
@@ -160,10 +151,7 @@ class MountSim(SafeLifecycleNode):
     def _run(self) -> None:
         assert self._loop is not None
         try:
-            if self.lockstep:
-                self._loop.run_in_lockstep(self._ending, self._patience)
-            else:
-                self._loop.run_in_real_time(self._ending)
+            self._loop.run_in_real_time(self._ending)
         except Exception as error:  # the border of the thread, whatever the reason
             self._fail(error)
 

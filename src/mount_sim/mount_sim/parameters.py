@@ -21,8 +21,7 @@ from mount_sim.excitation.scenario import (
 from mount_sim.plant.closing import ClosingMechanics
 from mount_sim.plant.engine_body import RigidEngine
 from mount_sim.plant.hydromount import Hydromount
-from mount_sim.plant.mounts import MOUNTS, seated_mount
-from mount_sim.plant.places import PLACES, Places
+from mount_sim.plant.mounts import MOUNTS, PLACES, Places, seated_mount
 from mount_sim.plant.plant import Plant
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients

@@ -28,31 +28,31 @@ SETPOINT_STEPS = 1.0e4  # per A
 
 
 @compiled
-def quantised_displacement(displacement: float) -> float:
+def quantised_displacement(displacement):
     """Return the displacement (m) as it arrives, in steps of 0.1 um; NaN outside +-50 mm."""
     return _quantised(displacement, DISPLACEMENT_STEPS, DISPLACEMENT_LIMIT)
 
 
 @compiled
-def quantised_coil_current(current: float) -> float:
+def quantised_coil_current(current):
     """Return the mean coil current (A) as it arrives, in steps of 0.2 mA; NaN outside +-6.5 A."""
     return _quantised(current, COIL_CURRENT_STEPS, COIL_CURRENT_LIMIT)
 
 
 @compiled
-def quantised_current_rate(rate: float) -> float:
+def quantised_current_rate(rate):
     """Return the slope of the current (A/s) as it arrives, in steps of 1 mA/s; NaN outside +-100 kA/s."""
     return _quantised(rate, CURRENT_RATE_STEPS, CURRENT_RATE_LIMIT)
 
 
 @compiled
-def quantised_flux_rate(rate: float) -> float:
+def quantised_flux_rate(rate):
     """Return the slope of the flux density (T/s) as it arrives, in 0.1 mT/s steps; NaN outside +-10 kT/s."""
     return _quantised(rate, FLUX_RATE_STEPS, FLUX_RATE_LIMIT)
 
 
 @compiled
-def quantised_coil_temperature(celsius: float) -> float:
+def quantised_coil_temperature(celsius):
     """Return the coil temperature (degC) as it arrives, in steps of 0.1 K; NaN outside -60..250 degC."""
     scaled = celsius * COIL_TEMPERATURE_STEPS
     if not COIL_TEMPERATURE_LOWEST <= scaled <= COIL_TEMPERATURE_HIGHEST:
@@ -61,7 +61,7 @@ def quantised_coil_temperature(celsius: float) -> float:
 
 
 @compiled
-def quantised_setpoint_current(current: float) -> float:
+def quantised_setpoint_current(current):
     """Return the current setpoint (A) as it arrives, limited to 0..3 A in steps of 0.1 mA; NaN for NaN."""
     if math.isnan(current):
         return math.nan
@@ -70,7 +70,7 @@ def quantised_setpoint_current(current: float) -> float:
 
 
 @compiled
-def _quantised(value: float, steps: float, limit: float) -> float:
+def _quantised(value, steps, limit):
     scaled = value * steps
     if not abs(scaled) <= limit:
         return math.nan

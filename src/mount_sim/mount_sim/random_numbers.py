@@ -8,12 +8,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import log, sine_and_cosine
-
-FloatArray = npt.NDArray[np.float64]
+from mount_models.arrays import FloatArray
 
 
 class RandomNumbers:

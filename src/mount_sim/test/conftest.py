@@ -13,7 +13,7 @@ from mount_models.arithmetic.series import series_of
 from mount_models.quantity import flattened, with_flattened
 from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.places import ALONE
+from mount_sim.plant.mounts import ALONE
 from mount_sim.plant.simulated_car import SimulatedCar, SimulatedMount
 
 # The tests are imported one by one (importmode importlib); what they share is found by this path.

@@ -41,25 +41,6 @@ def test_without_noise_the_crossing_is_found_to_a_fraction_of_a_milliampere(gap_
     assert found.current_std < 1e-4
 
 
-def test_the_slope_is_that_of_the_curve():
-    found = find_crossing(RAMP, FIXED)
-    near = found.current + np.array([-0.001, 0.001])
-    assert found.inductance_slope == pytest.approx(np.diff(fixed_gap_curve(near))[0] / 0.002, rel=0.01)
-
-
-def test_on_the_assembled_mount_the_crossing_lies_where_published():
-    assert find_crossing(RAMP, ASSEMBLED).current == pytest.approx(1.381, abs=0.0006)
-
-
-def test_samples_that_are_not_finite_are_left_out():
-    spoiled = ASSEMBLED.copy()
-    spoiled[::7] = math.nan
-    spoiled[3] = math.inf
-    assert find_crossing(RAMP, spoiled).current == pytest.approx(
-        find_crossing(RAMP, ASSEMBLED).current, abs=1e-4
-    )
-
-
 def test_the_stated_standard_deviation_is_that_of_repeated_measurements():
     random = np.random.default_rng(2)
     exact = find_crossing(RAMP, ASSEMBLED).current
@@ -90,25 +71,8 @@ def test_a_ramp_that_ends_too_early_is_refused_with_what_was_seen():
         find_crossing(RAMP[early], ASSEMBLED[early])
 
 
-def test_pure_noise_is_refused():
-    noise = 20e-3 * (1.0 + 0.5 * np.random.default_rng(6).standard_normal(RAMP.size))
-    with pytest.raises(CrossingError):
-        find_crossing(RAMP, noise)
-
-
-def test_a_rising_inductance_is_refused():
-    with pytest.raises(CrossingError):
-        find_crossing(RAMP, ASSEMBLED[::-1])
-
-
 def test_too_few_samples_are_refused():
     with pytest.raises(CrossingError, match='only 3 valid samples'):
         find_crossing(RAMP[:3], ASSEMBLED[:3])
     with pytest.raises(CrossingError, match=r'different currents within .* must be at least 7'):
         find_crossing(RAMP[::40], ASSEMBLED[::40])
-
-
-def test_a_current_that_stands_still_is_refused():
-    steps = np.repeat([1.2, 1.35, 1.4, 1.6], 200)
-    with pytest.raises(CrossingError, match='ramp the current more slowly'):
-        find_crossing(steps, assembled_curve(steps))

@@ -5,8 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from mount_models.coil.duty import Bridge, at_calibrated_duty, duty, gap_reluctance, skin_ratio, skin_shape
-from mount_models.coil.resistance import resistance_beside_drift
+from mount_models.coil.copper import resistance_beside_drift
+from mount_models.coil.correction import (
+    Bridge,
+    at_calibrated_duty,
+    duty,
+    gap_reluctance,
+    skin_ratio,
+    skin_shape,
+)
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, gap_permeance
 from mount_sim.plant.ripple import RippleCoil, incremental_inductance

@@ -1,4 +1,4 @@
-"""The simulated ripple inductance: published figures, the diffusion series, and where it tells no gap."""
+"""The simulated ripple: published figures, the quick skin factor, where it gives no gap, warm coils."""
 
 import math
 
@@ -9,14 +9,18 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from mount_models.quantity import with_values
+from mount_sim.electronics.electronics import ElectronicsParameters, Noise
+from mount_sim.excitation.excitation import Seat
+from mount_sim.plant.plant import Plant, PlantSimulation
 from mount_sim.plant.reluctance import (
     ReluctanceActuator,
     core_field,
     differential_permeability,
-    mean_incremental_inductance,
 )
 from mount_sim.plant.ripple import (
     RippleCoil,
+    TemperatureCoefficients,
+    coil_at,
     current_rate,
     diffusion_time,
     duty,
@@ -60,19 +64,6 @@ def test_the_20_millihenry_current_meets_the_published_table(gap_um, expected):
     assert crossing(gap_um) == pytest.approx(expected, abs=0.00011)
 
 
-@pytest.mark.parametrize(
-    ('gap_um', 'expected'), list(zip(GAPS_UM, (33.05, 34.68, 35.39, 35.57, 35.42, 35.13, 34.61), strict=True))
-)
-def test_inductance_at_0_8_amperes_meets_the_published_table(gap_um, expected):
-    assert inductance_mh(0.8, gap_um) == pytest.approx(expected, abs=0.0051)
-
-
-def test_at_rest_the_inductance_tells_the_gap_and_so_does_the_crossing_current():
-    gaps_um = np.arange(250, 551, 10)
-    assert (np.diff([inductance_mh(0.2, gap) for gap in gaps_um]) < 0.0).all()
-    assert (np.diff([crossing(gap) for gap in gaps_um]) > 0.0).all()
-
-
 @settings(deadline=None, max_examples=200)
 @given(current=st.floats(0.0, 3.0), gap_um=st.floats(250, 550))
 def test_the_quick_skin_factor_agrees_with_the_long_series(current, gap_um):
@@ -80,27 +71,6 @@ def test_the_quick_skin_factor_agrees_with_the_long_series(current, gap_um):
     assert skin_factor(COIL, time, share) == pytest.approx(
         skin_factor_series(COIL, time, share, MANY_TERMS), rel=1e-4
     )
-
-
-@pytest.mark.parametrize(('gap_um', 'current'), [(250, 0.2), (349, 1.0), (349, 2.2), (550, 3.0)])
-def test_the_series_is_that_of_diffusion_in_a_plate(gap_um, current):
-    time, off = diffusion_time(COIL, permeability(current, gap_um)), 1.0 - duty(COIL, current)
-    rates = (np.arange(1, MANY_TERMS + 1) * math.pi) ** 2 / time
-    fading = np.exp(-rates * COIL.sample_delay)
-    switched = (1 - np.exp(-rates * off * COIL.pwm_period)) / (1 - np.exp(-rates * COIL.pwm_period))
-    expected = 1.0 + 2.0 / off * np.sum(fading * switched)
-    assert skin_factor_series(COIL, time, duty(COIL, current), MANY_TERMS) == pytest.approx(
-        expected, rel=1e-6
-    )
-
-
-def test_slow_sampling_of_thin_plates_sees_the_whole_core():
-    coil = with_values(COIL, plate_half_thickness=2e-5)
-    assert skin_factor(coil, diffusion_time(coil, permeability(0.2, 349)), 0.52) == pytest.approx(
-        1.0, abs=1e-6
-    )
-    slow = mean_incremental_inductance(MAGNET, 0.2, 349e-6)
-    assert incremental_inductance(coil, MAGNET, 0.2, 349e-6) == pytest.approx(slow, rel=1e-6)
 
 
 @settings(deadline=None)
@@ -121,3 +91,23 @@ def test_a_sample_after_the_end_of_its_phase_is_unknown():
     late = with_values(COIL, sample_delay=150e-6)
     assert math.isnan(skin_factor(late, 0.01, 0.6))
     assert math.isfinite(skin_factor(late, 0.01, 0.8))
+
+
+COIL = RippleCoil()
+
+
+def test_core_and_copper_follow_their_own_coefficients():
+    warm = coil_at(COIL, TemperatureCoefficients(core=0.002, copper=0.004), 70.0)
+    assert warm.conductivity == pytest.approx(COIL.conductivity / 1.1)
+    assert warm.resistance == pytest.approx(COIL.resistance * 1.2)
+    assert warm._replace(conductivity=COIL.conductivity, resistance=COIL.resistance) == COIL
+
+
+def test_the_plant_reads_its_ripple_at_its_temperature():
+    def slope(**changes):
+        plant = Plant(electronics=ElectronicsParameters(coil_temperature=70.0), **changes)
+        return PlantSimulation(plant, Seat.BENCH, 1e-4).read(np.zeros(Noise.NUMBERS))[2]
+
+    told = slope(temperature=TemperatureCoefficients(core=0.002, copper=0.0))
+    more = slope(temperature=TemperatureCoefficients(core=0.004, copper=0.0))
+    assert more < told  # a core that conducts less has more inductance

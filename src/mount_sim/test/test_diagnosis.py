@@ -1,11 +1,9 @@
 """The simulator's verdict on itself."""
 
-import pytest
-
-from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
-from mount_sim.diagnosis import DRIVING, FINISHED, Counted, counted, verdict
+from mount_ros.nodes.diagnostics import Level
+from mount_sim.diagnosis import DRIVING, FINISHED, verdict
 from mount_sim.loop import LoopFigures
-from mount_sim.plant.places import ALONE
+from mount_sim.plant.mounts import ALONE
 from mount_sim.plant.simulated_car import BeyondRange, Run
 
 RUN = Run(samples=20_000, excitation_start=5000)
@@ -55,11 +53,6 @@ def test_a_machine_too_busy_for_real_time_is_a_warning():
     assert _judged(overruns=201, lockstep=True).level is Level.OK
 
 
-def test_the_first_second_is_not_judged_by_a_few_samples():
-    assert _judged(samples=100, overruns=50).level is Level.OK
-    assert _judged(samples=100, overruns=51).level is Level.WARN
-
-
 def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_moment():
     judged = _judged(beyond_range=BeyondRange(3, 3.25), lockstep=True)
     assert judged.level is Level.WARN
@@ -68,24 +61,3 @@ def test_a_mount_beyond_the_range_of_its_sensor_is_a_warning_with_the_first_mome
         '3.250 s; they were sent as not valid and answered with 0 A: excite it less'
     )
     assert (judged.figures['beyond_range'], judged.figures['first_beyond_range_s']) == (3, '3.250')
-
-
-@pytest.mark.parametrize('count', ['overruns', 'beyond_range'])
-def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow({}), ActiveFindings(), []
-    run = Run(samples=100_000, excitation_start=0)
-    for tenth in range(300):
-        found = 600 * min(max(tenth - 49, 0), 5)
-        value = found if count == 'overruns' else BeyondRange(found, 5.0)
-        figures = {'left': LoopFigures(samples=100 * tenth, **{count: value}), 'right': LoopFigures()}
-        earlier = window.earlier(tenth / 10, {name: counted(each) for name, each in figures.items()})
-        verdict_told = standing.keep(verdict(figures, run, earlier, lockstep=False))
-        before = {ALONE: earlier.get('left', Counted())}
-        alone = verdict({ALONE: figures['left']}, run, before, lockstep=False)
-        assert alone.level is verdict_told.level
-        told.append((verdict_told.level, verdict_told.sentence))
-    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
-    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
-    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
-    assert len(set(told)) == 2
-    assert told[50][1].startswith('left: ')

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from stiffness import dynamic_stiffness
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_type
+from mount_models.arithmetic.record import number_record
 from mount_sim.plant.vehicle import BRANCHES, Elastomer, elastomer_force, stretch_branches
 
 ELASTOMER = Elastomer()
@@ -15,7 +15,7 @@ ELASTOMER = Elastomer()
 
 def branches(*forces):
     """Return the state of the branches (1,)."""
-    return np.array([forces], record_type(BRANCHES))
+    return np.array([forces], number_record(*BRANCHES))
 
 
 @compiled
@@ -27,16 +27,6 @@ def response(elastomer, state, displacement, dt):
         force[k] = elastomer_force(elastomer, displacement[k], state[0])
         before = displacement[k]
     return force
-
-
-@pytest.mark.parametrize(
-    ('frequency', 'storage', 'loss'), [(8, 181.7, 14.1), (27, 193.6, 13.1), (50, 199.4, 11.7)]
-)
-def test_dynamic_stiffness_has_its_values_in_newton_per_millimetre(frequency, storage, loss):
-    stiffness = dynamic_stiffness(ELASTOMER, frequency) / 1000.0
-    assert stiffness.real == pytest.approx(storage, abs=0.06)
-    assert stiffness.imag == pytest.approx(loss, abs=0.06)
-    assert 0.058 < stiffness.imag / stiffness.real < 0.08
 
 
 @pytest.mark.parametrize('frequency', [8.0, 27.0, 50.0])
@@ -58,11 +48,3 @@ def test_one_step_equals_several_at_the_same_velocity(velocity, dt, parts):
     for _ in range(parts):
         stretch_branches(ELASTOMER, divided[0], velocity * dt / parts, dt / parts)
     assert divided.tolist()[0] == pytest.approx(whole.tolist()[0], rel=1e-9, abs=1e-12)
-
-
-def test_forces_decay_when_the_mount_is_held():
-    held = branches(10.0, 10.0, 10.0)
-    stretch_branches(ELASTOMER, held[0], 0.0, 0.1)
-    slow, middle, fast = held.tolist()[0]
-    assert slow == pytest.approx(10.0 * np.exp(-2.0 * np.pi * 0.2), rel=1e-12)
-    assert 0.0 < fast < middle < slow

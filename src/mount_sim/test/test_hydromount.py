@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from energy import upper_energy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from stiffness import dynamic_stiffness
@@ -61,11 +60,6 @@ def test_harmonics_at_8_hz_and_1_mm_have_their_values():
     assert np.linalg.norm(found[1:]) / found[0] == pytest.approx(0.056, abs=0.0005)
 
 
-def test_half_the_step_changes_no_harmonic_by_half_a_percent():
-    coarse, fine = np.abs(shaken(8.0, 1e-3)), np.abs(shaken(8.0, 1e-3, dt=DT / 2.0))
-    np.testing.assert_allclose(coarse, fine, rtol=0.005)
-
-
 @given(
     volume=st.floats(-3e-5, 3e-5),
     asymmetry=st.sampled_from([0.0, 0.25, 0.9]),
@@ -73,35 +67,13 @@ def test_half_the_step_changes_no_harmonic_by_half_a_percent():
 @example(volume=6e-11 * 6e4 * 0.875, asymmetry=0.25)
 @example(volume=-6e-11 * 6e4 * 1.125, asymmetry=0.25)
 @settings(deadline=None, derandomize=True, max_examples=200)
-def test_the_bulge_s_slope_is_its_compliance_and_its_energy_the_work_of_its_pressure(volume, asymmetry):
+def test_the_slope_of_the_bulge_is_its_compliance(volume, asymmetry):
     hydromount = HYDROMOUNT._replace(compliance_asymmetry=asymmetry)
     width = 1e-9
     low, high = (upper_pressure(hydromount, volume + side) for side in (-width, width))
     pressure = upper_pressure(hydromount, volume)
     compliance = 6e-11 * (1.0 - asymmetry * np.clip(pressure / 6e4, -1.0, 1.0))
     assert 2.0 * width / (high - low) == pytest.approx(compliance, rel=2e-3)
-    work = upper_energy(hydromount, volume + width) - upper_energy(hydromount, volume - width)
-    assert work == pytest.approx(2.0 * width * pressure, rel=2e-3, abs=1e-8)
-    assert upper_energy(hydromount, volume) >= 0.0
-
-
-def test_a_slow_stroke_only_fills_the_soft_chamber():
-    stroke = np.linspace(0.0, 2e-3, 400_000)
-    force = hydromount_response(HYDROMOUNT, stroke, DT)
-    # A_p^2 / (C_1 + C_2), and a little pressure to drive the track
-    assert force[-1] == pytest.approx(2.5e-3**2 / (2.5e-9 + 6e-11) * 2e-3, abs=0.1)
-
-
-def test_no_volume_is_lost():
-    state = np.zeros(1, HYDROMOUNT_STATE)
-    for change in (1e-4, -3e-5, 2e-5):
-        for _ in range(50):
-            hydromount_step(HYDROMOUNT, state[0], change / 50.0, DT)
-    contained = state[0]['upper_volume'] + state[0]['lower_volume']
-    assert contained == pytest.approx(HYDROMOUNT.piston_area * 9e-5, rel=1e-9)
-    assert hydromount_force(HYDROMOUNT, state[0]) == HYDROMOUNT.piston_area * upper_pressure(
-        HYDROMOUNT, state[0]['upper_volume']
-    )
 
 
 @given(

@@ -1,29 +1,21 @@
-"""The simulated rack: what it records is the actuator's, with noise of the stated size."""
+"""The simulated rack: what it records is that of actuator and contact, with noise of the stated size."""
 
 import numpy as np
 import pytest
 
+from mount_models.friction.coefficient import FrictionCoefficients
+from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError
-from mount_sim.plant.reluctance import force
-from mount_sim.rack.coil import (
+from mount_sim.rack import (
     GAPS,
     Rack,
     drawn_rack,
     measure_force,
     record_ripple,
+    sawtooth_corners,
     write_force,
     write_ripple,
 )
-
-
-def test_forces_are_those_of_the_actuator_with_noise_of_the_stated_size():
-    rack = Rack(noise=0.01, seed=3)
-    columns = measure_force(rack)
-    points = zip(columns['current_a'], columns['gap_um'], strict=True)
-    truth = np.array([force(rack.actuator, current, 1e-6 * gap) for current, gap in points])
-    error = columns['force_n'] / truth - 1.0
-    assert np.std(error) == pytest.approx(0.01, rel=0.1)
-    assert abs(np.mean(error)) < 0.001
 
 
 def test_the_same_seed_gives_the_same_recording_and_another_does_not():
@@ -63,3 +55,14 @@ def test_files_hold_what_was_measured(tmp_path):
     assert [file.name for file in files] == ['ripple_270um_+60degC.csv', 'ripple_290um_+60degC.csv']
     ripple = np.genfromtxt(files[0], delimiter=',', names=True, skip_header=1)
     assert ripple['gap_um'] == pytest.approx(270.0)
+
+
+CONTACT, COEFFICIENTS = FrictionContact(), FrictionCoefficients()
+
+
+def test_the_saw_tooth_grows_faster_after_every_second_turning_point():
+    times, positions = sawtooth_corners(-2.5e-3, (1e-3, 2e-3, 3e-3))
+    speeds = np.array([1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])
+    assert np.abs(np.diff(positions)) == pytest.approx(speeds * np.diff(times))
+    assert positions[1:] == pytest.approx([-2.5e-3, 2.5e-3] * 3 + [-2.5e-3])
+    assert (times[0], positions[0]) == (0.0, 0.0)

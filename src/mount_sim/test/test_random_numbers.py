@@ -31,7 +31,3 @@ def test_normal_numbers_are_normal_also_far_out():
 def test_blocks_go_on_where_the_one_before_ended():
     together, parts = RandomNumbers(2), RandomNumbers(2)
     assert np.array_equal(together.normal(6, 4), np.vstack([parts.normal(4, 4), parts.normal(2, 4)]))
-
-
-def test_an_odd_count_is_given_too():
-    assert np.array_equal(RandomNumbers(2).normal(1, 3)[0], RandomNumbers(2).normal(1, 4)[0, :3])

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mount_models.quantity import quantities
-from mount_sim.electronics.faults.kinds import FAULTS
+from mount_sim.electronics.faults import FAULTS
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS
 

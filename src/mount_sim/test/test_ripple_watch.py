@@ -7,7 +7,7 @@ import pytest
 
 from mount_driver.watches.ripple_law import RippleLaw, ripple_law
 from mount_driver.watches.ripple_watch import RippleWatch, RippleWatchParameters
-from mount_models.coil.heating import CoilHeating
+from mount_models.coil.copper import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
@@ -72,19 +72,16 @@ def test_the_defaults_are_the_shipped_specimen_s():
         assert getattr(law, name) == pytest.approx(value, rel=1e-12), name
 
 
-def test_the_ramp_tells_the_gap_at_the_crossing(learnt):
-    figures = learnt.figures
-    assert figures.gap == pytest.approx(341.2e-6, abs=6e-6)
-    assert figures.voltage == pytest.approx(14.0, abs=0.1)
-    assert math.isnan(watch().figures.gap)
+def test_the_ramp_tells_where_the_inductance_crosses_and_the_voltage(learnt):
+    assert learnt._reference.crossing_current == pytest.approx(1.384, abs=0.014)
+    assert learnt.voltage == pytest.approx(14.0, abs=0.1)
 
 
 @pytest.mark.parametrize('currents', [DAMPING, READY, np.zeros(2000), 2.0 * DAMPING, np.full(2000, 3.0)])
 @pytest.mark.parametrize('seed', [2, 3, 4])
 def test_a_sound_coil_is_not_doubted(learnt, currents, seed):
     assert fed(learnt, readings(currents, seed=seed)) is None
-    assert learnt.warning == ''
-    assert learnt.figures.noise == pytest.approx(0.01, abs=0.005)
+    assert learnt.noise == pytest.approx(0.01, abs=0.005)
 
 
 @pytest.mark.parametrize('before', [(-40.0, 14.0), (20.0, 9.0), (20.0, 16.0), (80.0, 14.0), (119.0, 12.0)])
@@ -95,14 +92,8 @@ def test_no_temperature_and_no_supply_makes_a_sound_coil_look_faulty(before, aft
     if before[1] < 12.0:
         ramp = np.minimum(RAMP, 2.6)  # what 9 V can drive so that the ripple is seen
     assert fed(found, readings(ramp, coil_at(*before)), before[1], before[0]) is None
-    assert not math.isnan(found.figures.gap)
+    assert not math.isnan(found.noise)
     assert fed(found, readings(drive, coil_at(*after), seed=2), after[1], after[0]) is None
-
-
-def test_the_supply_may_change_within_a_status(learnt):
-    low = readings(READY[:100], coil_at(20.0, 9.0))
-    assert fed(learnt, low, 14.0) is None  # the status comes with the next samples
-    assert fed(learnt, readings(READY, coil_at(20.0, 9.0)), 9.0) is None
 
 
 @pytest.mark.parametrize(
@@ -123,14 +114,6 @@ def test_another_gap_is_found_while_damping(learnt, currents, mechanics, within,
     assert places in sentence
     assert 'that in the ramp of the initialisation' in sentence
     assert 'check pads and rod' in sentence
-
-
-def test_slow_wear_is_warned_of_before_it_is_a_fault(learnt):
-    worn = MECHANICS._replace(contact_gap=329e-6)
-    assert fed(learnt, readings(DAMPING, mechanics=worn)) is None
-    assert 'closed gap has changed by -' in learnt.warning
-    assert 'limit 15 um' in learnt.warning
-    assert learnt.figures.gap_change == pytest.approx(-20e-6, abs=4e-6)
 
 
 @pytest.mark.parametrize('currents', [np.zeros(2000), READY, DAMPING])
@@ -173,12 +156,6 @@ def test_noise_is_told_as_noise(learnt):
     assert k < 400
     assert 'scatters by' in sentence
     assert 'limit 5 %' in sentence
-    assert learnt.warning == ''
-
-
-def test_some_more_noise_is_warned_of(learnt):
-    assert fed(learnt, readings(READY, noise=0.035), begin=10_000) is None
-    assert 'scatters by more than 2.5 % (off at 5 %)' in learnt.warning
 
 
 @pytest.mark.parametrize(('every', 'factor'), [(40, 3.0), (3, math.nan)])
@@ -186,17 +163,6 @@ def test_readings_that_are_wild_or_missing_now_and_then_are_no_fault(learnt, eve
     samples = readings(DAMPING)
     samples[1][::every] *= factor
     assert fed(learnt, samples) is None
-
-
-def test_a_bridge_that_is_off_has_no_ripple(learnt):
-    assert fed(learnt, changed(readings(READY), rate=math.nan), enabled=False) is None
-
-
-@pytest.mark.parametrize('celsius', [-40.0, 122.0])
-def test_the_temperature_may_jump_between_two_statuses(learnt, celsius):
-    other = coil_at(celsius)
-    assert fed(learnt, readings(DAMPING[:100], other), begin=10_000) is None
-    assert fed(learnt, readings(DAMPING, other), 14.0, celsius, begin=10_100) is None
 
 
 def test_a_deviation_that_goes_is_no_fault(learnt):
@@ -223,24 +189,16 @@ def test_an_unknown_supply_is_no_fault_and_the_gap_is_watched_on(learnt):
     )
 
 
-@pytest.mark.parametrize('celsius', [-40.0, 20.0, 119.0])
-def test_an_unknown_temperature_only_makes_the_limits_wider(celsius):
-    found, coil = watch(), coil_at(celsius)
-    assert fed(found, readings(RAMP, coil), 14.0, math.nan) is None
-    assert fed(found, readings(DAMPING, coil), 14.0, math.nan) is None
-    assert not math.isnan(found.figures.gap)
-
-
 def test_what_ends_before_its_peak_is_no_ramp(learnt):
     found = watch()
     half = np.concatenate([np.linspace(0.0, 1.5, 500), np.linspace(1.5, 0.0, 500)])
     assert fed(found, readings(half, mechanics=MECHANICS._replace(contact_gap=200e-6))) is None
-    assert math.isnan(found.figures.gap)
+    assert math.isnan(found.noise)
     jump = np.array([0.0] * 50 + [2.5] * 50 + [0.0] * 50)  # a sweep with holes
     assert fed(found, readings(jump)) is None
-    assert math.isnan(found.figures.gap)
+    assert math.isnan(found.noise)
     assert fed(found, readings(RAMP)) is None
-    assert found.figures.gap == pytest.approx(learnt.figures.gap, abs=6e-6)
+    assert found._reference.crossing_current == pytest.approx(learnt._reference.crossing_current, abs=0.012)
 
 
 @pytest.mark.parametrize(
@@ -267,6 +225,9 @@ def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
     for samples, found in ((still, False), (moving, True)):
         samples[1][:], samples[2][:] = frozen
         assert (fed(learnt, samples, begin=10_000 * (1 + found)) is not None) is found
+
+
+"""Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
 
 
 ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 125)) ** 2, READY])

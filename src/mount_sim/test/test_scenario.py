@@ -5,8 +5,7 @@ import pytest
 
 from mount_models.arithmetic.series import series_of
 from mount_models.quantity import ParameterError
-from mount_sim.excitation.array_file import write_excitation
-from mount_sim.excitation.building import build_excitation
+from mount_sim.excitation.building import build_excitation, write_excitation
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.scenario import STEP_TIME
 
@@ -57,31 +56,6 @@ def test_a_gap_after_the_end_of_the_drive_is_refused(parameters):
     assert 'motorway.gap_time (3 s) must lie before the end of the drive (3 s)' in _refusal(chosen)
     without = parameters(timeline__duration=3.0, motorway__gap_time=3.0, motorway__gap_depth=0.0)
     assert build_excitation(without).seat is Seat.VEHICLE
-
-
-def test_without_a_duration_the_drive_takes_15_s(parameters):
-    for scenario in ('bench', 'motorway'):
-        assert build_excitation(parameters(scenario=scenario)).duration == pytest.approx(15.0)
-
-
-def test_the_road_belongs_to_the_seed(parameters):
-    def road(seed):
-        return build_excitation(parameters(timeline__duration=1.0, seed=seed)).values[:]
-
-    np.testing.assert_array_equal(road(7), road(7))
-    assert np.abs(road(7) - road(8)).max() > 1e-4
-    smooth = build_excitation(parameters(timeline__duration=1.0, motorway__roughness=0.0, seed=7)).values[:]
-    assert np.abs(road(7) - smooth).max() > 1e-4
-
-
-def test_the_sweep_shakes_the_wheel_from_1_to_50_hz_in_49_s(parameters):
-    excitation = build_excitation(parameters(scenario='sweep'))
-    assert excitation.seat is Seat.VEHICLE
-    assert excitation.duration == pytest.approx(49.0)
-    times = np.arange(len(excitation.values)) * STEP_TIME
-    phase = 2.0 * np.pi * (times + 0.5 * times**2)
-    height = -0.12 / (2.0 * np.pi * (1.0 + times)) * np.cos(phase) * np.minimum(times, 1.0)
-    np.testing.assert_allclose(excitation.values[:], height, atol=1e-12)
 
 
 def test_an_impossible_sweep_is_refused(parameters):

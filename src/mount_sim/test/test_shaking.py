@@ -2,16 +2,12 @@
 
 import hashlib
 import tracemalloc
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mount_models.arithmetic.series import series_of
-from mount_sim.excitation.array_file import write_excitation
-from mount_sim.excitation.building import build_excitation
+from mount_sim.excitation.building import build_excitation, write_excitation
 from mount_sim.excitation.excitation import LONG_BLOCK, SHORT_BLOCK, Excitation, Seat, Shaking
 from mount_sim.excitation.scenario import STEP_TIME
 
@@ -51,17 +47,6 @@ def test_a_drive_is_shaken_to_the_bit_as_ever(chosen, scenario):
     if excitation.engine_forces is not None:
         digest.update(excitation.engine_forces[:].tobytes())
     assert digest.hexdigest()[:16] == DIGESTS[scenario]
-
-
-@pytest.mark.parametrize('scenario', CHOSEN)
-@given(cuts=st.sets(st.integers(1, round(SECONDS / STEP_TIME) - 1), max_size=12))
-@settings(max_examples=15, deadline=None)
-def test_parts_of_any_size_are_the_whole(chosen, scenario, cuts):
-    excitation = build_excitation(chosen(scenario))
-    for series in (excitation.values, excitation.engine_forces):
-        if series is not None:
-            parts = [series[first:behind] for first, behind in pairwise([0, *sorted(cuts), len(series)])]
-            np.testing.assert_array_equal(np.concatenate(parts), series[:])
 
 
 @pytest.mark.parametrize('scenario', CHOSEN)

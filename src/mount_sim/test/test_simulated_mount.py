@@ -5,39 +5,7 @@ import pytest
 
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
-from mount_sim.plant.plant import TRUTH, Plant, PlantSimulation
-
-
-def test_truth_bytes_are_its_numbers(make_mount):
-    mount = make_mount()
-    mount.measure()
-    numbers = np.frombuffer(mount.truth_bytes, '<f8')
-    np.testing.assert_array_equal(numbers, [mount.truth[name] for name in TRUTH.names])
-
-
-def test_a_run_is_the_rest_and_then_the_excitation(make_mount, drive):
-    mount = make_mount(timeline__start=0.1, timeline__duration=0.25)
-    assert (mount.run.samples, mount.run.excitation_start) == (350, 100)
-    _, truth = drive(mount)
-    assert mount.time == pytest.approx(0.35)
-    assert mount.finished
-    assert (truth['displacement'][:101] == 0.0).all()
-    assert (truth['displacement'][102:] != 0.0).all()
-
-
-@pytest.mark.parametrize('scenario', ['bench', 'motorway'])
-def test_behind_the_end_of_the_run_nothing_shakes_the_mount(make_mount, drive, scenario):
-    mount = make_mount(
-        scenario=scenario, timeline__duration=0.33, motorway__gap_depth=0.0, idle__amplitude=0.0
-    )
-    _, truth = drive(mount)
-    road = truth['road_height'][-1]
-    for _ in range(3000):
-        mount.advance(None)
-        mount.measure()
-    assert mount.sample == 3330
-    assert mount.truth['road_height'] == pytest.approx(road, abs=1e-4)
-    assert abs(mount.truth['velocity']) < 1e-5
+from mount_sim.plant.plant import Plant, PlantSimulation
 
 
 def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mount):
@@ -70,17 +38,6 @@ def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_moun
     assert enabled == [number < last + 1 + samples for number in range(300)]
 
 
-def test_a_driver_that_opens_says_that_it_is_off(make_mount):
-    mount = make_mount(mount='friction_off', timeline__start=0.05)
-    on = []
-    while mount.sample < mount.run.excitation_start + 3:
-        mount.measure()
-        on.append(mount.driver_on)
-        assert mount.enabled
-        mount.advance(0.0)
-    assert on == [True] * 50 + [False] * 3
-
-
 def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
     mount, currents = make_mount(), []
     for number in range(60):
@@ -88,30 +45,6 @@ def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
         currents.append(mount.truth['current_setpoint'])
         mount.advance(1.0 if number == 10 else None, 15)
     assert [number for number, current in enumerate(currents) if current > 0.0] == list(range(11, 16))
-
-
-def test_a_setpoint_after_a_timeout_switches_on_again(make_mount, drive):
-    _, truth = drive(make_mount(), lambda number: 1.0 if number < 10 or number >= 100 else None)
-    assert truth['coil_current'][99] == 0.0
-    assert truth['coil_current'][299] == pytest.approx(1.0, abs=1e-6)
-
-
-@pytest.mark.parametrize('scenario', ['bench', 'motorway'])
-def test_off_means_no_friction_at_all(make_mount, drive, scenario):
-    mount = make_mount(scenario=scenario, timeline__duration=1.0, motorway__gap_depth=0.03)
-    _, truth = drive(mount)
-    assert np.abs(truth['displacement']).max() > 0.9e-3
-    assert (truth['friction_force'] == 0.0).all()
-    assert (truth['normal_force'] == 0.0).all()
-
-
-def test_friction_needs_a_closed_actuator_and_opposes_the_motion(make_mount, drive):
-    _, truth = drive(make_mount(timeline__duration=1.0), lambda number: 1.0)
-    assert truth['normal_force'][-500:].min() > 60.0
-    work = np.sum(truth['friction_force'] * truth['velocity']) * 1e-3
-    assert work > 3.0  # J: it takes energy out
-    _, open_truth = drive(make_mount(timeline__duration=1.0), lambda number: 0.3)
-    assert (open_truth['friction_force'] == 0.0).all()
 
 
 def test_equal_seeds_give_equal_readings_to_the_bit(make_mount, drive):

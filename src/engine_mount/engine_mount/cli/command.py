@@ -35,11 +35,8 @@ from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
 
-_DRIVE = 'Drive and watch'
 _RECORDINGS = 'Recordings'
-_CHANGE = 'Change recordings'
 _MOUNT = 'Mount and paper'
-_PROJECT = 'This project on this machine'
 
 app = typer.Typer(
     cls=Group,
@@ -73,32 +70,42 @@ def prepare() -> None:
         prepare()
 
 
-_COMMANDS: tuple[tuple[str, str, Callable[..., None], str | None], ...] = (
-    (_DRIVE, 'drive', drive.drive, drive.EPILOG),
-    (_DRIVE, 'view', view.view, view.EPILOG),
-    (_DRIVE, 'status', view.status, view.STATUS_EPILOG),
-    (_DRIVE, 'record', record.record, record.EPILOG),
-    (_RECORDINGS, 'ls', ls.ls, ls.EPILOG),
-    (_RECORDINGS, 'info', ls.info, ls.INFO_EPILOG),
-    (_RECORDINGS, 'report', report.report, report.EPILOG),
-    (_RECORDINGS, 'replay', replay.replay, replay.EPILOG),
-    (_RECORDINGS, 'compare', compare.compare, compare.EPILOG),
-    (_RECORDINGS, 'audit', audit.audit, audit.EPILOG),
-    (_CHANGE, 'import', import_files.import_files, import_files.EPILOG),
-    (_CHANGE, 'cut', cut.cut, cut.EPILOG),
-    (_CHANGE, 'merge', merge.merge, merge.EPILOG),
-    (_CHANGE, 'recover', recover.recover, recover.EPILOG),
-    (_MOUNT, 'experiment', experiment.experiment, experiment.EPILOG),
-    (_PROJECT, 'check', check.check, check.EPILOG),
-    (_PROJECT, 'faults', faults.faults, faults.EPILOG),
-    (_PROJECT, 'bench', bench.bench, bench.EPILOG),
-    (_PROJECT, 'accept', accept.accept, accept.EPILOG),
-    (_PROJECT, 'prepare', prepare, None),
-)
-"""Panel of the help, name, function and epilog of each sub-command."""
+_COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
+    'Drive and watch': (
+        (drive.drive, drive.EPILOG),
+        (view.view, view.EPILOG),
+        (view.status, view.STATUS_EPILOG),
+        (record.record, record.EPILOG),
+    ),
+    _RECORDINGS: (
+        (ls.ls, ls.EPILOG),
+        (ls.info, ls.INFO_EPILOG),
+        (report.report, report.EPILOG),
+        (replay.replay, replay.EPILOG),
+        (compare.compare, compare.EPILOG),
+        (audit.audit, audit.EPILOG),
+    ),
+    'Change recordings': (
+        (import_files.import_file, import_files.EPILOG),
+        (cut.cut, cut.EPILOG),
+        (merge.merge, merge.EPILOG),
+        (recover.recover, recover.EPILOG),
+    ),
+    _MOUNT: ((experiment.experiment, experiment.EPILOG),),
+    'This project on this machine': (
+        (check.check, check.EPILOG),
+        (faults.faults, faults.EPILOG),
+        (bench.bench, bench.EPILOG),
+        (accept.accept, accept.EPILOG),
+        (prepare, None),
+    ),
+}
+"""Panel of the help: function and epilog of each sub-command."""
 
-for _panel, _name, _function, _epilog in _COMMANDS:
-    app.command(name=_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
+for _panel, _functions in _COMMANDS.items():
+    for _function, _epilog in _functions:
+        _name = _function.__name__.removesuffix('_file')
+        app.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
 app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)

@@ -10,11 +10,9 @@ Completer = Callable[[str], list[str]]
 KINDS = {
     'scenario': 'mount_sim.excitation.scenario:SCENARIO_NAMES',
     'mount': 'mount_sim.plant.mounts:MOUNTS',
-    'place': 'mount_sim.plant.places:PLACES',
-    'policy': 'mount_control.policy.registry:POLICIES',
-    'damper': 'mount_models.damper:DAMPERS',
+    'place': 'mount_sim.plant.mounts:PLACES',
     'on_full': 'mount_recorder.diagnosis:OnFull',
-    'fault': 'mount_sim.electronics.faults.kinds:FAULTS',
+    'fault': 'mount_sim.electronics.faults:FAULTS',
     'case': 'engine_mount.faults.case:MATRIX',
     'group': 'engine_mount.cli.bench.bench:GROUPS',
     'topic': 'mount_ros.topics:TOPICS',
@@ -25,41 +23,28 @@ _BAGS = Path('bags')
 
 
 def named(kind: str) -> Completer:
-    """Return the completer of one name of a kind, such as `scenario`."""
-    return lambda incomplete: _beginning(incomplete, _names(kind))
-
-
-def listed(kind: str) -> Completer:
-    """Return the completer of names of a kind with commas between them."""
+    """Return the completer of names of a kind, such as `scenario`, behind the last comma or slash."""
 
     def offer(incomplete: str) -> list[str]:
-        before, comma, last = incomplete.rpartition(',')
-        used = before.split(',')
-        return [before + comma + name for name in _beginning(last, _names(kind)) if name not in used]
+        module, _, collection = KINDS[kind].partition(':')
+        before = incomplete[: max(map(incomplete.rfind, ',/')) + 1]
+        names = getattr(import_module(module), collection)
+        texts = (getattr(each, 'value', getattr(each, 'name', each)) for each in names)
+        return _beginning(incomplete, (before + text for text in texts))
 
     return offer
 
 
 def setting(incomplete: str) -> list[str]:
     """Offer the parameters of the nodes for `--set`, with their defaults to be overwritten."""
-    name, equals, word = incomplete.partition('=')
-    if equals:
-        kind = name.rpartition('.')[2]
-        return [f'{name}={known}' for known in _beginning(word, _names(kind) if kind in KINDS else [])]
     from mount_bringup.settings import defaults_of_nodes
 
-    settings = [
+    settings = (
         f'{owner}.{parameter}={str(default).lower() if isinstance(default, bool) else default}'
         for owner, parameters in defaults_of_nodes().items()
         for parameter, default in parameters.items()
-    ]
+    )
     return _beginning(incomplete, settings)
-
-
-def faults(incomplete: str) -> list[str]:
-    """Offer the faults of the simulator; when they begin has to be written behind the `@`."""
-    mount, slash, name = incomplete.rpartition('/')
-    return [mount + slash + known for known in _beginning(name, ['list', *_names('fault')])]
 
 
 def recordings(incomplete: str) -> list[str]:
@@ -70,23 +55,10 @@ def recordings(incomplete: str) -> list[str]:
     return _beginning(incomplete, map(str, found))
 
 
-def references(incomplete: str) -> list[str]:
-    """Offer the references that there are."""
-    folder = _BAGS / 'reference'
-    return _beginning(incomplete, sorted(path.name for path in folder.iterdir()) if folder.is_dir() else [])
-
-
 def _is_recording(path: Path) -> bool:
     return path.suffix == '.mcap' or any(
         (place / 'metadata.yaml').is_file() for place in (path, path / 'recording')
     )
-
-
-def _names(kind: str) -> list[str]:
-    """Return the names of a kind: of keys, or of what has a `value` or a `name`."""
-    module, _, collection = KINDS[kind].partition(':')
-    known = getattr(import_module(module), collection)
-    return [getattr(each, 'value', getattr(each, 'name', each)) for each in known]
 
 
 def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:

@@ -1,32 +1,33 @@
 """Recordings that a command is given by URI, brought onto this machine; paths stay what they are."""
 
 from pathlib import Path
-
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from engine_mount.signals.sources.uris import is_uri, shown
 
+if TYPE_CHECKING:
+    from engine_mount.cli.screen import TerminalScreen
 
-def local(recording: str, console: Console) -> Path:
+
+def local(recording: str, screen: 'TerminalScreen') -> Path:
     """Return where a recording lies: a URI is fetched whole, with a bar; raises `SourceError`."""
     if not is_uri(recording):
         return Path(recording)
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.sources.stores import fetched
 
-    with TerminalScreen(console).bar(f'fetching {shown(recording)}', transient=True) as bar:
+    with screen.bar(f'fetching {shown(recording)}', transient=True) as bar:
         return fetched(recording, lambda done, of: bar(done / of, detail=f'{of / 1e6:.1f} MB'))
 
 
-def beside(recording: Path) -> Path:
-    """Return the folder for what is made of a recording: where it lies, if fetched the current one."""
-    if is_fetched(recording):
-        return Path.cwd()
-    return recording.absolute().parent
+def beside(recording: Path, ending: str) -> Path:
+    """Return the place of what is made of a recording: beside it; of a fetched one in the current folder."""
+    whole = recording.absolute()
+    name = whole.name if whole.is_dir() else whole.stem
+    return (Path.cwd() if is_fetched(recording) else whole.parent) / (name + ending)
 
 
 def named(recording: Path) -> str:
-    """Return what a recording is called to whom asked for it: its path, or the URI that it was fetched by."""
+    """Return the name of a recording for its user: its path, or the URI that it was fetched by."""
     from engine_mount.signals.sources.stores import uri_of
 
     return uri_of(recording) or str(recording)

@@ -121,10 +121,9 @@ def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:
         result = core.result()
     except InitialisationError as error:
         raise ReplayError(f'with these settings mount_init would have refused to start: {error}') from None
-    assert core.last_stamp is not None
     numbers = {name: float(getattr(result, name)) for name in topics.AIR_GAP.names}
-    table = ForceTable(core.last_stamp, result.table[0], result.table[1])
-    return RampAnswers(ramp.stamps, setpoints, MeasuredGap(core.last_stamp, numbers, table))
+    table = ForceTable(core.stamps[-1], result.table[0], result.table[1])
+    return RampAnswers(ramp.stamps, setpoints, MeasuredGap(core.stamps[-1], numbers, table))
 
 
 class ControlReplay:

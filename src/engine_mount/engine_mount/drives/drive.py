@@ -30,12 +30,12 @@ from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
 from mount_recorder.parameters import RecorderParameters, split_of
 from mount_recorder.session import new_session, session_text
-from mount_sim.electronics.faults.schedule import check_without_bus, told_faults
+from mount_sim.electronics.faults import check_without_bus, told_faults
 from mount_sim.excitation.excitation import Excitation, steps_of_sample
-from mount_sim.mount_choice import check_control_of_mount, with_control_of_mount
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.check import checked_plant
+from mount_sim.plant.car import checked_plant
 from mount_sim.plant.closing import checked_closing
+from mount_sim.plant.mounts import check_control_of_mount, with_control_of_mount
 from mount_sim.plant.simulated_car import SimulatedCar, beyond_range_sentence, mount_parameters
 
 CORE, LOCKSTEP, REAL_TIME = 'core', 'lock-step', 'real time'

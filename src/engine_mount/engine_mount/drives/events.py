@@ -4,8 +4,8 @@ import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+from mount_bringup.graph.graph import GraphObserver
 from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, GraphNode
-from mount_bringup.graph.reports import GraphObserver
 from mount_recorder.automatic_marks import MarkKind, Ration, of_mount
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level

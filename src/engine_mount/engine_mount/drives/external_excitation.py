@@ -113,7 +113,7 @@ def measured_road(
     `SignalError`, also for a road without a speed.
     """
     if road.speed is None:
-        raise SignalError('a road needs a speed: --speed 60/3.6 (m/s), or a file of the speed over time')
+        raise SignalError('a road needs a speed: --speed 60/3.6 (m/s)')
     over = wheel_height(
         road.profile, road.speed, contact_length=contact_length, duration=duration, repeat=repeat
     )

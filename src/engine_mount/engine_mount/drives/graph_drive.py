@@ -18,8 +18,8 @@ from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.settings.run_folder import RunFolder
 from engine_mount.signals.excitation import with_array
 from mount_bringup.graph.domain import can_port, domain_lock
+from mount_bringup.graph.graph import GraphObserver
 from mount_bringup.graph.nodes import CONTROL, RECORDER, SIM, SIMULATED, GraphSettings, Grouping, of_mounts
-from mount_bringup.graph.reports import GraphObserver
 from mount_bringup.graph.shutdown import ending_signals
 from mount_bringup.graph.supervisor import Supervisor
 from mount_ros.messages.verdicts import flags_of
@@ -46,7 +46,7 @@ def drive_graph(
     supervisor = Supervisor(of_mounts(SIMULATED, mounts), settings, folder.logs)
     supervisor.recovery.report = screen.note
     events = DriveEvents(supervisor.nodes, screen.say)
-    supervisor.reports.observer = events
+    supervisor.observer = events
     complaints: list[str] = []
     with domain_lock(settings.domain, settings.namespace, mounts), ending_signals(supervisor.interrupt):
         try:
@@ -58,7 +58,7 @@ def drive_graph(
             figures = supervisor.figures(SIM)
             controls = [supervisor.figures(node) for node in supervisor.nodes if node.is_a(CONTROL)]
         finally:
-            supervisor.reports.observer = GraphObserver()  # the supervisor reports the end
+            supervisor.observer = GraphObserver()  # the supervisor reports the end
             recorder = supervisor.figures(RECORDER)
             flags = flags_of(recorder)
             if flags.failed and not flags.fatal:

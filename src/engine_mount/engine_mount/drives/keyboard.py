@@ -5,7 +5,6 @@ import os
 import select
 import sys
 import termios
-import time
 import tty
 from collections.abc import Callable, Iterator
 
@@ -35,14 +34,6 @@ def mark_keys() -> Iterator[Callable[[float], int] | None]:
         yield pressed
     finally:
         termios.tcsetattr(stream, termios.TCSADRAIN, saved)
-
-
-def wait_for_keys(pressed: Callable[[float], int] | None, duration: float) -> int:
-    """Wait up to `duration` s and return how often a mark was requested."""
-    if pressed is not None:
-        return pressed(duration)
-    time.sleep(duration)
-    return 0
 
 
 def _in_foreground(terminal: int) -> bool:

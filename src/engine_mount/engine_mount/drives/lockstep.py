@@ -7,7 +7,7 @@ runs in the same domain neither receives nor disturbs them. A sample that is not
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -25,7 +25,7 @@ from engine_mount.drives.core import (
     activation_before,
     replay_parts,
 )
-from engine_mount.drives.inputs.consumed_samples import Column, ControlRun, MeasuredGap, ReplayError, Times
+from engine_mount.drives.inputs.consumed_samples import Column, ControlRun, MeasuredGap, ReplayError
 from engine_mount.drives.inputs.input import ReplayInput
 from engine_mount.settings.chosen import Parameters
 from mount_control.node import MountControl
@@ -35,7 +35,6 @@ from mount_ros.data_thread import DataThread
 from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.nodes.process import ros_context, transition
-from mount_ros.topics import Topic
 
 PATIENCE = 10.0  # s, chosen: a node that answers later does not answer
 _LOOK_PERIOD = 0.1  # s
@@ -49,86 +48,74 @@ def replay_in_lockstep(
     """Replay all runs through mount_control, initialisations in core; raises a `ValueError` for a refusal."""
     total = sum(len(run.stamps) for run in given.controls)
     done = 0
+    values = {**parameters.get('mount_control', {}), 'lockstep': True}
+    overrides = [Parameter(key, value=value) for key, value in values.items()]
     with ros_context(domain) as context:
-        player = ControlPlayer(context, parameters, f'/replay_{os.getpid()}')
+        thread = DataThread(context)
 
         def play_run(run: ControlRun, gap: MeasuredGap) -> ControlAnswers:
             nonlocal done
-            answers = player.play_run(run, gap, lambda samples: progress((done + samples) / total))
+            dialogue = _Dialogue(run)
+            with _active_control(context, thread, overrides, gap, dialogue) as (node, send):
+                dialogue.begin(send)
+                dialogue.wait(lambda samples: progress((done + samples) / total))
+                answers = _control_answers(run, dialogue, node)
+                node.trigger_deactivate()
+                if answers.setpoints[-1] != OFF:
+                    _wait_for(lambda: dialogue.repeated == 1, '0 A at the deactivation of mount_control')
             done += len(run.stamps)
             return answers
 
         return replay_parts(given, parameters, play_run)
 
 
-class ControlPlayer:
-    """The other side of the topics of mount_control, where driver and initialisation stand in the graph."""
-
-    def __init__(self, context: Context, parameters: Parameters, namespace: str, *, lockstep: bool = True):
-        self._context, self._namespace, self._lockstep = context, namespace, lockstep
-        values = {**parameters.get('mount_control', {}), 'lockstep': lockstep}
-        self._overrides = [Parameter(key, value=value) for key, value in values.items()]
-        self._thread = DataThread(context)
-
-    def play_run(self, run: ControlRun, gap: MeasuredGap, progress: Callable[[int], None]) -> ControlAnswers:
-        """Replay one run of the controller through a node of its own."""
-        dialogue = _Dialogue(run.stamps, displacement_messages(run))
-        receive = {
-            topics.CURRENT_SETPOINT: dialogue.take_setpoint,
-            topics.CONTROL_TRACE: dialogue.traces.append,
-        }
-        with self.active_control(run, gap, receive) as (node, send):
-            dialogue.begin(send)
-            dialogue.wait(progress)
-            answers = _control_answers(run, dialogue, node)
-            node.trigger_deactivate()
-            if answers.setpoints[-1] != OFF:
-                _wait_for(lambda: dialogue.repeated == 1, '0 A at the deactivation of mount_control')
-            return answers
-
-    @contextmanager
-    def active_control(
-        self, run: ControlRun, gap: MeasuredGap, receive: Mapping[Topic, Send]
-    ) -> Iterator[tuple[MountControl, Send]]:
-        """Give mount_control, active with `gap` before the first sample of `run`, and what sends samples.
-
-        `receive` takes its setpoints and traces.
-        """
-        own: dict[str, Any] = {'context': self._context, 'namespace': self._namespace}
-        node = MountControl(parameter_overrides=self._overrides, **own)
-        node.data_thread = self._thread
-        node.get_logger().set_level(LoggingSeverity.WARN)  # the command speaks for it
-        peer = Node('mount_replay', start_parameter_services=False, enable_rosout=False, **own)
-        path = DataPath(peer, lockstep=self._lockstep, thread=self._thread)
-        try:
-            transition(node.trigger_configure, node, 'mount_control')
-            send = path.sender(topics.DISPLACEMENT)
-            senders = [path.sender(topic) for topic in (topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)]
-            for topic, take in receive.items():
-                path.subscribe(topic, take)
-            path.start()
-            assert node.data_path is not None
-            ends = (path, node.data_path)
-            _wait_for(lambda: not any(end.unmatched() for end in ends), 'connection of all topics')
-            stamp = activation_before(int(run.stamps[0]))
-            for send_part, raw in zip(senders, gap.dated(stamp).messages(), strict=True):
-                send_part(raw)
-            send(ScalarsLayout(topics.DISPLACEMENT).pack(stamp, (float(run.displacement[0]),)))
-            transition(node.trigger_activate, node, 'mount_control')
-            yield node, send
-        finally:
-            path.stop()
-            peer.destroy_node()
-            node.close()
-            node.destroy_node()
+@contextmanager
+def _active_control(
+    context: Context,
+    thread: DataThread,
+    overrides: list[Parameter],
+    gap: MeasuredGap,
+    dialogue: '_Dialogue',
+) -> Iterator[tuple[MountControl, Send]]:
+    """Give mount_control, active with `gap` before the first sample, and what sends samples."""
+    own: dict[str, Any] = {'context': context, 'namespace': f'/replay_{os.getpid()}'}
+    node = MountControl(parameter_overrides=overrides, **own)
+    node.data_thread = thread
+    node.get_logger().set_level(LoggingSeverity.WARN)  # the command speaks for it
+    peer = Node('mount_replay', start_parameter_services=False, enable_rosout=False, **own)
+    path = DataPath(peer, lockstep=True, thread=thread)
+    try:
+        transition(node.trigger_configure, node, 'mount_control')
+        send = path.sender(topics.DISPLACEMENT)
+        senders = [path.sender(topic) for topic in (topics.AIR_GAP, topics.CURRENT_FORCE_TABLE)]
+        path.subscribe(topics.CURRENT_SETPOINT, dialogue.take_setpoint)
+        path.subscribe(topics.CONTROL_TRACE, dialogue.traces.append)
+        path.start()
+        assert node.data_path is not None
+        ends = (path, node.data_path)
+        _wait_for(lambda: not any(end.unmatched() for end in ends), 'connection of all topics')
+        stamp = activation_before(dialogue.stamps[0])
+        for send_part, raw in zip(senders, gap.dated(stamp).messages(), strict=True):
+            send_part(raw)
+        send(ScalarsLayout(topics.DISPLACEMENT).pack(stamp, (dialogue.first,)))
+        transition(node.trigger_activate, node, 'mount_control')
+        yield node, send
+    finally:
+        path.stop()
+        peer.destroy_node()
+        node.close()
+        node.destroy_node()
 
 
 class _Dialogue:
     """Sends the next sample as soon as the one before is answered, on the data thread."""
 
-    def __init__(self, stamps: Times, messages: list[bytes]):
-        self._stamps: list[int] = stamps.tolist()
-        self._messages = messages
+    def __init__(self, run: ControlRun):
+        self.stamps: list[int] = run.stamps.tolist()
+        self.first = float(run.displacement[0])
+        layout = ScalarsLayout(topics.DISPLACEMENT)
+        rows = layout.pack_rows(run.stamps, run.displacement[:, None])
+        self._messages = [row.tobytes() for row in rows]
         self._answers: list[bytes] = []
         self.traces: list[bytes] = []
         self._sent = 0
@@ -143,7 +130,7 @@ class _Dialogue:
     def take_setpoint(self, raw: bytes) -> None:
         """Take the answer to the sample that waits for one, and send the next."""
         answered = len(self._answers)
-        if answered == self._sent or stamp_of(raw) != self._stamps[answered]:
+        if answered == self._sent or stamp_of(raw) != self.stamps[answered]:
             self.repeated += self._over.is_set()
             return
         self._answers.append(raw)
@@ -162,7 +149,7 @@ class _Dialogue:
                 progress(answered)
             elif time.monotonic() - since > PATIENCE:
                 raise ReplayError(
-                    f'sample {answered} of {len(self._stamps)} ({self._stamps[answered] / 1e9:.3f} s) was '
+                    f'sample {answered} of {len(self.stamps)} ({self.stamps[answered] / 1e9:.3f} s) was '
                     f'not answered within {PATIENCE:g} s; mount_control does not answer'
                 )
 
@@ -170,13 +157,6 @@ class _Dialogue:
         """Return the setpoints (A) of all samples."""
         unpack = ScalarsLayout(topics.CURRENT_SETPOINT).unpack
         return np.array([unpack(raw)[1][0] for raw in self._answers])
-
-
-def displacement_messages(run: ControlRun) -> list[bytes]:
-    """Return the messages of the samples of a run."""
-    layout = ScalarsLayout(topics.DISPLACEMENT)
-    pairs = zip(run.stamps.tolist(), run.displacement.tolist(), strict=True)
-    return [layout.pack(stamp, (value,)) for stamp, value in pairs]
 
 
 def _control_answers(run: ControlRun, dialogue: _Dialogue, node: MountControl) -> ControlAnswers:

@@ -30,7 +30,7 @@ def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: 
 
     for topic in _INPUTS if replayed.ramps else _INPUTS[:1]:
         if recorded := given.messages.get(topic.name):
-            times = recorded.log_times.tolist()
+            times = recorded.receive_times.tolist()
             add(0, topic, times, (recorded.payloads[place] for place in range(len(times))))
     gaps = {gap.stamp: gap for gap in [*replayed.gaps, *(ramp.gap for ramp in replayed.ramps)]}
     first = int(given.parts[0].stamps[0]) + given.log_shift
@@ -54,7 +54,7 @@ def write_replay(folder: Path, given: ReplayInput, replayed: Replayed, session: 
             off = setpoint.pack(int(part.stamps[-1]), (OFF,))
             add(5, topics.CURRENT_SETPOINT, [int(logged[-1])], [off])
     entries.sort(key=lambda entry: entry[:2])
-    prefix = given.messages[topics.DISPLACEMENT.name].name.removesuffix(topics.DISPLACEMENT.name)
+    prefix = given.messages[topics.DISPLACEMENT.name].topic.removesuffix(topics.DISPLACEMENT.name)
     writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
     try:
         for topic in _WRITTEN:

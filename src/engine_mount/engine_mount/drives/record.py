@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
-from engine_mount.drives.keyboard import mark_keys, wait_for_keys
+from engine_mount.drives.keyboard import mark_keys
 from engine_mount.recordings.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
@@ -133,7 +133,11 @@ def _watch(
             rate = (received - counted) / max(now - before, 1e-3)
             before, counted = now, received
             show(_line(figures, now - begin, rate) + hint)
-            for _ in range(wait_for_keys(pressed, min(_LINE_PERIOD, end - now))):
+            wait = min(_LINE_PERIOD, end - now)
+            if pressed is None:
+                time.sleep(wait)
+                continue
+            for _ in range(pressed(wait)):
                 node.mark()
 
 

@@ -23,7 +23,7 @@ from engine_mount.drives.agreement import (
 )
 from engine_mount.drives.core import Progress, Replayed, replay_in_core
 from engine_mount.drives.inputs.consumed_samples import ReplayError
-from engine_mount.drives.inputs.foreign import DEFAULT_TABLE, ForeignOrder, chosen_gap, foreign_input
+from engine_mount.drives.inputs.gap import DEFAULT_TABLE, chosen_gap
 from engine_mount.drives.inputs.input import ReplayInput, replay_input, without
 from engine_mount.drives.output import write_replay
 from engine_mount.recordings.place import open_mount
@@ -50,7 +50,6 @@ from engine_mount.signals.importing.provenance import SCENARIO
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
-from mount_control.policy.registry import DEFAULT
 from mount_init.parameters import InitParameters
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
@@ -73,7 +72,6 @@ class Replay:
     mode: str
     changes: Parameters
     table: str
-    is_foreign: bool
     given: ReplayInput
     parameters: Parameters
     replayed: Replayed
@@ -88,8 +86,7 @@ class Replay:
     @property
     def held(self) -> bool:
         """Whether the answers are those recorded; true where something was changed or nothing compared."""
-        changed = self.changes or self.table or self.is_foreign
-        return bool(changed) or self.agreement is None or self.agreement.agrees
+        return bool(self.changes or self.table) or self.agreement is None or self.agreement.agrees
 
     @property
     def samples(self) -> int:
@@ -143,10 +140,9 @@ class Replay:
             ('replayed', _counted(figures)),
             ('settings', self._settings()),
             *_named('setpoints', self._verdict()),
+            ('versions', versions_sentence(figures['recorded_with'], versions())),
+            ('damping switched', switching_text(replayed_switching(self.given, self.replayed))),
         ]
-        if not self.is_foreign:
-            rows.append(('versions', versions_sentence(figures['recorded_with'], versions())))
-        rows.append(('damping switched', switching_text(replayed_switching(self.given, self.replayed))))
         if figures['recorded_switch_on_s'] is not None:
             changes = figures['switching_changes']
             more = [f'and {len(changes) - SHOWN} more'] if len(changes) > SHOWN else []
@@ -163,12 +159,10 @@ class Replay:
     def _settings(self) -> str:
         changes = []
         for node, values in self.changes.items():
-            recorded = {} if self.is_foreign else self.given.parameters.get(node, {})
+            recorded = self.given.parameters.get(node, {})
             for name, value in values.items():
                 before = f' (recorded {recorded[name]})' if name in recorded else ''
                 changes.append(f'{node}.{name} = {value}{before}')
-        if self.is_foreign:
-            return ', '.join(changes) or 'the defaults'
         if self.table:
             changes.append(f'table of {self.table}')
         return 'as recorded' + (f' but {", ".join(changes)}' if changes else '')
@@ -192,7 +186,6 @@ def replay(
     *,
     lockstep: bool = False,
     table: str = '',
-    foreign: ForeignOrder | None = None,
     mount: str = '',
     out: str | os.PathLike[str] | None = None,
     domain: int | None = None,
@@ -201,22 +194,14 @@ def replay(
     """Replay a recording or run and compare its answers with those recorded, to the bit.
 
     `changes` are parameters other than recorded, {`name` or `node.name`: value} or {node: {name: value}}, a
-    name alone one of mount_control. `table` is `default` or a recording whose force table is used, `foreign`
-    says how a foreign recording becomes a displacement, `mount` which of several is replayed. With a folder
-    `out` the replay is written as a recording that can be replayed again. In lock-step the real nodes answer
-    over topics of `domain`. Raises a `ValueError` with the reason.
+    name alone one of mount_control. `table` is `default` or a recording whose force table is used,
+    `mount` which of several is replayed. With a folder `out` the replay is written as a recording that can be
+    replayed again. In lock-step the real nodes answer over topics of `domain`. Raises a `ValueError` with the
+    reason.
     """
     changed, mode = parsed_changes(changes or {}), LOCKSTEP if lockstep else CORE
-    if foreign is not None:
-        parameters = {node: dict(changed.get(node, {})) for node in REPLAYED_NODES}
-        parameters['mount_control'].setdefault('policy', DEFAULT)
-        check_parameters(parameters)
-        gap, sentence = chosen_gap(table, parameters)
-        given = foreign_input(Path(recording), foreign, parameters, gap)
-        given.notes.insert(0, sentence)
-    else:
-        given = _recorded_input(open_mount(Path(recording), mount), table)
-        refuse_other_rate(given.parameters, changed)
+    given = _recorded_input(open_mount(Path(recording), mount), table)
+    refuse_other_rate(given.parameters, changed)
     if 'mount_init' in changed and len(given.controls) == len(given.parts):
         raise ReplayError('there is no initialisation to replay, so parameters of mount_init change nothing')
     parameters = with_changes(given.parameters, changed)
@@ -232,7 +217,7 @@ def replay(
         chosen_specimen(parameters)
         replayed = replay_in_core(given, parameters)
     found = agreement(given, replayed)
-    result = Replay(mode, changed, table, foreign is not None, given, parameters, replayed, found)
+    result = Replay(mode, changed, table, given, parameters, replayed, found)
     if out is not None:
         result.folder = make_run_folder(Path(out), '')
         result.folder.logs.rmdir()
@@ -317,7 +302,7 @@ def _recorded_input(recording: Recording, table: str) -> ReplayInput:
     except SessionError:
         imported = False
     table = table or (DEFAULT_TABLE if imported else '')  # in foreign files no gap was ever measured
-    gap, sentence = chosen_gap(table, {}) if table else (None, '')
+    gap, sentence = chosen_gap(table) if table else (None, '')
     given = replay_input(recording, gap)
     given.notes += [*([sentence] if sentence else []), *recording.warnings]
     return given

@@ -1,7 +1,6 @@
 """Fig. 13: the mount on a test rack, moved on a sine; hysteresis, harmonics and loss of its force."""
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
@@ -19,8 +18,7 @@ from engine_mount.experiments.harness.experiment import (
     claim,
     holds_if,
 )
-from engine_mount.experiments.registry import NAMES
-from engine_mount.reports.drawing.style import COLOURS, HYDROMOUNT_COLOUR
+from engine_mount.reports.drawing.style import HYDROMOUNT_COLOUR
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from engine_mount.reports.sections.periodic import (
     cycle_work,
@@ -35,7 +33,7 @@ from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
 
 NAME = 'bench'
-HYDRO, OFF, COULOMB = 'hydromount', 'friction, 0 A', 'Coulomb'
+HYDRO, OFF = 'hydromount', 'friction, 0 A'
 FAMILY = ('viscous_1000', 'viscous_2000', 'viscous_3000', 'viscous_4000')
 ORDERS = 8
 _SMOOTH = 2.0  # chosen: a loop is smooth if its force changes at most so much faster than a sine's
@@ -50,16 +48,12 @@ class BenchParameters(NamedTuple):
     damper: str = DEFAULT_DAMPER
     settling: Annotated[float, Quantity('s', 'excitation that is not evaluated', 0.5, 60.0)] = 2.5
     periods: Annotated[int, Quantity('1', 'whole periods that are evaluated', 2, 1000)] = 16
-    coulomb_force: Annotated[float, Quantity('N', 'plain Coulomb damper', 0.0, 1e4)] = 100.0
-    coulomb_stiffness: Annotated[float, Quantity('N/m', 'spring beside it', 0.0, 1e8)] = 1.6e5
 
 
-@dataclass(frozen=True)
-class Loop:
-    """Whole periods of one mount: displacement (m), velocity, mount force (N), arrays (n,); their figures."""
+class Loop(NamedTuple):
+    """Whole periods of one mount: displacement (m), mount force (N), arrays (n,); their figures."""
 
     displacement: FloatArray
-    velocity: FloatArray
     force: FloatArray
     figures: Values
 
@@ -80,20 +74,14 @@ def run(order: Order) -> Findings:
     cases |= {OFF: {**rack, 'mount': 'friction_off'}, HYDRO: {**rack, 'mount': 'hydro'}}
     drives = drive_cases(order, cases)
     loops = {name: driven_loop(each, own, name if name in dampers else '') for name, each in drives.items()}
-    loops[COULOMB] = coulomb_loop(loops[HYDRO], own)
     runs = {name: loop.figures for name, loop in loops.items()}
     for name in dampers:
         pairs = zip(runs[name]['harmonics_n'], runs[HYDRO]['harmonics_n'], strict=True)
         runs[name]['lower_than_hydromount'] = [k for k, (ours, its) in enumerate(pairs, 1) if ours < its]
     figures = {
-        **{key: runs[own.damper][key] for key in ('harmonics_n', 'thd', 'loss_energy_j', 'peak_force_n')},
-        'damper': own.damper,
-        'frequency_hz': own.frequency,
-        'amplitude_m': own.amplitude,
+        **{'damper': own.damper, 'frequency_hz': own.frequency, 'amplitude_m': own.amplitude},
         'sine_steepest_share': 2.0 * math.sin(math.pi * own.frequency * SAMPLE_TIME),
-        'mode': order.mode,
         'runs': runs,
-        'recordings': {name: each.recording.parent.name for name, each in drives.items()},
     }
     title = f'{own.frequency:g} Hz, {1e3 * own.amplitude:g} mm'
     pictures = {
@@ -107,48 +95,15 @@ def driven_loop(drive: DriveSignals, own: BenchParameters, damper: str) -> Loop:
     """Return the evaluated periods of a run with the characteristic `damper`, '' for none."""
     truth, seen = drive.truth, drive.seen
     part, _ = whole_periods(truth.time, own.frequency, own.periods)
-    time, velocity, friction = truth.time[part], truth.velocity[part], truth.friction_force[part]
-    wanted = damper_curve(damper).force(velocity) if damper else np.zeros(len(time))
+    time, x, force, friction = (
+        each[part] for each in (truth.time, truth.displacement, truth.mount_force, truth.friction_force)
+    )
+    wanted = damper_curve(damper).force(truth.velocity[part]) if damper else np.zeros(len(time))
     within = (seen.time >= time[0]) & (seen.time <= time[-1])
-    more = {
-        'friction_harmonics_n': harmonics(time, friction, own.frequency, ORDERS).tolist(),
-        'wanted_harmonics_n': harmonics(time, wanted, own.frequency, ORDERS).tolist(),
-        'damping_active_share': float(np.mean(seen.damping_active[within])),
-    }
-    moved = truth.displacement[part], velocity, truth.mount_force[part]
-    return Loop(*moved, figures_of(time, *moved, friction, own) | more)
-
-
-def coulomb_loop(moved: Loop, own: BenchParameters) -> Loop:
-    """Return what a spring and a constant friction force would do on the recorded displacement.
-
-    The force has the mean sign of the velocity in the sample interval: that of the samples alone would
-    reverse up to half a sample late and so make even harmonics.
-    """
-    x, velocity = moved.displacement, moved.velocity
-    samples = np.arange(len(velocity))
-    ends = np.interp(np.arange(len(velocity) + 1) - 0.5, samples, velocity)
-    steps = np.diff(ends)
-    still = steps == 0.0
-    sign = np.where(still, np.sign(velocity), np.diff(np.abs(ends)) / np.where(still, 1.0, steps))
-    friction = own.coulomb_force * sign
-    force = own.coulomb_stiffness * x + friction
-    return Loop(x, velocity, force, figures_of(samples / 1e3, x, velocity, force, friction, own))
-
-
-def figures_of(
-    time: FloatArray,
-    displacement: FloatArray,
-    velocity: FloatArray,
-    force: FloatArray,
-    friction: FloatArray,
-    own: BenchParameters,
-) -> Values:
-    """Return harmonics and loss of a mount force, and how steep its friction force is."""
     amplitudes = harmonics(time, force, own.frequency, ORDERS)
-    loss = cycle_work(displacement, force, own.periods)
+    loss = cycle_work(x, force, own.periods)
     peak = float(np.max(np.abs(friction)))
-    return {
+    figures = {
         'harmonics_n': amplitudes.tolist(),
         'thd': distortion(amplitudes),
         'loss_energy_j': loss,
@@ -156,7 +111,11 @@ def figures_of(
         'peak_force_n': float(np.max(np.abs(force))),
         # the largest change within a sample; none where there is no force
         'steepest_share': float(np.max(np.abs(np.diff(friction)))) / peak if peak > 1e-3 else None,
+        'friction_harmonics_n': harmonics(time, friction, own.frequency, ORDERS).tolist(),
+        'wanted_harmonics_n': harmonics(time, wanted, own.frequency, ORDERS).tolist(),
+        'damping_active_share': float(np.mean(seen.damping_active[within])),
     }
+    return Loop(x, force, figures)
 
 
 def _family(figures: Values) -> dict[str, Values]:
@@ -193,12 +152,10 @@ def _on_loss(figures):
     paper='The loops are very smooth and show nothing of the bumps of a dry friction device.',
 )
 def _on_smoothness(figures):
-    sine, runs = figures['sine_steepest_share'], figures['runs']
-    steep, coulomb = (runs[name]['steepest_share'] for name in (figures['damper'], COULOMB))
+    sine, steep = figures['sine_steepest_share'], figures['runs'][figures['damper']]['steepest_share']
     told = 'no friction force' if steep is None else f'at most {100 * steep:.1f} % of its peak'
     told = f"""With {figures['damper']} the friction force changes by {told} within 1 ms; a sine of this
-        frequency by {100 * sine:.1f} %, a plain Coulomb damper by {100 * (coulomb or 0.0):.0f} %. Counted as
-        smooth up to {_SMOOTH:g} times the sine (chosen)."""
+        frequency by {100 * sine:.1f} %. Counted as smooth up to {_SMOOTH:g} times the sine (chosen)."""
     return NOT_COMPARABLE if steep is None else steep <= _SMOOTH * sine, told
 
 
@@ -225,7 +182,7 @@ def _on_harmonics(figures):
 )
 def _on_acoustics(figures):
     damper, runs = figures['damper'], figures['runs']
-    chosen, hydro, coulomb = (runs[name]['thd'] for name in (damper, HYDRO, COULOMB))
+    chosen, hydro = (runs[name]['thd'] for name in (damper, HYDRO))
     found, wanted = (runs[damper][f'{what}_harmonics_n'][2:7:2] for what in ('friction', 'wanted'))
     odd = list(zip(found, wanted, strict=True))
     percent = f'{100 * _AS_WANTED:.0f} % (chosen), so the'
@@ -233,11 +190,11 @@ def _on_acoustics(figures):
         source = f'They agree within {percent} distortion is that of the dead zone, not of the pads.'
     else:
         source = f'They differ by more than {percent} dead zone alone does not explain the distortion.'
-    told = f"""THD {100 * chosen:.2f} % with {damper}, {100 * hydro:.2f} % with the hydromount,
-        {100 * coulomb:.1f} % with a plain Coulomb damper. Third, fifth and seventh harmonic of the friction
-        force in N, in brackets what the characteristic with its dead zone asks for:
+    told = f"""THD {100 * chosen:.2f} % with {damper}, {100 * hydro:.2f} % with the hydromount. Third, fifth
+        and seventh harmonic of the friction force in N, in brackets what the characteristic with its dead
+        zone asks for:
         {', '.join(f'{here:.2f} ({there:.2f})' for here, there in odd)}. {source}"""
-    return chosen < hydro < coulomb or PARTLY, told
+    return chosen < hydro or PARTLY, told
 
 
 def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str) -> Any:
@@ -249,7 +206,7 @@ def draw_hysteresis(loops: dict[str, Loop], dampers: list[str], title: str) -> A
     for name, style in styles.items():
         loop = loops[name]
         label = f'{name}: {1e3 * loop.figures["loss_energy_j"]:.0f} mJ per cycle'
-        axes.plot(1e3 * loop.displacement, loop.force, **{'linewidth': 1.4, 'label': label, **style})
+        axes.plot(1e3 * loop.displacement, loop.force, **{'linewidth': 1.4, **style}, label=label)
     axes.set(xlabel='displacement of the mount (mm)', ylabel='mount force (N)')
     axes.legend(fontsize='small', loc='upper left')
     return figure
@@ -261,9 +218,8 @@ def draw_harmonics(runs: dict[str, Values], damper: str, title: str) -> Any:
     places = np.arange(1, ORDERS + 1)
     least = -40.0  # dB above 1 N: below it a dot tells nothing
     for name, label, colour, aside in (
-        (damper, f'friction mount, {damper}', BLUE, -0.12),
-        (HYDRO, HYDRO, HYDROMOUNT_COLOUR, 0.0),
-        (COULOMB, 'plain Coulomb', COLOURS[1], 0.12),
+        (damper, f'friction mount, {damper}', BLUE, -0.06),
+        (HYDRO, HYDRO, HYDROMOUNT_COLOUR, 0.06),
     ):
         level = np.maximum(decibels(np.asarray(runs[name]['harmonics_n'])), least)
         beside = places + aside  # so that dots of one height do not hide each other
@@ -278,12 +234,10 @@ def draw_harmonics(runs: dict[str, Values], damper: str, title: str) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The rack moves the mount on a sine, by default 8 Hz and 1 mm. Initialisation and controller run as
     in the car, once with each damper characteristic, once with 0 A, and once with the original
     hydromount in the seat. Force and displacement over the last whole periods of each recording give
-    loops, loss and harmonics (least squares). The plain Coulomb damper is computed on the recorded
-    displacement.""",
+    loops, loss and harmonics (least squares).""",
     BenchParameters(),
     run,
     closed_loop=True,

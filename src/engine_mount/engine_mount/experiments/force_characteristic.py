@@ -17,9 +17,8 @@ from engine_mount.experiments.harness.experiment import (
 )
 from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.experiments.registry import NAMES
-from mount_models.actuator.law import TABLE_1, ForceLaw, check_gap, checked_force
-from mount_models.quantity import OutsideLawError, Quantity
+from mount_models.actuator import TABLE_1, ForceLaw, checked_force
+from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, core_flux_density
@@ -27,6 +26,8 @@ from mount_sim.plant.ripple import RippleCoil
 
 NAME = 'force_characteristic'
 _GAPS_UM = (275.0, 300.0, 349.0, 400.0, 450.0, 492.0, 545.0)
+_OF_TABLE_1 = _GAPS_UM[1:-1]
+"""Gaps at which Table 1 holds, and the specimen's fit was far from its ends."""
 _CURRENTS = np.linspace(0.0, HIGHEST_CURRENT, 61)
 _WEIGHED = 20.0  # N: relative errors count from here, as for the fit of the specimen
 
@@ -42,11 +43,9 @@ class ForceParameters(NamedTuple):
 def run(order: Order) -> Findings:
     """Measure the force at held gaps and compare it with the specimen's law and with Table 1."""
     own, law = order.parameters, default_specimen().force_law
-    order.progress(0.1, 'measuring the actuator')
     gaps = 1e-6 * np.array(_GAPS_UM)
     rig = (own.actuator, RippleCoil(), gaps, _CURRENTS)
     measured = measure_actuator(*rig, force_noise=own.force_noise, seed=own.seed)
-    order.progress(0.6, 'comparing with the laws')
     figures = figures_of(measured, measure_actuator(*rig), law, own.actuator)
     return Findings(figures, {NAME: draw_forces(measured, law)})
 
@@ -60,7 +59,7 @@ def figures_of(
     error = (checked_force(law, current, gaps[:, np.newaxis]) - true.force)[:, counted]
     strong = true.force[:, counted] > _WEIGHED
     relative = error[strong] / true.force[:, counted][strong]
-    inside = [k for k, gap in enumerate(gaps) if _within_table_1(gap)]
+    inside = np.isin(_GAPS_UM, _OF_TABLE_1)
     printed = checked_force(TABLE_1, current, gaps[inside, np.newaxis])
     table_error = (printed - true.force[inside])[:, counted]
     middle = int(np.argmin(np.abs(gaps - 349e-6)))
@@ -85,15 +84,6 @@ def figures_of(
             f'{gap * 1e6:.0f} um': float(each) for gap, each in zip(gaps, at_1_a, strict=True)
         },
     }
-
-
-def _within_table_1(gap: float) -> bool:
-    """Return whether Table 1 holds at `gap` (m), and the specimen's fit was far from its ends."""
-    try:
-        check_gap(TABLE_1, gap)
-    except OutsideLawError:
-        return False
-    return gap >= 300e-6 - 1e-12
 
 
 @claim('Sec. 3', paper='At low flux density the force is a quadratic function of the current.')
@@ -151,10 +141,11 @@ def draw_forces(measured: RigMeasurements, law: ForceLaw) -> Any:
     )
     fine = np.linspace(0.0, HIGHEST_CURRENT, 301)
     thin, dashed = {'linewidth': 1.2}, {'linewidth': 0.8, 'linestyle': '--'}
-    for gap, force, colour in zip(measured.gaps, measured.force, family(measured.gaps.size), strict=True):
+    for gap_um, force, colour in zip(_GAPS_UM, measured.force, family(len(_GAPS_UM)), strict=True):
+        gap = 1e-6 * gap_um
         axes.plot(measured.currents, force, '.', color=colour, markersize=5)
-        axes.plot(fine, checked_force(law, fine, gap), color=colour, label=f'{gap * 1e6:.0f} µm', **thin)
-        if _within_table_1(gap):
+        axes.plot(fine, checked_force(law, fine, gap), color=colour, label=f'{gap_um:.0f} µm', **thin)
+        if gap_um in _OF_TABLE_1:
             axes.plot(fine, checked_force(TABLE_1, fine, gap), color=colour, **dashed)
     axes.plot([], [], '.', color=GREY, label='measured')
     axes.plot([], [], color=GREY, label='Eqs (3), (4), fitted to this actuator', **thin)
@@ -166,7 +157,6 @@ def draw_forces(measured: RigMeasurements, law: ForceLaw) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The gap of the simulated actuator is held, the current stepped, the force measured with a noisy
     load cell (dots). Solid lines are the law of the shipped specimen, Eqs (3), (4) fitted to a
     calibration at 10 um steps without noise; dashed ones are Table 1. Errors are taken against the

@@ -1,11 +1,10 @@
 """Fig. 4: incremental inductance over current, at held gaps and on the assembled actuator; its sections."""
 
-from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.drives.loop.recording import record_core
+from engine_mount.drives.drive import drive
 from engine_mount.experiments.harness.drawing import BLUE, RED, family, new_mosaic
 from engine_mount.experiments.harness.experiment import (
     PARTLY,
@@ -22,7 +21,6 @@ from engine_mount.experiments.harness.fixed_gaps import (
     RigMeasurements,
     measure_actuator,
 )
-from engine_mount.experiments.registry import NAMES
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.reports.drive.signals import FloatArray
 from mount_models.coil.crossing import find_crossing
@@ -35,7 +33,6 @@ from mount_models.coil.gap import (
 )
 from mount_models.quantity import Quantity, flattened
 from mount_models.specimen import Specimen, default_specimen
-from mount_recorder.session import new_session, session_text
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
 from mount_sim.plant.ripple import RippleCoil
@@ -59,8 +56,7 @@ class InductanceParameters(NamedTuple):
     mechanics: ClosingMechanics = ClosingMechanics()
 
 
-@dataclass(frozen=True)
-class Ramp:
+class Ramp(NamedTuple):
     """The ripples of a current ramp, (n,) in A and H, and what the initialisation made of them."""
 
     current: FloatArray
@@ -70,8 +66,7 @@ class Ramp:
 
 def run(order: Order) -> Findings:
     """Measure held gaps on the rig, record the ramp of the assembled actuator, and compare."""
-    own, specimen, folder = order.parameters, default_specimen(), order.out / NAME
-    order.progress(0.05, 'held gaps on the rig')
+    own, specimen = order.parameters, default_specimen()
     noise = {'ratio_noise': own.ripple_noise / _AVERAGED**0.5, 'seed': own.seed}
     held = measure_actuator(own.actuator, own.coil, 1e-6 * np.array(_GAPS_UM), **noise)
     sim: Values = {
@@ -83,21 +78,11 @@ def run(order: Order) -> Findings:
         'electronics.ripple_noise': own.ripple_noise,
         **{name: value for name, value in flattened(own).items() if '.' in name},
     }
-    told = {NAME: flattened(own), 'mount_sim': sim}
-    session = new_session({'scenario': NAME, 'mode': 'core', 'parameters': told})
-    outcome = record_core(
-        folder,
-        {'mount_sim': sim},
-        session_text(session),
-        lambda share: order.progress(0.2 + 0.6 * share, 'ramp of the actuator'),
-    )
-    if outcome.result is None:
-        raise ValueError('the initialisation gave no result; the recording ends before it')
-    order.progress(0.8, 'evaluation')
-    ramp = read_ramp(open_recording(folder), specimen)
+    recording = drive(core=True, parameters={'mount_sim': sim}, out=order.out / NAME).recording
+    ramp = read_ramp(open_recording(recording), specimen)
     figures = figures_of(held, ramp, specimen, own)
     picture = draw_map(held, ramp, specimen, figures)
-    return Findings(figures, {NAME: picture}, [folder], judged={**own._asdict(), **figures})
+    return Findings(figures, {NAME: picture}, [recording], judged={**own._asdict(), **figures})
 
 
 def read_ramp(recording: Recording, specimen: Specimen) -> Ramp:
@@ -146,7 +131,7 @@ def figures_of(held: RigMeasurements, ramp: Ramp, specimen: Specimen, own: Induc
 def _ranges(inside: Any) -> list[list[float]]:
     """Return first and last current (A) of each stretch of the rig's currents."""
     edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    return [[float(RIG_CURRENTS[first]), float(RIG_CURRENTS[last - 1])] for first, last in edges]
+    return RIG_CURRENTS[edges - [0, 1]].tolist()
 
 
 def _told(ranges: list[list[float]]) -> str:
@@ -262,7 +247,6 @@ def draw_map(held: RigMeasurements, ramp: Ramp, specimen: Specimen, figures: Val
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """Thin lines: the gap of the simulated actuator is held on the rig and the current stepped; each
     point averages 50 ripples. Thick line: the current ramp of the initialisation on the assembled
     actuator, from a recording of `coil_ripple` (1 kHz, one ripple each, averaged in bins of 40 mA).

@@ -1,5 +1,6 @@
 """Fig. 15: over a gap in the motorway; displacement with both switching levels, and the current."""
 
+from collections import defaultdict
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,6 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from mount_control.policy import switched_viscous
@@ -66,7 +66,10 @@ def run(order: Order) -> Findings:
         for name, mount in _MOUNTS.items()
     }
     drives = drive_cases(order, cases)
-    gaps = {f'{1e3 * d:g} mm': {name: drives[f'{1e3 * d:g} mm, {name}'] for name in _MOUNTS} for d in depths}
+    gaps: dict[str, dict[str, DriveSignals]] = defaultdict(dict)
+    for case, driven in drives.items():
+        gap, name = case.split(', ', 1)
+        gaps[gap][name] = driven
     found = {gap: figures_of(each, own.gap_time, control) for gap, each in gaps.items()}
     shown = f'{1e3 * own.gap_depth:g} mm'
     figures = {
@@ -76,7 +79,6 @@ def run(order: Order) -> Findings:
         'switch_on_level_m': control.switch_on_level,
         'switch_off_level_m': control.switch_off_level,
         'period_s': 1.0 / control.eigenfrequency,
-        'mode': order.mode,
         'gaps': found,
     }
     picture = draw_gap(gaps[shown], shown, figures)
@@ -205,31 +207,24 @@ def draw_gap(drives: dict[str, DriveSignals], depth: str, figures: Values) -> An
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     middle = figures['exceeded_s'] or float(truth.time[-1]) / 2.0
 
-    def near(time: FloatArray) -> Any:
-        return (time >= middle - _BEFORE) & (time <= middle + _AFTER)
-
     for name, style in ((OFF, OFF_LINE), (HYDRO, HYDRO_LINE)):
         other = drives[name].truth
-        shown = near(other.time)
-        upper.plot(other.time[shown], 1e3 * other.displacement[shown], linewidth=1.0, label=name, **style)
-    shown = near(seen.time)
-    upper.plot(seen.time[shown], 1e3 * seen.displacement[shown], color=BLUE, linewidth=1.8, label=FRICTION)
+        upper.plot(other.time, 1e3 * other.displacement, linewidth=1.0, label=name, **style)
+    upper.plot(seen.time, 1e3 * seen.displacement, color=BLUE, linewidth=1.8, label=FRICTION)
     draw_level(upper, figures['switch_on_level_m'], 'switch-on level', '--', 0.8)
     draw_level(upper, figures['switch_off_level_m'], 'switch-off level', '-.', 0.8)
-    current = truth.coil_current[near(truth.time)]
-    lower.plot(truth.time[near(truth.time)], current, color=BLUE)
+    lower.plot(truth.time, truth.coil_current, color=BLUE)
     for axes in (upper, lower):
-        shade_damping(axes, seen, shown, 0.15)
-    upper.set_ylabel('displacement (mm)')
+        shade_damping(axes, seen, slice(None), 0.15)
+    upper.set(ylabel='displacement (mm)', xlim=(middle - _BEFORE, middle + _AFTER))
     lower.set(ylabel='coil current (A)', xlabel='time from the start of the drive (s)')
-    lower.set_ylim(0.0, max(0.1, 1.1 * float(np.max(current))))
+    lower.set_ylim(0.0, max(0.1, 1.1 * float(np.max(truth.coil_current))))
     upper.legend(loc='upper right', ncols=2, fontsize='small')
     return figure
 
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """A car at 119 km/h on a good road meets a gap; the paper does not tell its size, so three depths are
     driven, each with the friction mount, the same without current, and the original hydromount. Times
     and rms come from the recordings.""",

@@ -16,16 +16,19 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bmat, csc_matrix
 from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad
+from skfem import Basis, BilinearForm, ElementQuad2, LinearForm, MeshQuad, enforce
 from skfem.helpers import dot
 
 from engine_mount.reports.drive.signals import FloatArray
 from mount_sim.plant.reluctance import MU_0, ReluctanceActuator, core_flux_density
 from mount_sim.plant.ripple import RippleCoil, duty
 
+# beside the plate, m, chosen
+_AIR_WIDTH = 10e-3
+_WINDING_INSIDE, _WINDING_OUTSIDE = 0.5e-3, 3.5e-3  # from the plate
+_WINDING_START = 8e-3  # from the gap
 _MOST_STEPS = 60
 _SAME_FIELD = 1e-9
-_LEAST_SHARE = 1e-3
 _STEPS = 16  # in each part of the period
 _GAMMA = 1.0 - 0.5**0.5
 _GAUSS = (0.5 - 12.0**-0.5, 0.5 + 12.0**-0.5)
@@ -37,39 +40,24 @@ class FieldError(ValueError):
 
 
 @dataclass(frozen=True)
-class PlateSurroundings:
-    """Air and winding beside the plate, and the mesh; m, chosen."""
-
-    air_width: float = 10e-3
-    winding_distance: float = 0.5e-3  # from the plate
-    winding_thickness: float = 3e-3
-    winding_start: float = 8e-3  # from the gap
-    finest: float = 4e-6  # width of the elements at the surface
-
-
-@dataclass(frozen=True)
 class PlateField:
     """The field at one mean current.
 
     `depth` (m, from the surface) and `change` (T) are of shape (n,): the alternating flux density at the
     middle of the plate's length, as it has changed from switching to the sample. `mean_change` (T) is its
-    mean over the thickness, `equivalent_depth` (m) half the thickness x mean / surface value;
-    `path_depth` (m) the same for the magnetic tension along all of the plate instead of this section.
+    mean over the thickness, `equivalent_depth` (m) half the thickness x mean / surface value.
     `x`, `y` (m) are the centres of the elements, `steady` and `alternating` |B| (T) there, shape (y, x).
-    `drift` is the relative change of the surface value over the last period: 0 in the periodic state.
     """
 
     depth: FloatArray
     change: FloatArray
     mean_change: float
     equivalent_depth: float
-    path_depth: float
     permeability: float
     x: FloatArray
     y: FloatArray
     steady: FloatArray
     alternating: FloatArray
-    drift: float
 
 
 def plate_field(
@@ -77,17 +65,18 @@ def plate_field(
     actuator: ReluctanceActuator,
     current: float,
     gap: float,
-    surroundings: PlateSurroundings = PlateSurroundings(),
+    finest: float = 4e-6,
     periods: int = 4,
 ) -> PlateField:
     """Return the field at mean `current` (A) and `gap` (m); raises `FieldError` if the iteration fails.
 
     The winding drives the plate to the same mean flux density in its middle as the magnetic circuit of
-    `actuator` has at this current, so both computations speak of the same state of the iron.
+    `actuator` has at this current, so both computations speak of the same state of the iron. `finest` (m) is
+    the width of the elements at the surface.
     """
-    plate = _Plate(coil, actuator, gap, surroundings)
+    plate = _Plate(coil, actuator, gap, finest)
     steady = plate.steady_field(float(core_flux_density(actuator, current, gap)))
-    go = plate.march(plate.stiffness(steady))
+    go = plate.march(plate.matrices(steady)[1])
     plus, period, delay = duty(coil, current), coil.pwm_period, coil.sample_delay
     on, off = plus * period, (1.0 - plus) * period
     # the bridge imposes the rate of the mean flux density
@@ -95,118 +84,93 @@ def plate_field(
     rise, fall = rate * (1.0 - plus), -rate * plus
     # starting in the middle of a rise, the density has no mean from the first period on
     go(rise, 0.5 * on)
-    surface = []
     for _ in range(periods):
         before = go(fall, off)
         change = go(rise, delay) - before
         go(rise, on - delay)
-        depth, profile = plate.profile(change, plate.middle)
-        surface.append(profile[0])
-    mean = float(change[plate.surface_node] / plate.half)
-    slope = float(plate.curve(float(steady[plate.surface_node]) / plate.half)[1])
-    # the alternating field strength along the surface, A/m
-    field = [
-        plate.profile(change, row)[1][0]
-        * plate.curve(abs(float(plate.profile(steady, row)[1][1:3].mean())))[1]
-        for row in plate.rows_of_iron.tolist()
-    ]
-    tension = float(np.average(field, weights=plate.heights[plate.rows_of_iron]))
+    depth, profile = plate.profile(change)
+    mean = plate.mean(change)
     return PlateField(
         depth=depth,
         change=profile,
         mean_change=mean,
         equivalent_depth=plate.half * mean / float(profile[0]),
-        path_depth=plate.half * mean * slope / tension,
-        permeability=1.0 / slope,
+        permeability=1.0 / float(plate.curve(plate.mean(steady))[1]),
         x=plate.x,
         y=plate.y,
         steady=plate.density(steady),
         alternating=plate.density(change),
-        drift=float(abs(surface[-1] / surface[-2] - 1.0)) if periods > 1 else float('nan'),
     )
 
 
 class _Plate:
     """Mesh and matrices of half a plate with half its gap, and the fields on them."""
 
-    def __init__(self, coil: RippleCoil, actuator: ReluctanceActuator, gap: float, around: PlateSurroundings):
+    def __init__(self, coil: RippleCoil, actuator: ReluctanceActuator, gap: float, finest: float):
         self.coil, self.actuator = coil, actuator
         self.half = half = coil.plate_half_thickness
         edge, length = 0.5 * (gap + actuator.residual_gap), 0.25 * actuator.core_length
         # fine at the surface of the plate and at its end
-        outwards = half + _graded(around.air_width, 4.0 * around.finest)[1:]
-        x = np.concatenate([(half - _graded(half, around.finest))[::-1], outwards])
-        upwards = edge + _graded(length, 8.0 * around.finest)[1:]
-        y = np.concatenate([np.linspace(0.0, edge, 9), upwards])
-        mesh = MeshQuad.init_tensor(x, y)
-        self.basis = Basis(mesh, ElementQuad2())
-        # two Gauss points across each element, where the gradient is most exact, and its centre
-        self.line = Basis(mesh, self.basis.elem, quadrature=(np.array([(0.5, 0.5), _GAUSS]), np.full(2, 0.5)))
-        self.centre = Basis(mesh, self.basis.elem, quadrature=(np.full((2, 1), 0.5), np.ones(1)))
+        x = np.concatenate(
+            [(half - _graded(half, finest))[::-1], half + _graded(_AIR_WIDTH, 4.0 * finest)[1:]]
+        )
+        y = np.concatenate([np.linspace(0.0, edge, 9), edge + _graded(length, 8.0 * finest)[1:]])
+        mesh, element = MeshQuad.init_tensor(x, y), ElementQuad2()
+        self.basis = Basis(mesh, element)
+        self.centre = Basis(mesh, element, quadrature=(np.full((2, 1), 0.5), np.ones(1)))
         across, along = mesh.p[:, mesh.t].mean(axis=1)
-        self.x, self.y, self.heights = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), np.diff(y)
+        self.x, self.y = 0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1])
         self.rows = np.lexsort((across, along)).reshape(self.y.size, self.x.size)
-        self.columns_of_iron = np.flatnonzero(self.x < half)
-        self.rows_of_iron = np.flatnonzero(self.y > edge)
+        middle = int(np.searchsorted(y, edge + 0.5 * length)) - 1
+        # two Gauss points across each element of the iron's middle row, where the gradient is most exact
+        points = np.array([(0.5, 0.5), _GAUSS]), np.full(2, 0.5)
+        self.line = Basis(mesh, element, quadrature=points, elements=self.rows[middle, self.x < half])
         self.iron = self._per_point((across < half) & (along > edge))
-        distance = across - half - around.winding_distance
-        wound = (distance > 0.0) & (distance < around.winding_thickness)
-        wound &= along > edge + around.winding_start
+        wound = (across > half + _WINDING_INSIDE) & (across < half + _WINDING_OUTSIDE)
+        wound &= along > edge + _WINDING_START
         winding = _load.assemble(self.basis, inside=self._per_point(wound.astype(float)))
-        self.free = self.basis.complement_dofs(self.basis.get_dofs(lambda p: p[0] < 1e-12))
-        self.winding = (winding / winding.sum())[self.free]
-        self.middle = int(np.searchsorted(y, edge + 0.5 * length)) - 1
+        self.winding = winding / winding.sum()
+        self.axis = self.basis.get_dofs(lambda p: p[0] < 1e-12).all()
         surface = self.basis.get_dofs(lambda p: np.isclose(p[0], half, atol=1e-9)).all()
-        height = np.abs(self.basis.doflocs[1, surface] - self.y[self.middle])
-        self.surface_node = int(surface[np.argmin(height)])
+        height = np.abs(self.basis.doflocs[1, surface] - self.y[middle])
+        self.surface_node = surface[np.argmin(height)]
 
     def steady_field(self, flux_density: float) -> FloatArray:
-        """Return A with this mean flux density (T) in the middle of the plate, by damped Newton steps."""
-        if flux_density == 0.0:
-            return np.zeros(self.basis.N)
-        nothing = np.zeros(self.free.size)
-        found = self._factors(self.stiffness(self._whole(nothing))).solve(np.append(nothing, flux_density))
+        """Return A with this mean flux density (T) in the middle of the plate, by Newton's steps."""
+        potential, tension = np.zeros(self.basis.N), 0.0
         for _ in range(_MOST_STEPS):
-            potential, residual = self._whole(found[:-1]), self._residual(found)
-            size = np.linalg.norm(residual)
-            if size < _SAME_FIELD * abs(found[-1]) * np.linalg.norm(self.winding):
+            secant, tangent = self.matrices(potential)
+            lacking = tension * self.winding - secant @ potential
+            step, more = self._solver(tangent)(lacking, flux_density - self.mean(potential))
+            potential, tension = potential + step, tension + more
+            if np.linalg.norm(step) <= _SAME_FIELD * np.linalg.norm(potential):
                 return potential
-            step = self._factors(self.stiffness(potential)).solve(np.append(-residual, 0.0))
-            share = 1.0
-            while share > _LEAST_SHARE and np.linalg.norm(self._residual(found + share * step)) >= size:
-                share *= 0.5
-            found = found + share * step
         raise FieldError(f'the steady field did not settle in {_MOST_STEPS} steps; use a smaller current')
 
-    def _whole(self, free: FloatArray) -> FloatArray:
-        """Return A at all nodes."""
-        potential = np.zeros(self.basis.N)
-        potential[self.free] = free
-        return potential
+    def _solver(self, matrix: Any) -> Callable[[FloatArray, float], tuple[FloatArray, float]]:
+        """Return what solves a system for A, 0 on the axis, and the tension (A) that gives a mean (T)."""
+        sensed = csc_matrix(([1.0 / self.half], ([0], [self.surface_node])), shape=(1, self.basis.N))
+        within = enforce(matrix.tocsr(), D=self.axis)
+        whole = bmat([[within, -csc_matrix(self.winding[:, np.newaxis])], [sensed, None]], format='csc')
+        factors = splu(whole)
 
-    def _factors(self, matrix: Any) -> Any:
-        """Return the factors of a system whose last unknown is the tension (A), its last row the mean (T)."""
-        place = np.flatnonzero(self.free == self.surface_node)
-        sensed = csc_matrix(([1.0 / self.half], ([0], place)), shape=(1, self.free.size))
-        within = matrix[self.free][:, self.free]
-        return splu(bmat([[within, -csc_matrix(self.winding[:, np.newaxis])], [sensed, None]], format='csc'))
+        def solve(right: FloatArray, mean: float) -> tuple[FloatArray, float]:
+            right[self.axis] = 0.0
+            found = factors.solve(np.append(right, mean))
+            return found[:-1], float(found[-1])
 
-    def _residual(self, found: FloatArray) -> FloatArray:
-        gradient = self.basis.interpolate(self._whole(found[:-1])).grad
-        flow = _flow.assemble(self.basis, flow=self._reluctivities(gradient)[0] * gradient)
-        return np.asarray(flow[self.free] - found[-1] * self.winding, np.float64)
+        return solve
 
-    def stiffness(self, potential: FloatArray) -> Any:
-        """Return the matrix of the small field about the field `potential`."""
+    def matrices(self, potential: FloatArray) -> tuple[Any, Any]:
+        """Return the matrix that gives the flow of a field, and that of a small field about it."""
         gradient = self.basis.interpolate(potential).grad
-        secant, slope = self._reluctivities(gradient)
-        square = np.maximum((gradient**2).sum(axis=0), 1e-30)
-        return _tensor.assemble(self.basis, across=secant, along=(slope - secant) / square, g=gradient)
-
-    def _reluctivities(self, gradient: FloatArray) -> list[FloatArray]:
-        """Return H/B and dH/dB (m/H) at each point, of the core's magnetisation curve or of air."""
-        curve = self.curve(np.sqrt((gradient**2).sum(axis=0)))
-        return [np.where(self.iron, each, 1.0 / MU_0) for each in curve]
+        square = (gradient**2).sum(axis=0)
+        secant, slope = (np.where(self.iron, each, 1.0 / MU_0) for each in self.curve(np.sqrt(square)))
+        along = (slope - secant) / np.maximum(square, 1e-30)
+        return tuple(
+            _tensor.assemble(self.basis, across=secant, along=each, g=gradient)
+            for each in (0.0 * along, along)
+        )
 
     def curve(self, density: Any) -> tuple[Any, Any]:
         """Return H/B and dH/dB (m/H) of the core at a flux density (T)."""
@@ -224,38 +188,35 @@ class _Plate:
         mean flux density is imposed; the tension of the winding is whatever that takes.
         """
         mass = _mass.assemble(self.basis, sigma=self.coil.conductivity * self.iron)
-        free_mass = mass[self.free][:, self.free]
-        factors: dict[float, Any] = {}
-        inner, density = np.zeros(self.free.size), 0.0
-
-        def stage(dt: float, start: FloatArray, imposed: float) -> FloatArray:
-            right = np.append(free_mass @ start / (_GAMMA * dt), imposed)
-            return np.asarray(factors[dt].solve(right)[:-1], np.float64)
+        solvers: dict[float, Any] = {}
+        inner, density = np.zeros(self.basis.N), 0.0
 
         def go(rate: float, duration: float) -> FloatArray:
             nonlocal inner, density
             dt = duration / _STEPS
-            if dt not in factors:
-                factors[dt] = self._factors(mass / (_GAMMA * dt) + stiffness)
+            weight = mass / (_GAMMA * dt)
+            solve = solvers.get(dt) or solvers.setdefault(dt, self._solver(weight + stiffness))
             for step in range(_STEPS):
-                half_way = stage(dt, inner, density + rate * (step + _GAMMA) * dt)
+                half_way, _ = solve(weight @ inner, density + rate * (step + _GAMMA) * dt)
                 start = inner + (1.0 - _GAMMA) / _GAMMA * (half_way - inner)
-                inner = stage(dt, start, density + rate * (step + 1) * dt)
+                inner, _ = solve(weight @ start, density + rate * (step + 1) * dt)
             density += rate * duration
-            return self._whole(inner)
+            return inner
 
         return go
 
-    def profile(self, potential: FloatArray, row: int) -> tuple[FloatArray, FloatArray]:
-        """Return depths (m) and dA/dx (T) across the plate in a row of elements, surface first.
+    def mean(self, potential: FloatArray) -> float:
+        """Return the mean flux density (T) in the middle of the plate."""
+        return float(potential[self.surface_node] / self.half)
+
+    def profile(self, potential: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return depths (m) and dA/dx (T) across the middle of the plate, surface first.
 
         Within the elements at Gauss points; at the surface by a straight line through the two nearest.
         """
-        elements = self.rows[row, self.columns_of_iron]
-        x = np.asarray(self.line.global_coordinates()[0])[elements].ravel()
-        order = np.argsort(-x)
-        depth = self.half - x[order]
-        density = self.line.interpolate(potential).grad[0][elements].ravel()[order]
+        depth = self.half - np.asarray(self.line.global_coordinates()[0]).ravel()
+        order = np.argsort(depth)
+        depth, density = depth[order], self.line.interpolate(potential).grad[0].ravel()[order]
         slope = (density[1] - density[0]) / (depth[1] - depth[0])
         return np.append(0.0, depth), np.append(density[0] - slope * depth[0], density)
 
@@ -284,5 +245,4 @@ def _tensor(u: Any, v: Any, w: Any) -> Any:
 
 
 _mass = BilinearForm(lambda u, v, w: w['sigma'] * u * v)
-_flow = LinearForm(lambda v, w: dot(w['flow'], v.grad))
 _load = LinearForm(lambda v, w: w['inside'] * v)

@@ -1,7 +1,6 @@
 """Policies side by side: sweep, gap, rack, roads, other engines, idle, wear; and what no policy can beat."""
 
 import math
-from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
@@ -36,8 +35,7 @@ from engine_mount.experiments.policy_cases import (
     FRONT,
     GAP_TIME,
     HYDRO,
-    LEARNT_ROADS,
-    LEARNT_SCALES,
+    IDLE_ROADS,
     NAMED,
     OFF,
     POLICIES,
@@ -49,11 +47,8 @@ from engine_mount.experiments.policy_cases import (
     cases_of,
 )
 from engine_mount.experiments.policy_page import page_of
-from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.signals import FloatArray
-from mount_control import band_pass
-from mount_control.policy import continuous_viscous, switched_viscous
 from mount_models.arithmetic.compiled import compiled
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
@@ -88,9 +83,8 @@ def run(order: Order) -> Findings:
         numbers_of(order, 'idle_forces', 1.0, 2000.0),
     )
     found = run_cases(order, cases_of(order, axes))
-    order.progress(0.95, 'bounds and pictures')
     figures = figures_of(found, order.parameters, axes)
-    pictures = {'policy_velocity': draw_velocity()}
+    pictures = {}
     shown = {
         kind: sorted({key[2:] for key, each in found.items() if key[0] == kind and 'displacement' in each})
         for kind in ('sweep', 'gap')
@@ -99,8 +93,6 @@ def run(order: Order) -> Findings:
         pictures['policy_sweep'] = draw_sweeps(found, [level for level, _ in shown['sweep']])
     if shown['gap']:
         pictures['policy_gap'] = draw_gap(found, *shown['gap'][0])
-    if 'recorded' in figures['roads']:
-        pictures['policy_recorded'] = draw_spectra(found, figures['idle_amplitude_n'])
     if 'front' in figures:
         pictures['policy_front'] = draw_front(figures['front'])
     return Findings(figures, pictures, pages={f'{NAME}.md': page_of(figures, pictures.keys())})
@@ -120,9 +112,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
 
         return {who: by_depth(who) for who in _SUPPORTED}
 
-    def of_rack(what: str, mounts: Iterable[str]) -> Values:
-        return {who: {number(f): found['rack', who, f][what] for f in axes.frequencies} for who in mounts}
-
     def high(who: str, level: float, force: float) -> float:
         """Return the rms of the acceleration in the bands above 14 Hz together."""
         bands = [each for each in found['sweep', who, level, force]['rms'] if each is not None]
@@ -135,21 +124,17 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             for who in (*POLICIES, HYDRO)
         }
 
-    def of_road(road: str, speed: float, who: str) -> Values:
+    def of_road(road: str, who: str) -> Values:
         quiet = found['road', who, road, 0.0]
         return {
             'acceleration': over('acceleration', 'road', who, road, 0.0, other=OFF),
             'acceleration_idling': over('acceleration', 'road', who, road, idle, other=OFF),
             'displacement': over('peak_m', 'road', who, road, 0.0),
-            'j_per_km': 1e3 * quiet['power_w'] / speed,
+            'j_per_km': 1e3 * quiet['power_w'] / SPEED,
             'heat_w': quiet['heat_w'],
         }
 
-    speeds = dict.fromkeys(ROADS, SPEED)
-    if own.recording:
-        speeds['recorded'] = own.recorded_speed
-    energy_road = 'recorded' if own.recording else 'random'
-    roads = {road: {who: of_road(road, speed, who) for who in COMPARED} for road, speed in speeds.items()}
+    roads = {road: {who: of_road(road, who) for who in COMPARED} for road in ROADS}
     figures: Values = {
         'sweep_ratio': {
             who: {number(level): over('peak_m', 'sweep', who, level, 0.0) for level in axes.levels}
@@ -157,8 +142,10 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         },
         'gap_peak_ratio': of_gaps('peak_m'),
         'gap_first_extremum_ratio': of_gaps('first_m'),
-        'thd': of_rack('thd', (*POLICIES, HYDRO)),
-        'tracking': of_rack('tracking', POLICIES),
+        'thd': {
+            who: {number(f): found['rack', who, f]['thd'] for f in axes.frequencies}
+            for who in (*POLICIES, HYDRO)
+        },
         'high_frequency_ratio': high_ratio(0.0),
         'high_frequency_ratio_idling': high_ratio(idle),
         'roads': roads,
@@ -171,8 +158,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         },
         'limits': limits_of(found, axes),
         'idle_amplitude_n': idle,
-        'energy_road': energy_road,
-        'energy_j_per_km': {who: roads[energy_road][who]['j_per_km'] for who in POLICIES},
     }
     if not own.thorough:
         return figures
@@ -195,9 +180,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             ]
             for frequency, force in cases
         }
-
-    def learnt(what: str, *known: Any) -> Any:
-        return found['learn', CONTINUOUS, *known][what]
 
     points = [
         {
@@ -224,21 +206,7 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             for engine, plant in engines.items()
         },
         'idling': {
-            number(1e6 * road): {who: of_idling(who, road) for who in COMPARED} for road in LEARNT_ROADS
-        },
-        # what estimators from displacement alone say of engines and pads that are known here
-        'learnt': {
-            'frequency_hz': {
-                engine: {number(1e6 * road): learnt('frequency_hz', *plant, road) for road in LEARNT_ROADS}
-                for engine, plant in engines.items()
-            },
-            'friction_scale': {
-                number(scale): {
-                    number(1e6 * road): [learnt('friction_scale', scale, road, seed) for seed in seeds]
-                    for road in LEARNT_ROADS
-                }
-                for scale in LEARNT_SCALES
-            },
+            number(1e6 * road): {who: of_idling(who, road) for who in COMPARED} for road in IDLE_ROADS
         },
         'ablation': {name: variant(found, ('ablation', name), axes, idle) for name in ABLATIONS},
         'front': points,
@@ -391,64 +359,6 @@ def draw_gap(found: Found, depth: float, seed: int) -> Any:
     return figure
 
 
-def draw_velocity() -> Any:
-    """Draw what both policies take for the velocity over the true one, with the delay of the loop."""
-    frequency = np.geomspace(2.0, 60.0, 300)
-    figure, (upper, lower) = new_panels(
-        'Velocity that the policy takes, over the true one when its force acts', 2, height=6.0, sharex=True
-    )
-    z = np.exp(2j * np.pi * frequency * SAMPLE_TIME)
-    for policy, velocity in (
-        (switched_viscous, _velocity_of_paper),
-        (continuous_viscous, _velocity_of_continuous),
-    ):
-        own = policy.Parameters()
-        true = 2j * np.pi * frequency * np.exp(2j * math.pi * frequency * own.lead_time)
-        response = velocity(policy.design(own, SAMPLE_TIME).law, z) / true
-        who = PAPER if policy is switched_viscous else CONTINUOUS
-        upper.plot(frequency, np.abs(response), label=who, **_LINES[who])
-        lower.plot(frequency, np.degrees(np.unwrap(np.angle(response))), label=who, **_LINES[who])
-    upper.set_ylabel('gain')
-    lower.set(ylabel='phase (degrees)', xlabel='frequency (Hz)', xscale='log')
-    ticks = [2, 4, 6, 8, 11, 20, 36, 60]
-    lower.set_xticks(ticks, map(str, ticks))
-    lower.set_xticks([], minor=True)
-    upper.legend()
-    return figure
-
-
-def _velocity_of_paper(law: Any, z: FloatArray) -> FloatArray:
-    band = _band_response(law.band, z)
-    return law.band.from_velocity * band * (1.0 - 1.0 / z) / SAMPLE_TIME + law.band.from_displacement * band
-
-
-def _velocity_of_continuous(law: Any, z: FloatArray) -> FloatArray:
-    """Without an idle line."""
-    beta = law.beta_rate * SAMPLE_TIME
-    tracked = law.beta_rate * z * (z - 1.0) / (z * z + (law.alpha + beta - 2.0) * z + 1.0 - law.alpha)
-    return tracked - law.band_share * _band_response(law.band, z)
-
-
-def _band_response(law: band_pass.BandPass, z: FloatArray) -> FloatArray:
-    return law.gain * (1.0 - z**-2) / (1.0 + law.a1 / z + law.a2 / z**2)
-
-
-def draw_spectra(found: Found, idle: float) -> Any:
-    """Draw the chassis acceleration on the recorded road in bands of 1 Hz, without and with idle force."""
-    figure, panels = new_panels(
-        'The recorded drive as a road: acceleration of the chassis', 2, height=6.5, sharex=True
-    )
-    for panel, force in zip(panels, (0.0, idle), strict=True):
-        for who in COMPARED:
-            spectrum = np.array(found['road', who, 'recorded', force]['spectrum'])
-            panel.semilogy(np.arange(spectrum.size) + 0.5, spectrum, label=who, **_LINES[who])
-        panel.set_title(f'idle force {force:g} N', fontsize='medium')
-        panel.set_ylabel('rms in 1 Hz (m/s$^2$)')
-    panels[0].legend()
-    panels[1].set_xlabel('frequency (Hz)')
-    return figure
-
-
 def draw_front(points: list[Values]) -> Any:
     """Draw the ratio on a light road over wear and over the acceleration with an idling engine."""
     figure, panels = new_panels(
@@ -470,7 +380,6 @@ def draw_front(points: list[Values]) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The paper's switched policy and the continuous law on the same roads, racks and engines, beside the
     hydromount and the mount without current: what each gives, and what it costs.""",
     PolicyParameters(),

@@ -1,6 +1,5 @@
 """The runs that are compared: which policy or mount, on what, with which plant; and the figures of each."""
 
-import functools
 import importlib.resources
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -16,21 +15,14 @@ from engine_mount.experiments.harness.experiment import Order, Values, Workers
 from engine_mount.experiments.harness.measures import (
     first_extremum,
     peak_and_rms,
-    rms,
     rms_in_bands,
     sweep_parameters,
 )
-from engine_mount.reports.drive.signals import FloatArray, Truth
+from engine_mount.reports.drive.signals import Truth
 from engine_mount.reports.sections.periodic import distortion, harmonics, whole_periods
-from engine_mount.signals.excitation import acceleration_at, recorded_signal
-from engine_mount.signals.roads.inversion import road_of
-from mount_control.policy import continuous_viscous
-from mount_models.arithmetic.series import series_of
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.excitation import Excitation, Seat, idle_force
-from mount_sim.excitation.scenario import STEP_TIME, AccelerationScale, RecordedScenario
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.vehicle import Elastomer, Vehicle
 
@@ -45,7 +37,7 @@ FRONT = [(*amplitudes, damping) for amplitudes, damping in product(_CASES['ampli
 """Lowest and full amplitude (m), and damping coefficient (N s/m), that are run."""
 NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
 """{point of the front: the name it is worth}."""
-LEARNT_ROADS, LEARNT_SCALES = (2e-6, 16e-6), (0.85, 1.0, 1.15)
+IDLE_ROADS = (2e-6, 16e-6)
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 """Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
@@ -55,20 +47,15 @@ _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
 _TIP_IN = 400.0  # N, chosen
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
-_ONE_HERTZ = [(float(low), low + 1.0) for low in range(100)]  # Hz: bands of the shown spectrum
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
 _PERIODS = 8  # evaluated on the rack
-BAND = (4.0, 14.0)  # Hz: where the engine may shake
-_SMOOTH = 30.0  # Hz, chosen: above it no derivative is taken
-_RINGING = slice(60, 450)  # ms behind the gap: the first extremum is past, the ringing not
-_MASS = 80.0  # kg: the share of the engine that the estimate believes in
 
 Key = tuple[Any, ...]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class PolicyParameters(NamedTuple):
-    """Values between which all combinations are run, separated by commas, and a recorded drive."""
+    """Values between which all combinations are run, separated by commas."""
 
     road_levels: str = '0.04, 0.06, 0.08, 0.10, 0.12, 0.16, 0.20'
     last_frequency: Annotated[float, Quantity('Hz', 'end of the sweep', 14.0, 50.0, 'Sec. 6')] = 50.0
@@ -81,12 +68,6 @@ class PolicyParameters(NamedTuple):
     idle_frequencies: str = '20, 23, 26.7, 30, 33'
     idle_forces: str = '80, 200, 400'
     thorough: Annotated[int, Quantity('1', '1: robustness, idle, ablation, front too', 0, 1)] = 1
-    recording: str = ''
-    column: str = ''
-    scale: AccelerationScale = 1.0
-    recorded_speed: Annotated[
-        float, Quantity('m/s', 'mean speed of the recorded drive', 0.1, 90.0, 'its own')
-    ] = 16.7
     workers: Workers = 0
 
 
@@ -112,14 +93,12 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
     own: PolicyParameters = order.parameters
     cases: dict[Key, Case] = {}
 
-    def add(
-        key: Key, sim: Values, figures: Any, changes: Mapping[str, Any] = NOTHING, excitation: Any = None
-    ) -> None:
+    def add(key: Key, sim: Values, figures: Any, changes: Mapping[str, Any] = NOTHING) -> None:
         who = next(part for part in key if part in COMPARED)
         policy = who if who in POLICIES else PAPER
         control = {'policy': policy, **{f'{policy}.{name}': value for name, value in changes.items()}}
         mount = {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')
-        cases[key] = Case(settings_of_run(order, {**sim, 'mount': mount}, control), figures, excitation)
+        cases[key] = Case(settings_of_run(order, {**sim, 'mount': mount}, control), figures)
 
     idles, seeds = (0.0, own.idle_amplitude), range(1, own.gap_seeds + 1)
     for level, idle, who in product(axes.levels, idles, COMPARED):
@@ -130,21 +109,11 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         shown = seed == 1 and depth == _SHOWN_DEPTH
         figures = partial(with_displacement, of_gap) if shown else of_gap
         add(('gap', who, depth, seed), _gap(depth, 2e-6, seed), figures)
-    law = continuous_viscous.Parameters()
-    dampers = {PAPER: (2000.0, 0.004), CONTINUOUS: (law.damping_coefficient, law.rounding_velocity)}
     for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
-        figures = partial(of_rack, *dampers.get(who, (0.0, 0.0)))
-        add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, figures)
+        add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, of_rack)
     for idle, who in product(idles, COMPARED):
         for road, roughness in ROADS.items():
             add(('road', who, road, idle), _road(roughness, _ROAD_SECONDS, idle), of_road)
-        if own.recording:
-            recorded = RecordedScenario(file=own.recording, column=own.column, scale=own.scale)
-            sim, excitation = (
-                {'scenario': 'motorway', 'idle.amplitude': idle},
-                partial(over_recorded, recorded),
-            )
-            add(('road', who, 'recorded', idle), sim, partial(of_road, spectrum=True), excitation=excitation)
     for who in COMPARED:
         add(('tip-in', who), _road(2e-6, 4.0) | {'tip_in.force': _TIP_IN}, of_road)
     if not own.thorough:
@@ -156,16 +125,10 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         for who in (PAPER, HYDRO):
             add(('robust', who, *plant, 'nominal', level), sim, peak_and_rms)
     for roughness, frequency, force, who in product(
-        LEARNT_ROADS, axes.idle_frequencies, axes.idle_forces, COMPARED
+        IDLE_ROADS, axes.idle_frequencies, axes.idle_forces, COMPARED
     ):
         sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
         add(('idle', who, roughness, frequency, force), sim, of_road)
-    # what could be learnt of engines and pads
-    for plant, roughness in product(axes.plants, LEARNT_ROADS):
-        add(('learn', CONTINUOUS, *plant, roughness), _road(roughness, 10.0) | _engine(*plant), of_road)
-    for scale, roughness, seed in product(LEARNT_SCALES, LEARNT_ROADS, seeds):
-        sim = _gap(_SHOWN_DEPTH, roughness, seed) | {'friction.scale': scale}
-        add(('learn', CONTINUOUS, scale, roughness, seed), sim, of_gap)
     variants: dict[Key, Values] = {('ablation', name): changes for name, changes in ABLATIONS.items()}
     for point in FRONT:
         names = ('lowest_amplitude', 'full_amplitude', 'damping_coefficient')
@@ -207,51 +170,26 @@ def _engine(how: str, frequency: float) -> dict[str, float]:
     }
 
 
-def over_recorded(recorded: RecordedScenario, sim: SimParameters) -> Excitation:
-    """Return the drive over the road behind a recorded acceleration, with an idling engine."""
-    road, idle = recorded_road(recorded), sim.idle
-    forces = idle_force(idle.amplitude, idle.frequency, idle.second_share, road.size, STEP_TIME)
-    return Excitation(Seat.VEHICLE, series_of(road), STEP_TIME, sim.timeline.start, forces)
-
-
-@functools.cache
-def recorded_road(recorded: RecordedScenario) -> FloatArray:
-    """Return the road (m) behind a recorded acceleration, at the step of the plant; raises `SignalError`."""
-    acceleration = acceleration_at(recorded_signal(recorded), STEP_TIME)
-    return road_of(acceleration[:], STEP_TIME, Vehicle())
-
-
 def with_displacement(figures: Callable[..., Values], truth: Truth, sim: SimParameters) -> Values:
     """Return figures and the displacement (m) too, for a picture."""
     return {**figures(truth, sim), 'displacement': truth.displacement}
 
 
 def of_gap(truth: Truth, sim: SimParameters) -> Values:
-    """Return largest displacement and first extremum (m) over a gap, and the pads that the ringing shows."""
-    part = slice(round(sim.motorway.gap_time / SAMPLE_TIME), None)
-    behind = truth.displacement[part]
-    return {
-        'peak_m': float(np.max(np.abs(behind))),
-        'first_m': first_extremum(behind),
-        'friction_scale': friction_scale(behind, truth.friction_force[part] / sim.friction.scale),
-    }
+    """Return largest displacement and first extremum (m) over a gap."""
+    behind = truth.displacement[round(sim.motorway.gap_time / SAMPLE_TIME) :]
+    return {'peak_m': float(np.max(np.abs(behind))), 'first_m': first_extremum(behind)}
 
 
-def of_rack(damping: float, dead: float, truth: Truth, sim: SimParameters) -> Values:
-    """Return distortion (%), and how far friction lies from a damper (N s/m) with a dead zone (m/s)."""
+def of_rack(truth: Truth, sim: SimParameters) -> Values:
+    """Return the harmonic distortion (%) of the mount force."""
     frequency = sim.bench.frequency
     part, _ = whole_periods(truth.time, frequency, _PERIODS)
-    velocity, force = truth.velocity[part], truth.mount_force[part]
-    wanted = np.sign(velocity) * damping * np.maximum(np.abs(velocity) - dead, 0.0)
-    error = rms(truth.friction_force[part] - wanted)
-    return {
-        'thd': 100.0 * distortion(harmonics(truth.time[part], force, frequency)),
-        'tracking': 100.0 * float(error / np.abs(wanted).max()) if damping else None,
-    }
+    return {'thd': 100.0 * distortion(harmonics(truth.time[part], truth.mount_force[part], frequency))}
 
 
-def of_road(truth: Truth, sim: SimParameters, spectrum: bool = False) -> Values:
-    """Return displacement (m), chassis acceleration (m/s^2), power of pads and coil (W), engine frequency."""
+def of_road(truth: Truth, sim: SimParameters) -> Values:
+    """Return displacement (m), chassis acceleration (m/s^2), power of pads and coil (W)."""
     part = slice(round(_SETTLING / SAMPLE_TIME), None)
     displacement, acceleration = truth.displacement[part], truth.chassis_acceleration[part]
     acceleration = acceleration - acceleration.mean()
@@ -260,32 +198,5 @@ def of_road(truth: Truth, sim: SimParameters, spectrum: bool = False) -> Values:
         'peak_m': float(np.abs(displacement).max()),
         'rms_m': rms_in_bands(displacement, [BELOW_ISOLATION])[0],
         'power_w': float(np.mean(np.abs(truth.friction_force[part] * truth.velocity[part]))),
-        'frequency_hz': frequency_in_band(displacement),
         'heat_w': sim.coil.resistance * float(np.mean(truth.coil_current[part] ** 2)),
-        'spectrum': rms_in_bands(acceleration, _ONE_HERTZ) if spectrum else None,
     }
-
-
-def frequency_in_band(displacement: FloatArray) -> float:
-    """Return the rms velocity over the rms displacement (Hz) within `BAND`: how fast the phasor turns."""
-    frequency = np.fft.rfftfreq(displacement.size, SAMPLE_TIME)
-    within = (frequency >= BAND[0]) & (frequency <= BAND[1])
-    power = np.abs(np.fft.rfft(displacement)[within]) ** 2
-    return float(np.sqrt(np.sum(power * frequency[within] ** 2) / np.sum(power)))
-
-
-def friction_scale(displacement: FloatArray, assumed_force: FloatArray) -> float:
-    """Return the pads' friction over the `assumed_force` (N), from the ringing behind a gap at sample 0.
-
-    Least squares of acceleration over displacement, velocity, assumed force and a constant.
-    """
-    frequency = np.fft.rfftfreq(displacement.size, SAMPLE_TIME)
-
-    def derivative(values: FloatArray, order: int) -> FloatArray:
-        spectrum = np.where(frequency > _SMOOTH, 0.0, np.fft.rfft(values))
-        return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, values.size)[_RINGING]
-
-    columns = [derivative(displacement, 0), derivative(displacement, 1), derivative(assumed_force, 0)]
-    base = np.stack([*columns, np.ones(columns[0].size)], 1)
-    solution = np.linalg.lstsq(base, derivative(displacement, 2), rcond=None)[0]
-    return float(-_MASS * solution[2])

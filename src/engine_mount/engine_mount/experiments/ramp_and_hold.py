@@ -20,7 +20,6 @@ from engine_mount.experiments.harness.rack_recording import (
     ForceNoise,
     record_friction_rack,
 )
-from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.ramp_hold import (
     Relaxation,
@@ -32,7 +31,7 @@ from engine_mount.identification.friction.recording import FloatArray, FrictionR
 from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import Quantity, flattened
-from mount_sim.rack.friction import move, with_noise
+from mount_sim.rack import move, with_noise
 
 NAME = 'ramp_and_hold'
 _SYMBOLS = {'contact_stiffness': 'c_Re', 'tangential_stiffness': 'c_R', 'tangential_damping': 'd_R'}
@@ -65,7 +64,6 @@ class RampParameters(NamedTuple):
 def run(order: Order) -> Findings:
     """Pull the sticking pads, record it, and take the linear parameters from the recording."""
     own = order.parameters
-    order.progress(0.1, 'ramp and hold')
     corners = np.cumsum([0.0, own.rest_time, own.ramp_time, own.hold_time])
     ways = [0.0, 0.0, own.way, own.way]
     pulled = move(
@@ -80,7 +78,6 @@ def run(order: Order) -> Findings:
     measured = with_noise(pulled, own.force_noise, own.displacement_noise, own.seed)
     session = {'scenario': NAME, 'mode': 'rack', 'parameters': {NAME: flattened(own)}}
     recording = record_friction_rack(order.out / NAME, measured, session)
-    order.progress(0.7, 'evaluation')
     rack = read_recording(recording)
     time = rack.time - own.rest_time
     # the wanted displacement x_d (m), which the motor's control knows, less the measured one
@@ -236,7 +233,6 @@ def draw_relaxation(
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds.
     Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the
     last second, p from the force over what the motor gives way, T and the amplitude from an

@@ -9,7 +9,6 @@ import numpy.typing as npt
 from engine_mount.experiments.harness.closed_loop import drive_cases, paper_policy
 from engine_mount.experiments.harness.drawing import (
     BLUE,
-    GREY,
     HYDRO_LINE,
     OFF_LINE,
     draw_level,
@@ -27,7 +26,6 @@ from engine_mount.experiments.harness.experiment import (
     table,
 )
 from engine_mount.experiments.harness.measures import rms, rms_in_bands
-from engine_mount.experiments.registry import NAMES
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from engine_mount.signals.excitation import recorded_signal
@@ -48,10 +46,7 @@ _LINES: dict[str, Values] = {
 BANDS = ((1.0, 5.0), (5.0, 12.0), (12.0, 30.0))
 """Hz, chosen: the car's body, the engine on its mounts, above."""
 _BAND_NAMES = [f'{low:g} to {high:g} Hz' for low, high in BANDS]
-_SEGMENT = 4.096  # s, chosen: a spectrum with lines 0.24 Hz apart, and many segments in a minute
-SHORTEST = 3.0 * _SEGMENT
 _FILTER_ORDER = 4  # chosen, of the band-pass that goes forth and back
-_LOWEST, _HIGHEST = 0.7, 45.0  # Hz, chosen: what the bands lie in, and no more than a car's sensor has
 _BEFORE, _AFTER = 1.0, 4.0  # s, drawn round the largest displacement
 BoolArray = npt.NDArray[np.bool_]
 
@@ -69,18 +64,13 @@ class RecordedDriveParameters(NamedTuple):
 
 
 def run(order: Order) -> Findings:
-    """Drive every mount on the recording, and evaluate spectra and bands."""
+    """Drive every mount on the recording, and evaluate bands."""
     own = order.parameters
     if not own.file:
         raise ExperimentError(
             f'{NAME} needs a recorded vertical acceleration (CSV, MCAP, or a folder of NPY pairs): give '
             f'--set {NAME}.file=FILE, its --set {NAME}.column=NAME, and --set {NAME}.scale=-1 where its axis '
             'points down'
-        )
-    if 0.0 < own.duration < SHORTEST:
-        raise ExperimentError(
-            f'{NAME}.duration ({own.duration:g} s) must be at least {SHORTEST:.1f} s for a spectrum, '
-            'or 0 for all of the recording'
         )
     recorded = RecordedScenario(*(getattr(own, name) for name in RecordedScenario._fields))
     rate = recorded_signal(recorded).rate  # refuses what cannot be read
@@ -91,36 +81,10 @@ def run(order: Order) -> Findings:
         'recorded.file': str(Path(own.file).absolute()),
     }
     drives = drive_cases(order, {name: {**drive, 'mount': mount} for name, mount in _MOUNTS.items()})
-    spectra = {name: spectra_of(each) for name, each in drives.items()}
     figures = figures_of(drives, order)
-    pictures = {
-        'recorded_drive_spectra': draw_spectra(spectra),
-        'recorded_drive': draw_traces(drives, figures['switch_on_level_m']),
-    }
+    pictures = {NAME: draw_traces(drives, figures['switch_on_level_m'])}
     recordings = [each.recording for each in drives.values()]
     return Findings(figures, pictures, recordings, {f'{NAME}.md': page_of(figures, rate)})
-
-
-def spectra_of(drive: DriveSignals) -> dict[str, FloatArray]:
-    """Return amplitude densities over `frequency` (Hz) by Welch with a Hann window.
-
-    Of the displacement (m/sqrt(Hz)) and of the mount force (N/sqrt(Hz)).
-    """
-    from scipy.signal import welch  # here, for it takes longer to load than all the rest
-
-    count, seconds = round(_SEGMENT / SAMPLE_TIME), drive.truth.time.size * SAMPLE_TIME
-    if seconds < SHORTEST - 0.5 * SAMPLE_TIME:
-        raise ExperimentError(
-            f'the recorded drive lasts {seconds:.1f} s; a spectrum needs at least {SHORTEST:.1f} s: give a '
-            'longer one'
-        )
-    found = {}
-    for name in ('displacement', 'mount_force'):
-        values = getattr(drive.truth, name)
-        # evenly weighted
-        found['frequency'], density = welch(values, 1.0 / SAMPLE_TIME, 'hann', count, 3 * count // 4)
-        found[name] = np.sqrt(density)
-    return found
 
 
 def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | None:
@@ -129,7 +93,7 @@ def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | 
     By a band-pass without phase: what happens at one time stays there but for about a period of the lower
     edge. At both edges of the band a quarter of the power is left.
     """
-    from scipy.signal import butter, sosfiltfilt  # here, as above
+    from scipy.signal import butter, sosfiltfilt  # here, for it takes longer to load than all the rest
 
     if not within.any():
         return None
@@ -140,24 +104,18 @@ def rms_in_bands_within(values: FloatArray, within: BoolArray) -> list[float] | 
     return found
 
 
-def near(active: BoolArray, margin: float) -> BoolArray:
-    """Return where damping is `active` (n,) at 1 kHz, and `margin` (s) before and behind."""
-    count = round(margin / SAMPLE_TIME)
-    return np.convolve(active, np.ones(2 * count + 1), 'same') > 0.5
-
-
 def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
     """Return rms of displacement and force: of all, by band, at the moments of damping and else."""
     own, control = order.parameters, paper_policy(order)
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     active = np.interp(truth.time, seen.time, seen.damping_active.astype(float)) > 0.5
-    events = near(active, 1.0 / control.eigenfrequency)
+    margin = round(1.0 / (control.eigenfrequency * SAMPLE_TIME))  # samples, before and behind
+    events = np.convolve(active, np.ones(2 * margin + 1), 'same') > 0.5
     changes = switching(seen)
-    runs: Values = {}
+    runs: dict[str, Values] = {name: {} for name in drives}
     for name, drive in drives.items():
-        runs[name] = {}
-        for what, unit in (('displacement', 'm'), ('force', 'n')):
-            values = getattr(drive.truth, what if unit == 'm' else 'mount_force')
+        moved = (('displacement', 'm', drive.truth.displacement), ('force', 'n', drive.truth.mount_force))
+        for what, unit, values in moved:
             runs[name] |= {
                 f'{what}_rms_{unit}': rms(values),
                 f'{what}_peak_{unit}': float(np.max(np.abs(values))),
@@ -165,26 +123,19 @@ def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
                 f'{what}_band_rms_at_events_{unit}': rms_in_bands_within(values, events),
                 f'{what}_band_rms_else_{unit}': rms_in_bands_within(values, ~events),
             }
-        while_on = drive.truth.displacement[active]
-        runs[name]['displacement_rms_while_friction_is_on_m'] = rms(while_on) if active.any() else None
     return {
         'source': Path(own.file).name,
         'column': own.column,
         'scale': own.scale,
         'duration_s': float(truth.time[-1] - truth.time[0] + SAMPLE_TIME),
-        'acceleration_rms_m_s2': rms(truth.chassis_acceleration),
         'acceleration_band_rms_m_s2': rms_in_bands(truth.chassis_acceleration, BANDS),
         'damper': own.damper,
         'switch_on_level_m': control.switch_on_level,
-        'switch_off_level_m': control.switch_off_level,
         'times_on': len(changes.on),
         'switched_on_s': list(changes.on),
-        'switched_off_s': list(changes.off),
         'damping_active_share': float(np.mean(active)),
         'events_share': float(np.mean(events)),
         'events_margin_s': 1.0 / control.eigenfrequency,
-        'bands_hz': [list(band) for band in BANDS],
-        'mode': order.mode,
         'runs': runs,
     }
 
@@ -233,11 +184,6 @@ def page_of(figures: Values, rate: float) -> str:
     levels = zip(_BAND_NAMES, figures['acceleration_band_rms_m_s2'], strict=True)
     bands = ', '.join(f'{value:.3f} m/s^2 from {band}' for band, value in levels)
     column = f', `{figures["column"]}`' if figures['column'] else ''
-    key = 'displacement_rms_while_friction_is_on_m'
-    while_on = 'Damping was never on: the displacement did not stay above the switch-on level long enough.'
-    if runs[FRICTION][key] is not None:
-        told = ', '.join(f'{name} {1e3 * each[key]:.2f} mm' for name, each in runs.items())
-        while_on = f'In the seconds in which damping was on, the rms displacements are: {told}.'
     peaks = ', '.join(f'{name} {1e3 * each["displacement_peak_m"]:.2f} mm' for name, each in runs.items())
     return f"""# A recorded drive: friction mount, hydromount, elastomer alone
 
@@ -252,16 +198,15 @@ engine-mount experiment recorded_drive --set recorded_drive.file=drive.csv --set
 ```
 
 Driven: `{figures['source']}`{column}, times {figures['scale']:g}, {figures['duration_s']:.1f} s at \
-{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. Damper {figures['damper']}; \
-mode {figures['mode']}.
+{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. Damper {figures['damper']}.
 
 ## In short
 
 {_in_short(figures)}- **Largest displacement**: {peaks}.
 
-## Spectra and bands
+## Bands
 
-![Spectra of displacement and force](figures/recorded_drive_spectra.png)
+Spectra of displacement, force and acceleration: `engine-mount report` of the three recordings together.
 
 Moments of damping are those with the friction damper on, and {figures['events_margin_s']:.3f} s before and \
 behind: {100.0 * figures['events_share']:.1f} % of the drive, the same ones for all mounts. In the rest the \
@@ -279,7 +224,7 @@ Rms of the force on the chassis in N:
 ![Displacement over time](figures/recorded_drive.png)
 
 Damping went on {figures['times_on']} times and was on for {share:.1f} % of the drive (switch-on level \
-{1e3 * figures['switch_on_level_m']:g} mm). {while_on}
+{1e3 * figures['switch_on_level_m']:g} mm).
 
 ## Limits of this comparison
 
@@ -329,31 +274,6 @@ def _bands(runs: Values, what: str, unit: str, scale: float) -> str:
     return table(('part of the drive', 'mount', *_BAND_NAMES), rows)
 
 
-def draw_spectra(spectra: dict[str, dict[str, FloatArray]]) -> Any:
-    """Draw displacement and chassis-side force of all mounts over frequency, the bands behind them."""
-    figure, panels = new_panels(
-        'A recorded drive: displacement of the mount and its force on the chassis', 2, height=7.5, sharex=True
-    )
-    for axes, name, scale, label in (
-        (panels[0], 'displacement', 1e6, 'displacement (µm/$\\sqrt{\\mathrm{Hz}}$)'),
-        (panels[1], 'mount_force', 1.0, 'force on the chassis (N/$\\sqrt{\\mathrm{Hz}}$)'),
-    ):
-        for mount, style in _LINES.items():
-            frequency, width = spectra[mount]['frequency'], 1.6 if mount == ELASTOMER else 1.4
-            shown = (frequency >= _LOWEST) & (frequency <= _HIGHEST)
-            values = scale * spectra[mount][name][shown]
-            axes.loglog(frequency[shown], values, linewidth=width, label=mount, **style)
-        for edge in sorted({edge for band in BANDS for edge in band}):
-            axes.axvline(edge, color=GREY, linewidth=0.8, linestyle='-.')
-        axes.set_ylabel(label)
-    ticks = [1, 2, 5, 8, 12, 20, 30]
-    panels[1].set_xticks(ticks, [f'{tick:g}' for tick in ticks])
-    panels[1].set_xticks([], minor=True)
-    panels[1].set(xlim=(_LOWEST, _HIGHEST), xlabel='frequency (Hz); vertical lines: edges of the bands')
-    panels[0].legend(loc='lower left')
-    return figure
-
-
 def draw_traces(drives: dict[str, DriveSignals], level: float) -> Any:
     """Draw the whole drive above, the seconds round its largest displacement below."""
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
@@ -381,10 +301,9 @@ def draw_traces(drives: dict[str, DriveSignals], level: float) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The vertical acceleration that a real car recorded moves the chassis side of the mount, with
-    friction mount, original hydromount and elastomer alone in the seat. Spectra and bands come from
-    the recordings of these runs.""",
+    friction mount, original hydromount and elastomer alone in the seat. What each band holds comes from the
+    recordings of these runs.""",
     RecordedDriveParameters(),
     run,
     closed_loop=True,

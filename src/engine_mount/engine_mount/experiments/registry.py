@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.experiments.harness.experiment import (
+    NAMES,
     Experiment,
     ExperimentError,
     Order,
@@ -16,24 +17,9 @@ from engine_mount.experiments.harness.experiment import (
 )
 from engine_mount.settings.run_folder import RunFolderError, new_place
 from mount_bringup.settings import checked_settings, defaults_of_nodes
+from mount_models.quantity import flattened
 
 ALL = 'all'
-
-NAMES = {
-    'force_characteristic': ('Force of the actuator over current and gap', 'Fig. 2'),
-    'field_penetration': ("How far the ripple's field enters the iron", 'Fig. 3'),
-    'inductance_map': ('Incremental inductance over current and gap', 'Fig. 4'),
-    'ramp_and_hold': ('Ramp and hold of the sticking contact', 'Fig. 7'),
-    'sawtooth': ('Friction contact alone on a saw tooth', 'Figs. 8 to 11'),
-    'bench': ('Friction mount and hydromount on a test rack', 'Fig. 13'),
-    'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
-    'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
-    'sensitivity': ('What the comparison with the hydromount depends on', 'Figs. 13, 14'),
-    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 6, 7'),
-    'recorded_drive': ('A recorded drive', 'Sec. 7'),
-    'measured_road': ('A measured road', 'Sec. 7'),
-}
-"""{name of the experiment and its file: (title, section or figure of the paper)}."""
 
 
 def listed() -> list[tuple[str, str, str]]:
@@ -63,28 +49,19 @@ def experiments_named(names: Sequence[str]) -> list[Experiment]:
 def known_settings(experiments: Sequence[Experiment]) -> dict[str, Values]:
     """Return {owner: {parameter: default}} of what can be set where these experiments run."""
     nodes = defaults_of_nodes() if any(each.closed_loop for each in experiments) else {}
-    return {owner: values for each in experiments for owner, values in each.known_settings().items()} | nodes
+    return {each.name: flattened(each.defaults) for each in experiments} | nodes
 
 
 def orders(
-    experiments: Sequence[Experiment], settings: Settings, out: Path | None = None, *, graph: bool = False
+    experiments: Sequence[Experiment], settings: Settings, out: Path | None = None
 ) -> list[tuple[Experiment, Order]]:
     """Return each experiment with its order; raises a `ValueError` that says what is wrong with it."""
-    for each in experiments if graph else ():
-        if not each.closed_loop:
-            raise ExperimentError(
-                f'{each.name} has no graph to run through: neither controller nor CAN bus take part in it; '
-                'leave out --graph'
-            )
     checked = checked_settings(settings, known_settings(experiments), 'owner of parameters here')
     alone = len(experiments) == 1
     place = out or new_place(experiments[0].name if alone else 'experiments')
     if place.exists() and (not place.is_dir() or any(place.iterdir())):
         raise RunFolderError(f'{place} exists and is not empty; choose another folder with --out')
-    return [
-        (each, each.order(place if alone else place / each.name, checked, graph=graph))
-        for each in experiments
-    ]
+    return [(each, each.order(place if alone else place / each.name, checked)) for each in experiments]
 
 
 def experiment(name: str, *, out: str | PathLike[str] | None = None, **settings: Any) -> Outcome:

@@ -1,6 +1,5 @@
 """Figs. 8 to 11: the friction contact alone on a saw tooth, faster after every second turning point."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -34,7 +33,6 @@ from engine_mount.experiments.harness.rack_recording import (
     ForceNoise,
     record_friction_rack,
 )
-from engine_mount.experiments.registry import NAMES
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.recording import FloatArray, FrictionRecording
 from engine_mount.identification.friction.sawtooth import (
@@ -48,7 +46,7 @@ from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import FADED_BELOW, simplified_response
 from mount_models.quantity import Quantity, flattened
 from mount_sim.plant.friction import full_response
-from mount_sim.rack.friction import move, sawtooth_corners, with_noise
+from mount_sim.rack import move, sawtooth_corners, with_noise
 
 NAME = 'sawtooth'
 
@@ -73,24 +71,22 @@ class SawtoothParameters(NamedTuple):
     contact: FrictionContact = FrictionContact()
 
 
-@dataclass(frozen=True)
-class Rack:
-    """One recording at one normal force, its strokes, and both models driven by its displacement.
+class Rack(NamedTuple):
+    """One recording at one normal force (N), its strokes, and both models driven by its displacement.
 
     The first stroke, which no turning point precedes, is not among `strokes`.
     """
 
+    load: float
     recording: FrictionRecording
     deflection: FloatArray
     strokes: list[StrokeLine]
     full_force: FloatArray
     simplified_force: FloatArray
 
-    def by_speed(self, direction: float) -> list[StrokeLine]:
-        """Return the strokes in one direction (1 or -1), slowest first."""
-        return sorted(
-            (s for s in self.strokes if s.velocity * direction > 0.0), key=lambda s: abs(s.velocity)
-        )
+    def strokes_of(self, direction: float) -> list[StrokeLine]:
+        """Return the strokes in one direction (1 or -1), in their order: the slowest first."""
+        return [stroke for stroke in self.strokes if stroke.velocity * direction > 0.0]
 
 
 def run(order: Order) -> Findings:
@@ -107,7 +103,6 @@ def run(order: Order) -> Findings:
         folder = order.out / f'sawtooth_{load:.0f}N'
         recordings.append(record_friction_rack(folder, measured, {**session, 'normal_force': load}))
         racks.append(evaluate(recordings[-1], own.contact, own.friction))
-    order.progress(0.95, 'pictures')
     shown = racks[int(np.argmin(np.abs(loads - own.shown_normal_force)))]
     pictures = {
         'sawtooth_force': draw_time(shown),
@@ -138,16 +133,16 @@ def evaluate(path: Path, contact: FrictionContact, coefs: FrictionCoefficients) 
     between = (np.interp(fine, samples, values) for values in (x, load))
     full, *_ = full_response(contact, coefs, *between, dt / SUBSTEPS)
     strokes = [line for line in stroke_lines(recording, contact) if line.stroke.start > 0]
-    return Rack(recording, xi, strokes, np.asarray(full[::SUBSTEPS]), simplified)
+    return Rack(float(load[0]), recording, xi, strokes, np.asarray(full[::SUBSTEPS]), simplified)
 
 
 def figures_of(racks: list[Rack], shown: Rack, own: SawtoothParameters) -> Values:
     """Return what the strokes show of mu, and how far both models lie from the shown recording."""
     strokes = [stroke for each in racks for stroke in each.strokes]
     curves = [(s, own.friction, s.velocity, s.normal_force) for s in strokes]
-    noise = [(s.residual, own.force_noise / s.normal_force) for s in strokes]
-    directions = {'p': shown.by_speed(1.0), 'n': shown.by_speed(-1.0)}
+    directions = {'p': shown.strokes_of(1.0), 'n': shown.strokes_of(-1.0)}
     level = {way: [float(np.mean(s.mu[-20:])) for s in chosen] for way, chosen in directions.items()}
+    straight = [s.residual * s.normal_force / own.force_noise for s in strokes if own.force_noise]
     micro, macro, faded = slip_regions(shown.recording, own.contact)
     measured = shown.recording.force
 
@@ -156,14 +151,12 @@ def figures_of(racks: list[Rack], shown: Rack, own: SawtoothParameters) -> Value
         return rms(model[where] - measured[where]) / rms(measured) if where.any() else None
 
     return {
-        'normal_forces_n': sorted({round(s.normal_force, 6) for s in strokes}),
-        'speeds_m_per_s': sorted({round(_speed(s), 5) for s in strokes}),
         'strokes': len(strokes),
         'strokes_with_falling_coefficient': sum(s.b < 0.0 for s in strokes),
         'rising_up_to_n': max((s.normal_force for s in strokes if s.b >= 0.0), default=None),
         **{f'jump_{way}': [s.fall for s in chosen] for way, chosen in directions.items()},
-        'largest_residual_of_line': max(residual for residual, _ in noise),
-        'largest_residual_over_noise': max((r / n for r, n in noise if n > 0.0), default=None),
+        'largest_residual_of_line': max(s.residual for s in strokes),
+        'largest_residual_over_noise': max(straight, default=None),
         'a_rms_error': rms([s.a - offset_coefficient(*curve) for s, *curve in curves]),
         'b_rms_error_per_mm': rms([s.b - slope_coefficient(*curve) for s, *curve in curves]) * 1e-3,
         **{f'level_{way}': values for way, values in level.items()},
@@ -267,7 +260,7 @@ def _on_models(figures):
 def draw_time(rack: Rack) -> Any:
     """Draw force and deflection u over time, Fig. 8."""
     figure, (upper, lower) = new_panels(
-        f'Saw tooth at {rack.strokes[0].normal_force:g} N: force and deflection (Fig. 8)', 2, sharex=True
+        f'Saw tooth at {rack.load:g} N: force and deflection (Fig. 8)', 2, sharex=True
     )
     force, time = rack.recording.force, rack.recording.time
     upper.plot(time, force, color=BLUE, linewidth=0.6)
@@ -279,12 +272,11 @@ def draw_time(rack: Rack) -> Any:
 
 def draw_lines(rack: Rack) -> Any:
     """Draw mu over u for each stroke with its line, Fig. 9; one panel for each direction."""
-    load = rack.strokes[0].normal_force
     figure, panels = new_panels(
-        f'Coefficient over deflection at {load:g} N, one colour for each speed (Fig. 9)', 1, 2
+        f'Coefficient over deflection at {rack.load:g} N, one colour for each speed (Fig. 9)', 1, 2
     )
     for axes, name, direction in zip(panels, ('positive', 'negative'), (1.0, -1.0), strict=True):
-        chosen = [stroke for stroke in rack.strokes if stroke.velocity * direction > 0.0]
+        chosen = rack.strokes_of(direction)
         for stroke, colour in zip(chosen, family(len(chosen)), strict=True):
             step = max(stroke.u.size // 150, 1)
             axes.plot(1e6 * stroke.u[::step], stroke.mu[::step], '.', color=colour, markersize=2, alpha=0.6)
@@ -304,23 +296,19 @@ def draw_parameters(racks: list[Rack], coefs: FrictionCoefficients) -> Any:
     )
     largest = max(abs(stroke.velocity) for rack in racks for stroke in rack.strokes)
     half = np.linspace(2e-4, largest, 100)
-    velocity = np.concatenate([-half[::-1], [np.nan], half])
-    for rack, colour in zip(racks, family(len(racks)), strict=True):
-        load = rack.strokes[0].normal_force
-        found = 1e3 * np.array([stroke.velocity for stroke in rack.strokes])
-        for axes, name, law, scale in (
-            (left, 'b', slope_coefficient, 1e-3),
-            (right, 'a', offset_coefficient, 1.0),
-        ):
-            axes.plot(
-                found, [scale * getattr(s, name) for s in rack.strokes], 'o', color=colour, markersize=4
-            )
-            curve = [scale * law(coefs, v, load) if v == v else v for v in velocity]
-            axes.plot(1e3 * velocity, curve, color=colour, linewidth=1.0, label=f'{load:g} N')
-            axes.set(xlabel='velocity (mm/s)')
-            axes.xaxis.set_major_locator(MaxNLocator(5))
-    left.set_ylabel('b (1/mm)')
-    right.set_ylabel('a (1)')
+    velocity = np.concatenate([-half[::-1], half])
+    for axes, name, unit, law, scale in (
+        (left, 'b', '1/mm', slope_coefficient, 1e-3),
+        (right, 'a', '1', offset_coefficient, 1.0),
+    ):
+        for rack, colour in zip(racks, family(len(racks)), strict=True):
+            found = np.array([(1e3 * s.velocity, scale * getattr(s, name)) for s in rack.strokes])
+            axes.plot(*found.T, 'o', color=colour, markersize=4)
+            curve = np.array([scale * law(coefs, v, rack.load) for v in velocity])
+            curve[half.size - 1] = np.nan  # no line through the jump at 0
+            axes.plot(1e3 * velocity, curve, color=colour, linewidth=1.0, label=f'{rack.load:g} N')
+        axes.set(xlabel='velocity (mm/s)', ylabel=f'{name} ({unit})')
+        axes.xaxis.set_major_locator(MaxNLocator(5))
     left.axhline(0.0, color=GREY, linewidth=0.8)
     legend_below(figure, left, 6, fontsize='small')
     return figure
@@ -328,9 +316,8 @@ def draw_parameters(racks: list[Rack], coefs: FrictionCoefficients) -> Any:
 
 def draw_models(rack: Rack) -> Any:
     """Draw the recorded force with both models: all of it, and two turning points in detail, Fig. 11."""
-    load = rack.strokes[0].normal_force
     figure, rows = new_mosaic(
-        f'Both friction models on the recorded displacement, {load:g} N (Fig. 11)',
+        f'Both friction models on the recorded displacement, {rack.load:g} N (Fig. 11)',
         [['whole', 'whole'], ['slow', 'fast']],
         6.5,
     )
@@ -356,7 +343,6 @@ def draw_models(rack: Rack) -> Any:
 
 EXPERIMENT = Experiment(
     NAME,
-    *NAMES[NAME],
     """The simulated pads (full model) are moved between two turning points at constant speed and constant
     normal force; after every second turning point the speed grows by 1 mm/s. Displacement, friction
     force and normal force are recorded at 1 kHz with noisy instruments; everything below is computed

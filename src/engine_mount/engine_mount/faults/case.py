@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from mount_sim.electronics.faults.kinds import FAULTS
+from mount_sim.electronics.faults import FAULTS
 
 
 class Reaction(Enum):

@@ -17,7 +17,6 @@ from rclpy.node import Node
 
 from mount_bringup.graph.nodes import DRIVER
 from mount_driver.bus import MULTICAST_GROUP, Reception, open_bus
-from mount_driver.layout import FrameError
 from mount_driver.protocol import MountCodec
 from mount_ros.data_path import DataPath
 from mount_ros.messages.scalars import ScalarsLayout
@@ -106,14 +105,12 @@ class Observers:
     def listen(self, port: int, ending: threading.Event) -> None:
         """Note the setpoint frames on the bus at a UDP port; one that no electronics would take is none."""
         bus = open_bus('udp_multicast', MULTICAST_GROUP, port=port, receive=[self._codec.setpoint.frame_id])
-        reception = Reception()  # frames that cannot be read are one of the faults
+        layout, reception = self._codec.setpoint, Reception()  # what cannot be read is one of the faults
         while not ending.is_set():
             frame = reception.frame(bus, _LOOK_PERIOD)
-            try:
-                setpoint = self._codec.decode_setpoint(frame.data)[1] if frame else None
-            except FrameError:
+            if frame is None or not layout.is_sound(frame.data):
                 continue
-            if frame and setpoint:
+            if setpoint := layout.decode(frame.data)[1]:
                 current = setpoint.current if setpoint.enable else 0.0
                 self.setpoints.append(Setpoint(frame.timestamp - self._epoch, current))
         bus.shutdown()

@@ -45,7 +45,7 @@ def second_host(bus: can.BusABC) -> Step:
     def step() -> None:
         while (frame := bus.recv(0.0)) is not None:
             if frame.arbitration_id == codec.measurement.frame_id:
-                counter = codec.decode_measurement(frame.data)[1].sample_counter
+                counter = codec.measurement.decode(frame.data)[1].sample_counter
                 data = codec.encode_setpoint(Setpoint(HIGHEST_CURRENT, counter, True), alive.next())
                 bus.send(Frame(codec.setpoint.frame_id, data))
 

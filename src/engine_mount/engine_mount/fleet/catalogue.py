@@ -33,8 +33,7 @@ from engine_mount.recordings.session import (
 from engine_mount.recordings.times import each_once, misdated
 from engine_mount.settings.changes import changed_parameters
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
-from mount_sim.mount_choice import seat_of, simulated_mounts
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, simulated_mounts, without_friction
 
 if TYPE_CHECKING:
     import pyarrow

@@ -27,7 +27,7 @@ from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
 from mount_sim.excitation.scenario import SweepScenario
-from mount_sim.mount_choice import with_control_of_mount
+from mount_sim.plant.mounts import with_control_of_mount
 
 Settings = Mapping[str, Any]
 

@@ -22,7 +22,7 @@ from engine_mount.drives.inputs.consumed_samples import (
     looked_up,
     quiet_at_first,
 )
-from engine_mount.drives.inputs.foreign import default_gap
+from engine_mount.drives.inputs.gap import default_gap
 from engine_mount.drives.inputs.input import (
     displacement_of,
     has,
@@ -40,7 +40,7 @@ from engine_mount.recordings.times import each_once
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import check_effect, control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
-from mount_models.arithmetic.interpolation import each_interpolated
+from mount_models.arithmetic.sums import each_interpolated
 from mount_ros.topics import (
     AIR_GAP,
     CONTROL_TRACE,

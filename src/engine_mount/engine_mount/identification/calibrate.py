@@ -14,7 +14,7 @@ from engine_mount.identification.force_law import ActuatorCalibration, fit_force
 from engine_mount.identification.inductance import InductanceCalibration, calibrate_inductance
 from engine_mount.identification.rack import RACK, FileValues, read_force, read_ripple
 from engine_mount.signals.mapping import Mapping, with_options
-from mount_models.coil.temperature import CONDUCTIVITY_COEFFICIENT
+from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT
 from mount_models.specimen import chosen_specimen
 
 Place = str | os.PathLike[str]
@@ -100,10 +100,9 @@ def rack(
     """
     from mount_models.friction.coefficient import FrictionCoefficients
     from mount_models.friction.contact import FrictionContact
-    from mount_sim.rack.coil import Rack, drawn_rack, write_force, write_ripple
-    from mount_sim.rack.friction import drawn_friction, write_friction
+    from mount_sim.rack import Rack, drawn_friction, drawn_rack, write_force, write_friction, write_ripple
 
-    simulated = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
+    simulated = (drawn_rack(seed) if drawn else Rack(seed=seed))._replace(noise=noise)
     pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
     out, steps = Path(folder), 2 + len(celsius)
     out.mkdir(parents=True, exist_ok=True)

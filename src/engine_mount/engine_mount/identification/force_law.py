@@ -36,7 +36,7 @@ from engine_mount.identification.force_points import (
 )
 from engine_mount.identification.specimen import described_files, rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
-from mount_models.actuator.law import (
+from mount_models.actuator import (
     LOWEST_SHARE,
     TABLE_1,
     ForceLaw,

@@ -18,14 +18,14 @@ from engine_mount.identification.gap_curves import (
 )
 from engine_mount.identification.specimen import described_files, rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
-from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
-from mount_models.coil.temperature import (
+from mount_models.coil.correction import (
     CONDUCTIVITY_COEFFICIENT,
     TemperatureCompensation,
     check_compensation,
     crossing_at_calibration,
     inductance_at_calibration,
 )
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
 from mount_models.quantity import LawRefusedError
 from mount_models.specimen import Specimen
 

@@ -15,7 +15,7 @@ from engine_mount.identification.force_points import gap_groups
 from engine_mount.identification.friction.ladder import Rung, best_rung, predicted_force
 from engine_mount.identification.friction.recording import FrictionRecording
 from engine_mount.identification.gap_curves import CurveFit
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 

@@ -1,10 +1,11 @@
 """Which recordings there are, from the ends of their files, and what one of them is and holds."""
 
 import json
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import audit
@@ -24,12 +25,10 @@ from engine_mount.recordings.session import (
 )
 from engine_mount.settings.changes import changed_parameters
 from engine_mount.settings.run_folder import RunFolder
-from engine_mount.signals.sources.stores import entries
-from engine_mount.signals.sources.uris import inside, is_local, local_path
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
-from mount_sim.mount_choice import simulated_mounts
+from mount_sim.plant.mounts import simulated_mounts
 
 _COUNTS = {
     'lost_samples': 'samples lost',
@@ -53,14 +52,17 @@ class Description(NamedTuple):
     tables: list[Table]
 
 
-def list_recordings(folders: Sequence[Path | str]) -> list[Figures]:
+def list_recordings(folders: Sequence[Path]) -> list[Figures]:
     """Return the recordings in `folders`, and those that these are themselves, the newest first.
 
-    A folder is a path or a URI; in a store only names and sizes are read. `sound` is None where no summary of
-    a run says whether anything was lost or went wrong. Raises `SourceError` where a store cannot be listed.
+    `sound` is None where no summary of a run says whether anything was lost or went wrong.
     """
-    found = [one for folder in folders for one in _recordings_at(str(folder))]
-    return sorted(found, key=lambda one: _seconds(one['started']), reverse=True)
+
+    def seconds(one: Figures) -> float:
+        return datetime.fromisoformat(one['started']).timestamp() if one['started'] else 0.0
+
+    found = [summarise_recording(path) for folder in folders for path in _places(folder)]
+    return sorted(found, key=seconds, reverse=True)
 
 
 def summarise_recording(path: Path) -> Figures:
@@ -71,12 +73,11 @@ def summarise_recording(path: Path) -> Figures:
     except (ReadingError, OSError) as error:
         return {'recording': str(path), **_UNKNOWN, 'verdict': str(error), 'sound': False}
     parameters = session_parameters(session)
-    scenario = str(session.get('scenario', ''))
     verdict, sound = _verdict(path, recording)
     return {
         **_head(recording, session),
         'recording': str(path),
-        'scenario': (f'replay of {scenario}'.strip() if 'replay' in session else scenario) or None,
+        'scenario': _scenario(session) or None,
         'mode': str(session.get('mode', '')) or None,
         'mount': simulated_mounts(parameters) or None,
         'policy': str(parameters.get('mount_control', {}).get('policy', '')) or None,
@@ -92,7 +93,14 @@ def describe_recording(recording: Recording) -> Description:
     found = losses(recording, audits)
     head, made_with = _head(recording, session), versions_told(session)
     changed = changed_parameters(session_parameters(session))
-    gaps, marks = _gaps(recording), _marks(recording)
+    gaps: dict[str, dict[str, float]] = {}  # {mount: {name: m}}
+    marks: Counter[str] = Counter()
+    for part in recording.by_mount():
+        if AIR_GAP.name in part and len(part[AIR_GAP.name]):
+            message = part.latched(AIR_GAP.name)
+            gaps[part.mount] = dict(zip(message.name, map(float, message.position), strict=True))
+        if EVENT.name in part:
+            marks.update(mark.kind for mark in read_marks(part[EVENT.name]))
     figures = {
         **head,
         'scenario': session.get('scenario'),
@@ -117,8 +125,7 @@ def describe_recording(recording: Recording) -> Description:
         **found.as_json(),
     }
     started, duration = started_of(session, recording), head['duration_s']
-    replay = 'replay of ' if 'replay' in session else ''
-    driven = f'{replay}{session.get("scenario", "")}, {session.get("mode", "")}'
+    driven = f'{_scenario(session)}, {session.get("mode", "")}'
     shown = ', '.join(f'{name} {made_with[name]}' for name in _VERSIONS if name in made_with)
     here = versions()
     rows = [
@@ -147,39 +154,6 @@ def describe_recording(recording: Recording) -> Description:
     return Description(figures, rows, [table for table in tables if table.rows])
 
 
-def _recordings_at(folder: str) -> Iterator[Figures]:
-    if is_local(folder):
-        yield from map(summarise_recording, _places(local_path(folder)))
-        return
-    for uri, size in _stored(folder).items():
-        verdict = f'{size / 1e6:.1f} MB, not read: engine-mount info fetches it'
-        yield {'recording': uri, **_UNKNOWN, 'verdict': verdict, 'sound': None}
-
-
-def _stored(folder: str) -> dict[str, int]:
-    """Return the recordings and runs that a place in a store is or directly holds, with their bytes."""
-    root = folder.rstrip('/')
-    files = {entry.uri[len(root) :].strip('/'): entry.size for entry in entries(folder)}
-    if '' in files:
-        return {folder: files['']}
-    found: dict[str, int] = {}
-    for name, size in files.items():
-        first, _, rest = name.partition('/')
-        found[first if rest else ''] = found.get(first if rest else '', 0) + size
-    recorded = {PurePosixPath(name).parent.as_posix() for name in files if _is_recorded(name)}
-    if recorded & {'.', 'recording'}:
-        return {folder: sum(files.values())}
-    return {
-        inside(folder, name): size
-        for name, size in sorted(found.items())
-        if recorded & {name, f'{name}/recording'}
-    }
-
-
-def _is_recorded(name: str) -> bool:
-    return name.endswith('.mcap') or PurePosixPath(name).name == METADATA_NAME
-
-
 def _places(folder: Path) -> Iterator[Path]:
     """Return the runs and recordings that `folder` is or holds."""
     if _is_recording(folder) or not folder.is_dir():
@@ -204,6 +178,11 @@ def _head(recording: Recording, session: Mapping[str, Any]) -> Figures:
     }
 
 
+def _scenario(session: Mapping[str, Any]) -> str:
+    scenario = str(session.get('scenario', ''))
+    return f'replay of {scenario}'.strip() if 'replay' in session else scenario
+
+
 def _verdict(path: Path, recording: Recording) -> tuple[str, bool | None]:
     """Return what the summary of the run says, else whether the recording is whole."""
     if not recording.whole:
@@ -220,35 +199,17 @@ def _verdict(path: Path, recording: Recording) -> tuple[str, bool | None]:
     return ', '.join(wrong) or 'nothing lost, no faults', not wrong
 
 
-def _seconds(started: str | None) -> float:
-    return datetime.fromisoformat(started).timestamp() if started else 0.0
-
-
 def _count(value: Any) -> int:
     return len(value) if isinstance(value, list) else value if isinstance(value, int) else 0
 
 
-def _gaps(recording: Recording) -> dict[str, dict[str, float]]:
-    """Return {mount: {name: m}}."""
-    found = {}
-    for part in recording.by_mount():
-        if AIR_GAP.name in part and len(part[AIR_GAP.name]):
-            message = part.latched(AIR_GAP.name)
-            found[part.mount] = dict(zip(message.name, map(float, message.position), strict=True))
-    return found
-
-
 def _gap_text(gap: Mapping[str, float]) -> str:
-    unknown, texts = float('nan'), []
-    for name in ('rest', 'contact'):
-        value, std = (1e6 * gap.get(key, unknown) for key in (f'{name}_gap', f'{name}_gap_std'))
-        texts.append(f'{name} {value:.1f} ± {std:.1f} µm')
-    return ', '.join(texts)
+    def microns(name: str) -> str:
+        return f'{1e6 * gap.get(name, math.nan):.1f}'
 
-
-def _marks(recording: Recording) -> dict[str, int]:
-    parts = [part for part in recording.by_mount() if EVENT.name in part]
-    return dict(Counter(mark.kind for part in parts for mark in read_marks(part[EVENT.name])))
+    return ', '.join(
+        f'{name} {microns(f"{name}_gap")} ± {microns(f"{name}_gap_std")} µm' for name in ('rest', 'contact')
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -171,14 +171,11 @@ def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda share, wha
 
 def _names(recordings: Sequence[Recording]) -> list[str]:
     """Return short names that differ."""
-    paths = [
-        [part for part in recording.path.absolute().parts if part != 'recording'] for recording in recordings
-    ]
     for parts in (1, 2, 3):
-        names = [
-            f'{"/".join(path[-parts:])} {recording.mount}'.strip()
-            for path, recording in zip(paths, recordings, strict=True)
-        ]
+        names = []
+        for recording in recordings:
+            path = [part for part in recording.path.absolute().parts if part != 'recording']
+            names.append(f'{"/".join(path[-parts:])} {recording.mount}'.strip())
         if len(set(names)) == len(names):
             return names
     return [f'{number}: {recording.path.absolute()}' for number, recording in enumerate(recordings, 1)]

@@ -39,9 +39,6 @@ def draw_road(profile: RoadProfile, found: Unevenness, file: Path) -> None:
     line = found.roughness * (fitted / REFERENCE_FREQUENCY) ** -found.waviness
     label = f'class {found.letter}, waviness {found.waviness:.2f}'
     below.loglog(fitted, line, '--', color=LEVEL_COLOUR, label=label)
-    for period in found.periods:
-        label = f'every {period.wavelength:.3g} m'
-        below.axvline(1.0 / period.wavelength, color=COLOURS[1], linewidth=0.8, label=label)
     below.set(xlabel='spatial frequency (cycles/m)', ylabel='density of the height (m³)')
     below.legend(loc='lower left', fontsize='small')
     for axes in (above, below):

@@ -1,12 +1,11 @@
 """Sizes and durations as people write them, and the options of the recorder that are made of them."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.automatic_marks import mark_kinds
-from mount_recorder.bag_writer import SplitRule, checked_rule
 from mount_recorder.parameters import RecorderParameters, split_of
 
 _SIZES = {'B': 1, 'kB': 10**3, 'MB': 10**6, 'GB': 10**9, 'KiB': 1 << 10, 'MiB': 1 << 20, 'GiB': 1 << 30}
@@ -14,28 +13,18 @@ _DURATIONS = {'ms': 10**6, 's': 10**9, 'min': 60 * 10**9, 'h': 3600 * 10**9}
 _AMOUNT = re.compile(r'\s*(\d+(?:\.\d+)?)\s*([A-Za-z]+)\s*')
 
 
-def split_rule(texts: Iterable[str]) -> SplitRule:
-    """Return the rule of texts such as `500MB` or `60s`, one of each kind at most; or `ParameterError`."""
-    size = duration = 0
-    for text in texts:
-        unit = _unit(text)
-        if unit in _SIZES and not size:
-            size = size_in_bytes(text)
-        elif unit in _DURATIONS and not duration:
-            duration = duration_in_nanoseconds(text)
-        elif unit in _SIZES or unit in _DURATIONS:
-            raise ParameterError(f'{text!r} is a second limit of its kind; give one size and one duration')
-        else:
-            raise ParameterError(f'{text!r} is no size and no duration; write 500MB, 1GiB, 60s or 10min')
-    return checked_rule(SplitRule(size, duration))
-
-
 def recorder_options(split: Sequence[str], snapshot: str, snapshot_after: str = '') -> dict[str, Any]:
-    """Return {parameter: value} of the recorder of texts such as `500MB`, `60s`; raises `ParameterError`."""
+    """Return {parameter: value} of the recorder of texts such as `500MB`, `60s`; raises `ParameterError`.
+
+    `split` holds one size and one duration at most.
+    """
     options: dict[str, Any] = {}
-    if split:
-        rule = split_rule(split)
-        options.update(split_size=rule.size, split_duration=rule.duration * 1e-9)
+    for text in split:
+        amount, unit = _amount(text, _SIZES | _DURATIONS, 'size and no duration')
+        name, value = ('split_size', amount) if unit in _SIZES else ('split_duration', amount * 1e-9)
+        if name in options:
+            raise ParameterError(f'{text!r} is a second limit of its kind; give one size and one duration')
+        options[name] = value
     for name, text in (('snapshot', snapshot), ('snapshot_after', snapshot_after)):
         if text:
             options[name] = duration_in_nanoseconds(text) * 1e-9
@@ -54,21 +43,16 @@ def checked_recorder(options: Mapping[str, Any]) -> RecorderParameters:
 
 def size_in_bytes(text: str) -> int:
     """Return the bytes of a text such as `500MB` or `2GiB`; raises `ParameterError`."""
-    return _amount(text, _SIZES, 'size such as 500MB')
+    return _amount(text, _SIZES, 'size such as 500MB')[0]
 
 
 def duration_in_nanoseconds(text: str) -> int:
     """Return the ns of a text such as `30s` or `1.5min`; raises `ParameterError`."""
-    return _amount(text, _DURATIONS, 'duration such as 30s')
+    return _amount(text, _DURATIONS, 'duration such as 30s')[0]
 
 
-def _unit(text: str) -> str:
-    match = _AMOUNT.fullmatch(text)
-    return match[2] if match else ''
-
-
-def _amount(text: str, units: dict[str, int], wanted: str) -> int:
+def _amount(text: str, units: dict[str, int], wanted: str) -> tuple[int, str]:
     match = _AMOUNT.fullmatch(text)
     if match is None or match[2] not in units:
-        raise ParameterError(f'{text!r} is no {wanted}; units are {", ".join(units)}')
-    return round(float(match[1]) * units[match[2]])
+        raise ParameterError(f'{text!r} is no {wanted}; write as in 500MB or 60s, of {", ".join(units)}')
+    return round(float(match[1]) * units[match[2]]), match[2]

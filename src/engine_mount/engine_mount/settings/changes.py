@@ -1,16 +1,15 @@
 """The parameters of a run that differ from their defaults."""
 
-from collections.abc import Mapping
 from typing import Any
 
-from mount_bringup.settings import defaults_of_nodes
+from mount_bringup.settings import Known, defaults_of_nodes
 from mount_models.specimen import default_specimen
 
 _OF_THE_RUN = {'uri', 'lockstep', 'interface', 'channel', 'port'}
 """Parameters that a run chooses by itself."""
 
 
-def changed_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, tuple[Any, Any]]]:
+def changed_parameters(parameters: Known) -> dict[str, dict[str, tuple[Any, Any]]]:
     """Return {node: {parameter: (value, default)}} of a session that differ from the default.
 
     Of friction and contact the default is what the shipped specimen says of this actuator.
@@ -22,21 +21,17 @@ def changed_parameters(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str,
         prefix, _, rest = name.partition('.')
         if prefix in ('friction', 'contact') and rest in identified:
             control[name] = identified[rest]
-    changed = {
-        node: {
-            name: (value, defaults[node][name])
-            for name, value in values.items()
-            if name in defaults.get(node, {})
-            and name not in _OF_THE_RUN
-            and _differs(value, defaults[node][name])
+    changed = {}
+    for node, values in parameters.items():
+        own = defaults.get(node, {})
+        names = [name for name in values if name in own and name not in _OF_THE_RUN]
+        changed[node] = {
+            name: (values[name], own[name]) for name in names if _differs(values[name], own[name])
         }
-        for node, values in parameters.items()
-    }
-    return {node: own for node, own in changed.items() if own}
+    return {node: pairs for node, pairs in changed.items() if pairs}
 
 
 def _differs(value: Any, default: Any) -> bool:
-    both_unknown = value != value and default != default
     if isinstance(default, tuple):
         return bool(value) and tuple(value) != default
-    return not both_unknown and value != default
+    return value != default and not (value != value and default != default)  # NaN is unknown

@@ -8,7 +8,7 @@ from typing import Any
 
 from mount_bringup.settings import OF_EACH, Known, settings_of_mount
 from mount_models.quantity import ParameterError
-from mount_sim.plant.places import mount_names
+from mount_sim.plant.mounts import mount_names
 
 
 def mounts_of(settings: Known) -> tuple[str, ...]:
@@ -26,7 +26,4 @@ def mounts_of(settings: Known) -> tuple[str, ...]:
 
 def settings_of_mounts(settings: Known) -> dict[str, dict[str, dict[str, Any]]]:
     """Return {mount: settings}; a mount alone has the name ''."""
-    names = mounts_of(settings)
-    return {name: settings_of_mount(settings, name) for name in names} or {
-        '': {node: dict(values) for node, values in settings.items()}
-    }
+    return {name: settings_of_mount(settings, name) for name in mounts_of(settings) or ('',)}

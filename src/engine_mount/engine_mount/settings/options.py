@@ -1,7 +1,7 @@
 """Options `--set NODE.NAME=VALUE` and `--sample-rate` as settings of the nodes."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from typing import Any
 
@@ -9,21 +9,28 @@ from mount_bringup.settings import NODES, Known, SettingError, defaults_of_nodes
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError
 
-_FIRST = 'mount_control'  # the node that is meant where none is named
+Settings = dict[str, dict[str, Any]]
 
 
-def settings_of_options(options: Sequence[str], known: Known | None = None) -> dict[str, dict[str, Any]]:
+def settings_of_options(options: Sequence[str], known: Known | None = None) -> Settings:
     """Return {node: {parameter: value}} of options [NODE.]NAME=VALUE.
 
     Raises `SettingError` for one that is not written like that.
     """
-    parameters: dict[str, dict[str, Any]] = {}
+    parameters: Settings = {}
     for option in options:
         name, equals, text = option.partition('=')
         if not (equals and name):
             raise SettingError(f'--set {option}: write NAME=VALUE or NODE.NAME=VALUE, as in mount_sim.seed=2')
         node, parameter = owned(name, known)
-        parameters.setdefault(node, {})[parameter] = setting_value(option, text)
+        try:
+            parameters.setdefault(node, {})[parameter] = plain_yaml(text)
+        except YamlError as error:
+            reason = str(error).removesuffix('; put it in quotes')
+            raise SettingError(
+                f'--set {option}: the value {text!r:.60} {reason}; put it in quotes of its own, as in '
+                f'\'{option.removesuffix(text)}"{text}"\''
+            ) from None
     return parameters
 
 
@@ -39,8 +46,8 @@ def owned(name: str, known: Known | None = None) -> tuple[str, str]:
     if parameter and (node.rpartition('/')[2] in {*known, *NODES} or '/' in node):
         return node, parameter
     owners = [node for node, names in known.items() if name in names]
-    if _FIRST in owners:
-        return _FIRST, name
+    if 'mount_control' in owners:
+        return 'mount_control', name
     if len(owners) > 1:
         raise ParameterError(
             f'{name!r} is a parameter of {", ".join(owners)}: write which, as in {owners[0]}.{name}'
@@ -53,24 +60,9 @@ def owned(name: str, known: Known | None = None) -> tuple[str, str]:
     raise ParameterError(f'{name!r} is no parameter of any node; {hint}')
 
 
-def setting_value(option: str, text: str) -> Any:
-    """Return the value that `text` (YAML) in `--set option` gives; raises `SettingError`."""
-    try:
-        return plain_yaml(text)
-    except YamlError as error:
-        reason = str(error).removesuffix('; put it in quotes')
-        raise SettingError(
-            f'--set {option}: the value {text!r:.60} {reason}; put it in quotes of its own, as in '
-            f'\'{option.removesuffix(text)}"{text}"\''
-        ) from None
-
-
-def with_sample_rate(
-    settings: Mapping[str, Mapping[str, Any]], sample_rate: float | None
-) -> dict[str, dict[str, Any]]:
+def with_sample_rate(settings: Known, sample_rate: float | None) -> Settings:
     """Return the settings with `sample_rate` (Hz) for every node; None changes nothing."""
     completed = {node: dict(values) for node, values in settings.items()}
-    if sample_rate is not None:
-        for node in NODES:
-            completed.setdefault(node, {})['sample_rate'] = sample_rate
+    for node in NODES if sample_rate is not None else ():
+        completed.setdefault(node, {})['sample_rate'] = sample_rate
     return completed

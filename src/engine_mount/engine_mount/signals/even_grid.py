@@ -9,11 +9,10 @@ samples that came in bursts, are refused, for no number tells when these were ta
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
-from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.compiled import compiled
+from mount_models.arithmetic.sums import mean
 
 ON_THE_LINE = 1e-3
 """Share of a period, chosen: so late a sample of a sine of 0.15 of the rate is wrong by a thousandth."""
@@ -82,11 +81,6 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
             f'{lowest_rate:g} are needed'
         )
     return EvenSignal(name, period, values, signal.begin + round(SECOND * first), tuple(notes))
-
-
-def gaps(signal: Signal, longest_gap: float) -> NDArray[np.intp]:
-    """Return behind which samples of `signal` no next one comes for more than `longest_gap` (s)."""
-    return np.flatnonzero(np.diff(signal.times) > longest_gap)
 
 
 def _check_steps(name: str, times: FloatArray, period: float, longest_gap: float) -> None:

@@ -1,6 +1,6 @@
 """Recorded signals as excitation: the vertical acceleration of the chassis, the height of the road.
 
-The simulator takes arrays at its own step alone (`mount_sim.excitation.array_file`); here they are made.
+The simulator takes arrays at its own step alone (`mount_sim.excitation.building`); here they are made.
 """
 
 from collections.abc import Mapping as Keys
@@ -15,11 +15,11 @@ from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.resampling import resampled
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import check_size
-from mount_models.arithmetic.averages import mean
 from mount_models.arithmetic.series import StreamedSeries
+from mount_models.arithmetic.sums import mean
 from mount_models.quantity import flattened
 from mount_sim.excitation import building
-from mount_sim.excitation.array_file import write_excitation
+from mount_sim.excitation.building import write_excitation
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario, RoadScenario
 from mount_sim.parameters import SimParameters

@@ -10,7 +10,7 @@ from engine_mount.signals.mapping import ColumnChoice
 from engine_mount.signals.quantities import Quantity
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.units import STANDARD_GRAVITY, Unit, is_unit, unit_of, units_of
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 
 GRAVITY_WITHIN = 0.06
 """Share of standard gravity, chosen: a tilt of 20 degrees, or the error of a common sensor."""
@@ -62,14 +62,16 @@ def unit_of_column(
                 '(-1)'
             )
         scale /= unit.factor
-    gravity = _gravity_unit(scale * size) if wanted.dimension == 'acceleration' else ''
+    gravity, plain = _gravity_unit(wanted, scale * size), _gravity_unit(wanted, size)
     in_gravity = f'a mean of {size[0]:.4g} is gravity in {gravity}'
-    looks = _guesses(wanted, size)
+    # what the values look like, the likeliest first
+    fitting = [one.symbol for one in units_of(wanted.dimension) if not _doubt(wanted, one.to_si(size))]
+    looks = [plain] if plain else fitting[:_NAMED]
     remedy = f'in no unit of {wanted.dimension} would it be {wanted.name}: is it another column?'
     if looks:
         remedy = f'it could be {", ".join(looks)}: {write(looks[0])}, or the one that it is'
     if not (said or header or choice.scale is not None):
-        if gravity == unit.symbol or (wanted.dimension == 'length' and looks[:1] == (unit.symbol,)):
+        if gravity == unit.symbol or (wanted.dimension == 'length' and looks[:1] == [unit.symbol]):
             seen = f'{in_gravity}: ' if gravity else ''
             notes.append(f'{column.name}: no unit is said; {seen}taken as {unit.symbol}')
             return unit, scale, notes
@@ -126,16 +128,9 @@ def _doubt(wanted: Quantity, size: FloatArray) -> str:
     return ''
 
 
-def _gravity_unit(size: FloatArray) -> str:
+def _gravity_unit(wanted: Quantity, size: FloatArray) -> str:
     """Return the unit of acceleration in which the mean is that of gravity, '' where it is in none."""
-    for unit in units_of('acceleration'):
+    for unit in units_of('acceleration') if wanted.dimension == 'acceleration' else ():
         if abs(abs(size[0]) * unit.factor / STANDARD_GRAVITY - 1.0) <= GRAVITY_WITHIN:
             return unit.symbol
     return ''
-
-
-def _guesses(wanted: Quantity, size: FloatArray) -> tuple[str, ...]:
-    """Return the units that values of that size look like, the likeliest first."""
-    gravity = _gravity_unit(size) if wanted.dimension == 'acceleration' else ''
-    fitting = (unit.symbol for unit in units_of(wanted.dimension) if not _doubt(wanted, unit.to_si(size)))
-    return (gravity,) if gravity else tuple(fitting)[:_NAMED]

@@ -18,7 +18,6 @@ from mount_models.plain_yaml import YamlError, yaml_in_file
 
 MEAN = 'mean'
 """The offset that is the mean of the signal."""
-_KEYS = ('system', 'time', 'columns', 'others', 'decimal', 'delimiter')
 
 
 @dataclass(frozen=True)
@@ -92,8 +91,9 @@ class Mapping:
 
     def of(self, known: Quantities) -> 'Mapping':
         """Return the mapping of the `known` quantities alone, by the names that these have."""
-        pairs = ((name, one.mapped or name) for name, one in known.items())
-        there = {name: self.choices.get(name, self.choices.get(mapped)) for name, mapped in pairs}
+        there = {
+            name: self.choices.get(name, self.choices.get(one.mapped or name)) for name, one in known.items()
+        }
         return self.only({name: choice for name, choice in there.items() if choice is not None})
 
 
@@ -113,21 +113,22 @@ def mapping_in_file(path: Path) -> Mapping:
 
     Raises `SignalError`, for a key that is not known too.
     """
+    keys = ('system', 'time', 'columns', 'others', 'decimal', 'delimiter')
     try:
-        found = _section(yaml_in_file(path), _KEYS, 'a mapping')
-        columns, others = (found.get(name, {}) for name in ('columns', 'others'))
-        for name in _dict(others, 'others'):
+        found = _section(yaml_in_file(path), keys, 'a mapping')
+        columns, others = (_section(found.get(name, {}), None, name) for name in ('columns', 'others'))
+        for name in others:
             if name in QUANTITIES or not (name.isidentifier() and name.isascii()):
                 raise SignalError(
                     f'others: {name!r} must be a name of letters, digits and _ that is no quantity; '
                     'a quantity stands below columns'
                 )
         return Mapping(
-            {quantity(name).name: _column(one, name) for name, one in _dict(columns, 'columns').items()},
+            {quantity(name).name: _column(one, name) for name, one in columns.items()},
             {name: _column(one, name) for name, one in others.items()},
             TimeChoice(**_section(found.get('time', {}), ('column', 'unit', 'rate'), 'time')),
             str(found.get('system', '')),
-            stated=Stated(decimal=str(found.get('decimal', '')), delimiter=str(found.get('delimiter', ''))),
+            stated=Stated(str(found.get('decimal', '')), str(found.get('delimiter', ''))),
         )
     except YamlError as error:
         raise SignalError(f'{path} {error}') from None
@@ -154,36 +155,42 @@ def with_options(
     said: dict[str, ColumnChoice] = {}
     for text in columns:
         if text.startswith('time='):
-            time = text.partition('=')[2]
+            time = text.removeprefix('time=')
             continue
-        name, choice = column_option(text, default, known)
+        name, choice = _column_option(text, default, known)
         if name in said:
             raise SignalError(f'{name} is named twice, {said[name].column!r} and {choice.column!r}; name one')
         before = mapping.columns.get(name, choice)
-        said[name] = (
-            choice if before.column != choice.column else replace(before, unit=choice.unit or before.unit)
-        )
+        same = before.column == choice.column
+        said[name] = replace(before, unit=choice.unit or before.unit) if same else choice
     if scale is not None:
         said = {name: replace(one, scale=scale) for name, one in (said or mapping.columns).items()}
-    times = mapping.time
-    if time or rate is not None:
-        times = TimeChoice(*split_unit(time), rate)
-    told = mapping.stated
+    times = TimeChoice(*split_unit(time), rate) if time or rate is not None else mapping.time
+    file = mapping.stated
     if stated is not None:
-        dialect = {'decimal': stated.decimal or told.decimal, 'delimiter': stated.delimiter or told.delimiter}
-        told = replace(stated, **dialect)
-    return replace(mapping, columns={**mapping.columns, **said}, time=times, stated=told)
+        file = replace(
+            stated, decimal=stated.decimal or file.decimal, delimiter=stated.delimiter or file.delimiter
+        )
+    return replace(mapping, columns={**mapping.columns, **said}, time=times, stated=file)
 
 
-def column_option(text: str, default: str = '', known: Quantities = QUANTITIES) -> tuple[str, ColumnChoice]:
+def split_unit(text: str, dimension: str = '') -> tuple[str, str]:
+    """Return column and unit of `COLUMN[:UNIT]`; what follows the colon must be a unit, else it is a name."""
+    column, colon, unit = text.rpartition(':')
+    if colon and is_unit(unit, dimension):
+        return column, unit_of(unit, dimension).symbol
+    return (column, unit) if colon and is_unit(unit) else (text, '')
+
+
+def _column_option(text: str, default: str, known: Quantities) -> tuple[str, ColumnChoice]:
     """Return quantity and column of `[QUANTITY=]COLUMN[:UNIT]`; raises `SignalError`.
 
     Where no quantity is written it is `default`; without one, unit or title tell it.
     """
     name, _, rest = text.partition('=')
-    named = name in known and rest != ''
-    name = name if named else default
-    column, unit = split_unit(rest if named else text, known[name].dimension if name in known else '')
+    if not (name in known and rest):
+        name, rest = default, text
+    column, unit = split_unit(rest, known[name].dimension if name in known else '')
     if not column:
         raise SignalError(f'--column {text}: write [QUANTITY=]COLUMN[:UNIT], as in acceleration=az:g')
     if name:
@@ -199,14 +206,6 @@ def column_option(text: str, default: str = '', known: Quantities = QUANTITIES) 
     return found.name, ColumnChoice(column, unit)
 
 
-def split_unit(text: str, dimension: str = '') -> tuple[str, str]:
-    """Return column and unit of `COLUMN[:UNIT]`; what follows the colon must be a unit, else it is a name."""
-    column, colon, unit = text.rpartition(':')
-    if colon and is_unit(unit, dimension):
-        return column, unit_of(unit, dimension).symbol
-    return (column, unit) if colon and is_unit(unit) else (text, '')
-
-
 def _column(value: Any, name: str) -> ColumnChoice:
     found = _section(value, ('column', 'unit', 'scale', 'offset'), name)
     if 'column' not in found:
@@ -214,17 +213,13 @@ def _column(value: Any, name: str) -> ColumnChoice:
     return ColumnChoice(**{**found, 'column': str(found['column'])})
 
 
-def _section(value: Any, known: Sequence[str], what: str) -> dict[str, Any]:
-    """Return a section of a file that has no other keys; raises `SignalError`."""
-    unknown = [str(key) for key in _dict(value, what) if key not in known]
-    if unknown:
-        raise SignalError(f'{what}: {", ".join(unknown)} is not known; known are {", ".join(known)}')
-    return dict(value)
-
-
-def _dict(value: Any, what: str) -> dict[str, Any]:
+def _section(value: Any, known: Sequence[str] | None, what: str) -> dict[str, Any]:
+    """Return a section of a file that has no other keys than `known`; raises `SignalError`."""
     if not isinstance(value, dict):
         raise SignalError(f'{what} must have keys with values; instead it is {value!r}')
+    unknown = [str(key) for key in value if known and key not in known]
+    if unknown:
+        raise SignalError(f'{what}: {", ".join(unknown)} is not known; known are {", ".join(known or ())}')
     return value
 
 

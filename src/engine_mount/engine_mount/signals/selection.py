@@ -23,9 +23,10 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
-from engine_mount.signals.times import SLOWEST, is_time, times_of
+from engine_mount.signals.sources.uris import name_of
+from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, unit_of
-from mount_models.arithmetic.averages import mean
+from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
@@ -69,7 +70,6 @@ def select_rows(
     needed: Collection[str],
     *,
     timed: bool = False,
-    slowest: float = SLOWEST,
 ) -> dict[str, FloatArray]:
     """Return the quantities of a table row by row in SI, (n,) each, with `timed` the `time` in s.
 
@@ -79,7 +79,7 @@ def select_rows(
     `SignalError` or `SourceError`.
     """
     mapping = _mapping(choices, known).of(known)
-    there = _headings(source) if isinstance(source, Measured) else headings(source, mapping.stated)
+    there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
     uri = source.provenance.uri if isinstance(source, Measured) else str(source)
     for named in mapping.columns.values():
         heading_of(there, named.column, uri)
@@ -93,7 +93,7 @@ def select_rows(
             raise SignalError(
                 f'{uri} has no column for {name} (its columns: {columns}); name it as in {option}'
             )
-    signals = _select(source, mapping, known, timed=timed, slowest=slowest, whole=True).signals
+    signals = _select(source, mapping, known, timed=timed, whole=True).signals
     first = next(iter(signals.values()))
     inside = np.full(first.values.size, True)
     rows = {'time': first.times} if timed else {}
@@ -107,18 +107,12 @@ def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
         return found(wanted, there, uri)
     except SignalError:
         name, _, unit = wanted.rpartition(':')
-        if name not in {text for one in there for text in (one.name, one.header)}:
-            raise
-        try:
-            unit_of(unit)
-        except SignalError as error:
-            raise SignalError(f'{uri}, column {name!r}: {error}') from None
+        if name in {text for one in there for text in (one.name, one.header)}:
+            try:
+                unit_of(unit)
+            except SignalError as error:
+                raise SignalError(f'{uri}, column {name!r}: {error}') from None
         raise
-
-
-def name_of(uri: str) -> str:
-    """Return the last part of a path or URI."""
-    return uri.rstrip('/').rpartition('/')[2] or uri
 
 
 def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
@@ -127,17 +121,12 @@ def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
     return with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
 
 
-def _headings(measured: Measured) -> list[Heading]:
-    return [*measured.columns.values(), *measured.others]
-
-
 def _select(
     source: str | Path | Measured,
     mapping: Mapping,
     known: Quantities,
     *,
     timed: bool = True,
-    slowest: float = SLOWEST,
     whole: bool = False,
 ) -> Selection:
     """Return the columns that `mapping` names; `timed` at their times, `whole` without a missing number."""
@@ -147,25 +136,24 @@ def _select(
     uri = measured.provenance.uri
     signals, quantities, columns = {}, {}, {}
     for name, choice in mapping.choices.items():
-        column = measured.column(heading_of(_headings(measured), choice.column, uri).name)
+        column = measured.column(heading_of(measured.headings, choice.column, uri).name)
         wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
         where = f'{name_of(uri)}, column {column.name!r}'
         base, notes = column.time, ()
         if timed:
-            base, notes = times_of(measured, column, mapping.time, slowest)
+            base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
-        known_ones = _known(where, column, base, whole=whole)
-        values, told, more = _in_si(
-            where, replace(column, values=column.values[known_ones]), wanted, choice, mapping.option
-        )
-        times = base.times[known_ones]
+        is_known = _known(where, column, base, whole=whole)
+        own = replace(column, values=column.values[is_known])
+        values, facts, more = _in_si(where, own, wanted, choice, mapping.option)
+        times = base.times[is_known]
         begin = base.begin + round(SECOND * float(times[0]))
-        missing = column.values.size - values.size
-        left_out = (f'{column.name}: {missing} samples without a number are left out',) if missing else ()
-        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more, *left_out))
-        told |= {'times': base.told, 'samples': int(values.size)}
-        columns[name] = {**told, 'offset': choice.offset} if choice.offset else told
+        if missing := column.values.size - values.size:
+            more.append(f'{column.name}: {missing} samples without a number are left out')
+        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
+        offset = {'offset': choice.offset} if choice.offset else {}
+        columns[name] = {**facts, 'times': base.told, 'samples': int(values.size), **offset}
         quantities[name] = wanted
     return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
@@ -174,11 +162,12 @@ def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     """Return a file with the columns that `mapping` names, and those that may hold their times."""
     there = headings(source, mapping.stated)
     wanted = [choice.column for choice in mapping.choices.values()]
-    wanted += [mapping.time.column] if timed and mapping.time.column else []
+    if timed and mapping.time.column:
+        wanted.append(mapping.time.column)
     names = {heading_of(there, text, str(source)).name for text in wanted}
-    if timed and not mapping.time.column:
-        names |= {one.name for one in there if is_time(one)}
-    return read(source, [one.name for one in there if one.name in names], mapping.stated)
+    guessed = timed and not mapping.time.column
+    chosen = [one.name for one in there if one.name in names or (guessed and is_time(one))]
+    return read(source, chosen, mapping.stated)
 
 
 def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None:
@@ -201,8 +190,8 @@ def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
         raise SignalError(
             f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
         )
-    unit = unit_of(choice.unit or column.unit)
-    return Quantity(name, unit.dimension, f'{name}, in {Quantity(name, unit.dimension, "").unit.symbol}')
+    own = Quantity(name, unit_of(choice.unit or column.unit).dimension, '')
+    return replace(own, sentence=f'{name}, in {own.unit.symbol}')
 
 
 def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:
@@ -230,13 +219,13 @@ def _in_si(
     unit, scale, notes = unit_of_column(where, column, wanted, choice, option)
     values = unit.to_si(column.values)
     values *= scale  # in place: it can be an hour
-    told = {'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol}
+    facts = {'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol}
     offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
     if offset:
         values -= offset
         which = 'its mean' if choice.offset == MEAN else 'as said'
         notes.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
-    return values, told, notes
+    return values, facts, notes
 
 
 def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:

@@ -27,21 +27,19 @@ def is_time(heading: Heading) -> bool:
     return heading.date or heading.name[len(_group(heading)) :].lower().replace(' ', '_') in TITLES
 
 
-def times_of(
-    measured: Measured, column: MeasuredColumn, choice: TimeChoice, slowest: float = SLOWEST
-) -> Times:
+def times_of(measured: Measured, column: MeasuredColumn, choice: TimeChoice) -> Times:
     """Return the times of a column.
 
-    What is said by hand goes before what the format tells, and that before a column with a usual title. A
-    rate below `slowest` (Hz) doubts their unit. Raises `SignalError`.
+    What is said by hand goes before what the format tells, and that before a column with a usual title.
+    Raises `SignalError`.
     """
     if choice.column:
-        return _in_column(measured, measured.column(choice.column), choice.unit, slowest)
-    titled = sorted(
+        return _in_column(measured, measured.column(choice.column), choice.unit)
+    found = min(
         (one for one in measured.columns.values() if one is not column and is_time(one)),
         key=lambda one: -len(_group(one)) if column.name.startswith(_group(one)) else 1,
+        default=None,
     )
-    found = titled[0] if titled else None
     if choice.rate is not None:
         return _at_rate(measured, column, choice.rate, found)
     if column.time is not None:
@@ -49,10 +47,9 @@ def times_of(
     if found is None:
         raise SignalError(
             f'{measured.provenance.uri} tells no times for column {column.name!r}: name their column with '
-            f'--time COLUMN:UNIT (there are {listed([*measured.columns.values(), *measured.others])}), or '
-            'the rate with --rate HZ'
+            f'--time COLUMN:UNIT (there are {listed(measured.headings)}), or the rate with --rate HZ'
         )
-    return _in_column(measured, found, choice.unit, slowest)
+    return _in_column(measured, found, choice.unit)
 
 
 def _group(heading: Heading) -> str:
@@ -77,7 +74,7 @@ def _at_rate(measured: Measured, column: MeasuredColumn, rate: float, found: Mea
     return TimeBase(np.arange(column.values.size) / rate, begin, told), ()
 
 
-def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: float) -> Times:
+def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> Times:
     where, raw = f'{measured.provenance.uri}, column {column.name!r}', column.values
     bad = np.flatnonzero(~np.isfinite(raw))
     if column.time is not None and bad.size == raw.size:
@@ -87,7 +84,7 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: f
             f'{where}: {bad.size} of {raw.size} times are no numbers (the first: number {bad[:1]}); at least '
             '2 are needed: remove these samples, or say the rate with --rate HZ'
         )
-    unit, notes = _unit(where, column, said, slowest)
+    unit, notes = _unit(where, column, said)
     origin = float(raw[0]) * unit.factor
     told = f'column {column.name!r} in {unit.symbol}'
     told += ', counted from 1970' if _EPOCH[0] < origin < _EPOCH[1] else ''
@@ -95,7 +92,7 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str, slowest: f
     return TimeBase((raw - raw[0]) * unit.factor, begin, told), notes
 
 
-def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tuple[Unit, tuple[str, ...]]:
+def _unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tuple[str, ...]]:
     """Return the unit of a column of times; it must give a rate that can be."""
     chosen = said or column.unit
     unit = unit_of(chosen or 's', 'time')
@@ -108,9 +105,11 @@ def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tupl
     step = float((column.values.max() - column.values.min()) / (count - 1))
     rate = 1.0 / (step * unit.factor) if step > 0.0 else SLOWEST  # of these the even grid tells
     who = 'as you say' if said else 'as its header says' if chosen else 'for no unit is said'
-    if not slowest <= rate <= FASTEST or rate > max(_COMMON, 2.0 * count):
-        fitting = (one for one in ('s', 'ms', 'us', 'ns', 'min') if _is_common(step * unit_of(one).factor))
-        guess = next(fitting, '')
+    if not SLOWEST <= rate <= FASTEST or rate > max(_COMMON, 2.0 * count):
+        steps = {one: step * unit_of(one).factor for one in ('s', 'ms', 'us', 'ns', 'min')}
+        guess = next(
+            (one for one, each in steps.items() if 2.0 * SLOWEST * each <= 1.0 <= _COMMON * each), ''
+        )
         raise SignalError(
             f'{where}: steps of {step:.4g} are {rate:.4g} samples per second in {unit.symbol}, {who}; '
             + (f'these look like {guess}: write --time {column.name}:{guess}, or ' if guess else '')
@@ -121,7 +120,3 @@ def _unit(where: str, column: MeasuredColumn, said: str, slowest: float) -> tupl
     if said and column.unit and unit_of(column.unit, 'time') != unit:
         return unit, (f'{column.name}: its header says {column.unit}; taken as {said}, as you say',)
     return unit, ()
-
-
-def _is_common(step: float) -> bool:
-    return 2.0 * SLOWEST * step <= 1.0 <= _COMMON * step

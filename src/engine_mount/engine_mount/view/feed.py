@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from engine_mount.recordings.place import open_run
-from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
+from mount_ros.topics import TOPICS, Topic
 
 _PERIOD = 0.01  # s, chosen
 _LOWEST_RATE, _HIGHEST_RATE = 0.01, 1000.0
@@ -45,9 +45,6 @@ class Feed(Protocol):
     def stop(self) -> None:
         """Return when no message comes any more; safe to call twice."""
 
-    def mark(self) -> str:
-        """Ask the recorder of the graph to mark this moment; return its answer."""
-
 
 class RecordedFeed:
     """A recording of one mount, from `begin` (s) on, `rate` times as fast as it was recorded."""
@@ -57,18 +54,25 @@ class RecordedFeed:
         if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
             raise FeedError(f'--rate ({rate:g}) must lie within {_LOWEST_RATE:g} .. {_HIGHEST_RATE:g}')
         recording = open_run(path)
-        self.topics: Mapping[str, Topic] = _topics_of(recording.topics, namespace, path)
+        mounts, wanted = recording.mounts, namespace.strip('/')
+        if not wanted and len(mounts) == 1:
+            wanted = mounts[0]
+        if mounts and wanted not in mounts:
+            named = ', '.join(mount or '/' for mount in sorted(mounts))
+            raise FeedError(f'{path} holds the mounts {named}: choose one with --namespace')
+        part = recording.of_mount(wanted)
+        self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
         self.title = f'{recording.short_name} at {rate:g} x'
-        recording.load(self.topics)
-        self._series = [(topic, recording[name]) for name, topic in self.topics.items()]
+        part.load(self.topics)
+        self._series = [(topic, part[name]) for name, topic in self.topics.items()]
         times = [series.receive_times for _, series in self._series]
+        if not sum(map(len, times)):
+            raise FeedError(f'{path} holds no message of the topics of a mount')
         arrivals = np.concatenate(times)
         order = np.argsort(arrivals, kind='stable')
         self._arrivals = arrivals[order]
         self._owners = np.repeat(np.arange(len(times)), [*map(len, times)])[order]
         self._places = np.concatenate([np.arange(len(each)) for each in times])[order]
-        if not len(order):
-            raise FeedError(f'{path} holds no message of the topics of a mount')
         self._seconds = (self._arrivals - self._arrivals[0]) * 1e-9
         if not 0.0 <= begin <= self._seconds[-1]:
             raise FeedError(f'--from ({begin:g} s) must lie within 0 .. {self._seconds[-1]:.3f} s')
@@ -105,10 +109,6 @@ class RecordedFeed:
         if self._thread is not None:
             self._thread.join()
 
-    def mark(self) -> str:
-        """Say that a recording cannot be marked from here."""
-        return 'no mark was set: this is a recording'
-
     def _play(self, receive: Receive) -> None:
         due = int(np.searchsorted(self._seconds, self._begin))
         for owner, (topic, _) in enumerate(self._series):
@@ -122,17 +122,3 @@ class RecordedFeed:
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1
-
-
-def _topics_of(recorded: Mapping[str, object], namespace: str, path: Path) -> dict[str, Topic]:
-    """Return the topics of one mount; raises `FeedError` where several mounts were recorded."""
-    ending = f'/{DISPLACEMENT.name}'
-    spaces = sorted(name.removesuffix(ending) for name in recorded if name.endswith(ending))
-    space = f'/{namespace.strip("/")}' if namespace.strip('/') else ''
-    if not namespace and len(spaces) == 1:
-        space = spaces[0]
-    if spaces and space not in spaces:
-        named = ', '.join(name.lstrip('/') or '/' for name in spaces)
-        raise FeedError(f'{path} holds the mounts {named}: choose one with --namespace')
-    names = {topic.name if topic.name.startswith('/') else f'{space}/{topic.name}': topic for topic in TOPICS}
-    return {name: topic for name, topic in names.items() if name in recorded}

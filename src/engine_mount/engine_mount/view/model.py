@@ -17,7 +17,7 @@ from engine_mount.reports.drawing.chart import Chart, Curve, Panel, level_lines
 from engine_mount.reports.drawing.detail import browser_chart
 from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.evaluation import levels_of
-from engine_mount.settings.chosen import policy_of
+from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.view.alternatives import MOUNTS, Alternatives
 from engine_mount.view.feed import Feed, Message
 from engine_mount.view.state import GraphState
@@ -98,9 +98,8 @@ class Model:
         self.alternatives: Alternatives | None = None
         self._beside = beside
         self._on_failure = on_failure
-        self._lock = threading.Lock()
-        self._arrived: list[Message] = []
-        self._made_with = ''
+        self._arrived: deque[Message] = deque()
+        self._made_with: Parameters = {}
         self._time, self._number, self._newest = 0.0, 0, 0  # s, intervals, ns of arrival
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._serve, name='view', daemon=True)
@@ -110,8 +109,7 @@ class Model:
 
     def take(self, message: Message) -> None:
         """Take a message; cheap, from any thread."""
-        with self._lock:
-            self._arrived.append(message)
+        self._arrived.append(message)
 
     def listen(self, listener: Callable[[Interval], None]) -> None:
         """Call `listener` with each interval from now on, from the thread of the model."""
@@ -139,27 +137,17 @@ class Model:
         return [TRACES[0], *(beside if self.alternatives is not None else []), *TRACES[1:], _LATENCY]
 
     def chart(self) -> dict[str, Any]:
-        """Return the panels for the page's script; `keys` are those of the curves in an interval."""
-        panels, keys = [], []
+        """Return the panels for the page's script; the `key` of a curve is that of an interval's extents."""
+        panels = []
         for name, (unit, share, least) in PANELS.items():
-            traces = [trace for trace in self.traces if trace.panel == name]
-            curves = [
-                Curve(
-                    trace.label,
-                    np.empty(0),
-                    np.empty(0),
-                    COLOUR_OF[trace.key.removeprefix('beside.')],
-                    width=1.0 if trace.key.startswith('beside.') else 1.5,
-                )
-                for trace in traces
-            ]
+            curves = []
+            for label, key in ((trace.label, trace.key) for trace in self.traces if trace.panel == name):
+                colour, width = COLOUR_OF[key.removeprefix('beside.')], 1.0 if 'beside' in key else 1.5
+                curves.append(Curve(label, np.empty(0), np.empty(0), colour, width=width, key=key))
             levels = level_lines(self._levels()) if name == 'displacement' else ()
             label = f'{name} ({unit})' if unit else name
             panels.append(Panel(label, curves, levels=levels, share=share, least=least))
-            keys.append([trace.key for trace in traces])
-        chart = browser_chart(Chart('view', 'view', 'time (s)', panels))
-        panels_json = [{**panel, 'keys': names} for panel, names in zip(chart['panels'], keys, strict=True)]
-        return {**chart, 'panels': panels_json}
+        return browser_chart(Chart('view', 'view', 'time (s)', panels))
 
     def state_json(self) -> dict[str, Any]:
         """Return the state of the graph: nodes, gap, coil, losses, events."""
@@ -199,9 +187,8 @@ class Model:
             while not self._ending.is_set():
                 due += 1.0 / INTERVALS_PER_SECOND
                 self._ending.wait(max(0.0, due - time.monotonic()))
-                with self._lock:
-                    messages, self._arrived = self._arrived, []
-                interval = self.interval(messages)
+                count = len(self._arrived)
+                interval = self.interval([self._arrived.popleft() for _ in range(count)])
                 for listener in self._listeners:
                     listener(interval)
         except Exception as error:
@@ -211,18 +198,16 @@ class Model:
         """Return displacements (m) of the alternatives, made anew where the parameters are others."""
         if not self._beside or SIM_CHASSIS_ACCELERATION not in series:
             return {}
-        if self.alternatives is None or self._made_with != repr(self.state.parameters):
-            self._made_with = repr(self.state.parameters)
+        if self.alternatives is None or self._made_with != self.state.parameters:
+            self._made_with = self.state.parameters
             try:
                 self.alternatives = Alternatives(self.state.parameters)
             except ValueError:  # parameters of another version
                 self._beside, self.alternatives = False, None
                 return {}
         accelerations = _column(series, SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
-        stamps = series[SIM_CHASSIS_ACCELERATION].stamps
-        if len(stamps) != len(accelerations):
-            return {}
-        return self.alternatives.advance(stamps.tolist(), accelerations)
+        stamps = series[SIM_CHASSIS_ACCELERATION].stamps.tolist()
+        return self.alternatives.advance(stamps[: len(accelerations)], accelerations)
 
 
 def _series(topic: Topic, messages: Iterable[Message]) -> Series:

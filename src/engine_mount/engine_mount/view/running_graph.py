@@ -4,19 +4,15 @@ from functools import partial
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
 
 from engine_mount.view.feed import Fail, FeedError, Message, Receive
-from mount_bringup.graph.nodes import RECORDER
 from mount_recorder.collector import Collector
 from mount_ros.environment import loopback_refusal, prepare_environment
 from mount_ros.qos import control_qos
 from mount_ros.topics import TOPICS, Topic
 
-_ANSWER_LIMIT = 3.0  # s, chosen: of the recorder to a mark
 _PERIOD = 0.02  # s, chosen: less than a picture of the page
 
 
@@ -33,7 +29,6 @@ class RunningGraph:
         self._node = Node(
             'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
         )
-        self._mark = self._node.create_client(Trigger, f'{RECORDER.name}/mark')
         self._collector: Collector | None = None
         self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
         self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
@@ -56,19 +51,6 @@ class RunningGraph:
             self._collector.stop()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
-
-    def mark(self) -> str:
-        """Ask the recorder to mark this moment; return its answer."""
-        if not self._mark.service_is_ready():
-            return 'no mark was set: no recorder is there'
-        executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(self._node)
-        call = self._mark.call_async(Trigger.Request())
-        executor.spin_until_future_complete(call, timeout_sec=_ANSWER_LIMIT)
-        executor.remove_node(self._node)
-        executor.shutdown()
-        answer = call.result() if call.done() else None
-        return answer.message if answer is not None else 'no mark was set: the recorder does not answer'
 
 
 def _hand_over(receive: Receive, topic: Topic, raw: bytes, received: int, sent: int) -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -51,7 +52,6 @@ class GraphState:
     gap: dict[str, float] = field(default_factory=dict)
     coil_celsius: float = math.nan
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
-    scenario: str = ''
     events: deque[Mark] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def take(self, message: Message) -> None:
@@ -66,12 +66,8 @@ class GraphState:
         elif message.topic is EVENT:
             self.events.append(read_mark(_decoded(message).data, message.received))
         elif message.topic is SESSION:
-            try:
-                content = session_content(_decoded(message).data)
-            except SessionError:
-                return
-            self.parameters = session_parameters(content)
-            self.scenario = str(content.get('scenario', ''))
+            with suppress(SessionError):
+                self.parameters = session_parameters(session_content(_decoded(message).data))
 
     def values(self) -> dict[str, str]:
         """Return the figures beside the charts, by name, with units."""
@@ -105,7 +101,7 @@ class GraphState:
             for event in reversed(self.events)
         ]
         values = [{'name': name, 'value': value} for name, value in self.values().items()]
-        return {'scenario': self.scenario, 'nodes': nodes, 'values': values, 'events': events}
+        return {'nodes': nodes, 'values': values, 'events': events}
 
     def _take_diagnostics(self, message: Message) -> None:
         for verdict in verdicts_in(_decoded(message)):

@@ -89,7 +89,7 @@ def serve_view(
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
         look = running_model(feed, beside=beside, receivers=receivers, on_failure=ending.set)
         model = stack.enter_context(look)
-        page = Web(model, feed.title, feed.mark, host, port)
+        page = Web(model, feed.title, host, port)
         stack.callback(page.stop)
         page.start()
         say(f'page       {page.address}')

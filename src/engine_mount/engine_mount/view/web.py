@@ -1,8 +1,6 @@
 """The page at localhost: HTTP for its files, a WebSocket for what happens."""
 
-import asyncio
 import json
-from collections.abc import Callable
 from importlib.resources import files
 from typing import Any
 
@@ -13,12 +11,8 @@ from engine_mount.view.model import INTERVALS_PER_SECOND, WINDOW, Interval, Mode
 from engine_mount.view.server import LocalServer
 
 _STATE_EVERY = 10  # intervals, chosen: three times a second
-_FILES = {
-    **dict.fromkeys(('view.html', ''), 'text/html'),
-    **dict.fromkeys(('view.js', 'chart.js'), 'text/javascript'),
-    **dict.fromkeys(('view.css', 'page.css'), 'text/css'),
-}
-_OF_REPORTS = ('chart.js', 'page.css')
+_OWN, _OF_REPORTS = ('view.html', 'view.js', 'view.css'), ('chart.js', 'page.css')
+_TYPES = {'html': 'text/html', 'js': 'text/javascript', 'css': 'text/css'}
 _POLICY = "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' data:; frame-ancestors 'none'"
 
 
@@ -29,20 +23,19 @@ class Web(LocalServer):
     remedy = 'choose another --port'
     backlog = 90  # intervals, chosen: 3 s; a viewer that lags behind them misses some
 
-    def __init__(self, model: Model, title: str, mark: Callable[[], str], host: str, port: int):
+    def __init__(self, model: Model, title: str, host: str, port: int):
         """Bind to `host`; where others can reach it, only with the token that `address` carries."""
         super().__init__(host, port)
-        self._model, self._title, self._mark = model, title, mark
+        self._model, self._title = model, title
         self.address = f'http://{host}:{port}/{self.query}'
         """What to type into a browser."""
         model.listen(self._add)
 
     def routes(self) -> list[web.RouteDef]:
-        """Return the files of the page, its stream, and the mark."""
+        """Return the files of the page and its stream."""
         return [
             web.get('/stream', self.stream),
             web.get('/{name:.*}', _file),
-            web.post('/mark', self._set_mark),
         ]
 
     def greeting(self) -> list[str]:
@@ -57,9 +50,6 @@ class Web(LocalServer):
         }
         return [json.dumps(content)]
 
-    async def _set_mark(self, _: web.Request) -> web.Response:
-        return web.json_response({'answer': await asyncio.to_thread(self._mark)})
-
     def _add(self, interval: Interval) -> None:
         """Take an interval from the thread of the model."""
         if not self.viewers:
@@ -73,10 +63,10 @@ class Web(LocalServer):
 
 
 async def _file(request: web.Request) -> web.Response:
-    name = request.match_info['name']
-    if name not in _FILES:
+    name = request.match_info['name'] or 'view.html'
+    if name not in (*_OWN, *_OF_REPORTS):
         raise web.HTTPNotFound
-    own = files('engine_mount.view') / 'page' / (name or 'view.html')
+    own = files('engine_mount.view') / 'page' / name
     text = asset(name) if name in _OF_REPORTS else own.read_text(encoding='utf-8')
     headers = {'Content-Security-Policy': _POLICY, 'Cache-Control': 'no-store'}
-    return web.Response(text=text, content_type=_FILES[name], headers=headers)
+    return web.Response(text=text, content_type=_TYPES[name.rpartition('.')[2]], headers=headers)

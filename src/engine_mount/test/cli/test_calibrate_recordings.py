@@ -2,18 +2,15 @@
 
 import math
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
-from engine_mount.cli.command import main
 from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
 from engine_mount.signals.mapping import ColumnChoice, Mapping
 from engine_mount.signals.signal import SignalError
-from mount_models.actuator.law import checked_force
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.sampling import SAMPLE_RATE
 from mount_models.specimen import default_specimen, load_specimen
@@ -23,7 +20,7 @@ from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
-from mount_sim.rack.coil import drawn_rack, record_ripple
+from mount_sim.rack import drawn_rack, record_ripple
 
 RACK = drawn_rack(5)
 GAPS = np.linspace(280e-6, 540e-6, 8)
@@ -66,47 +63,25 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     return folder
 
 
-@pytest.fixture(scope='module')
-def recordings(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('rack')
-    warm = [record(folder / f'warm_{gap * 1e6:.1f}um', gap, 80.0, spoil=40) for gap in GAPS[::2]]
-    return [record(folder / f'held_{gap * 1e6:.1f}um', gap, spoil=40) for gap in GAPS] + warm
-
-
-@pytest.fixture(scope='module')
-def calibrated(recordings, tmp_path_factory):
-    """Return the specimen of both commands run on the recordings alone."""
-    specimen = tmp_path_factory.mktemp('out') / 'left.yaml'
-    area = RACK.actuator.turns * RACK.actuator.gap_area
-    for arguments in (
-        ['actuator', *recordings],
-        ['inductance', *recordings, '--turns-area', area, '--base', specimen],
-    ):
-        with pytest.raises(SystemExit) as end:
-            main(['calibrate', *map(str, arguments), '--name', 'left', '--out', str(specimen)])
-        assert end.value.code == 0
-    return specimen
-
-
-def test_force_and_gap_curves_come_out_of_recordings(calibrated):
-    specimen = load_specimen(calibrated, 'left')
-    gaps, currents = np.linspace(300e-6, 500e-6, 5), np.linspace(0.5, 2.4, 10)
-    for gap in gaps:
+def test_force_and_gap_curves_come_out_of_recordings(tmp_path, command):
+    recordings = [record(tmp_path / f'held_{gap * 1e6:.1f}um', gap, spoil=40) for gap in GAPS]
+    recordings += [record(tmp_path / f'warm_{gap * 1e6:.1f}um', gap, 80.0, spoil=40) for gap in GAPS[::2]]
+    written, area = tmp_path / 'left.yaml', RACK.actuator.turns * RACK.actuator.gap_area
+    target = ('--name', 'left', '--out', written)
+    command('calibrate', 'actuator', *recordings, *target)
+    command('calibrate', 'inductance', *recordings, '--turns-area', area, '--base', written, *target)
+    specimen, currents = load_specimen(written, 'left'), np.linspace(0.5, 2.4, 10)
+    for gap in (300e-6, 400e-6, 500e-6):
         truth = np.array([magnetic_force(RACK.actuator, i, gap) for i in currents])
-        fitted = np.array([float(checked_force(specimen.force_law, i, gap)) for i in currents])
+        fitted = checked_force(specimen.force_law, currents, np.full(10, gap))
         assert np.sqrt(np.mean((fitted / truth - 1.0) ** 2)) < 0.01
-    curves = specimen.gap_curves
-    for gap in gaps:
-        measured = record_ripple(RACK, float(gap), duration=1.5, peak_current=2.5)
+        measured = record_ripple(RACK, gap, duration=1.5, peak_current=2.5)
         at_rest = np.mean(measured['flux_rate_t_per_s'][:500] / measured['current_rate_a_per_s'][:500])
-        told = evaluate(curves.gap_of_inductance, specimen.turns_area * at_rest)
+        told = evaluate(specimen.gap_curves.gap_of_inductance, specimen.turns_area * at_rest)
         assert float(told) == pytest.approx(gap, abs=2e-6)
-
-
-def test_the_specimen_names_its_recordings_by_their_hash(calibrated, recordings):
-    parts = yaml.safe_load(calibrated.read_text())['provenance']['parts']
     for part in ('force_law', 'gap_curves'):
-        assert [entry['file'] for entry in parts[part]['recordings']] == [file.name for file in recordings]
+        named = specimen.provenance['parts'][part]['recordings']
+        assert [entry['file'] for entry in named] == [file.name for file in recordings]
 
 
 def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path):
@@ -121,6 +96,9 @@ def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path)
     given = FileValues({bag: 350e-6}, {bag: 20.0})
     (ripple,) = read_ripple([bag], {}, given, AREA)
     assert (ripple.gap, ripple.celsius) == (350e-6, 20.0)
+    (file,) = bag.glob('*.mcap')
+    (of_file,) = read_ripple([file], Mapping(), FileValues({file: 350e-6}), AREA)
+    np.testing.assert_array_equal(of_file.inductance, ripple.inductance)
 
 
 def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
@@ -143,21 +121,14 @@ def test_a_recording_without_what_is_needed_is_refused(tmp_path):
         read_force([bag], Mapping({'force': ColumnChoice('sim/mount_force.wrench.force.z')}), given)
 
 
-def test_a_recording_whose_slopes_are_mostly_missing_is_refused(tmp_path):
-    bag = record(tmp_path / 'held_349um', 349e-6, spoil=5)
-    with pytest.raises(IdentificationError, match='20% of the inductances are not positive, at most 10%'):
+@pytest.mark.parametrize(
+    ('spoiled', 'sentence'),
+    [
+        ({'spoil': 5}, '20% of the inductances are not positive, at most 10%'),
+        ({'warming': 10.0}, r'the coil temperature ran from 20\.0 to 34\.0 degC'),
+    ],
+)
+def test_a_recording_without_slopes_or_of_a_coil_that_warmed_is_refused(tmp_path, spoiled, sentence):
+    bag = record(tmp_path / 'held_349um', 349e-6, **spoiled)
+    with pytest.raises(IdentificationError, match=sentence):
         read_ripple([bag], Mapping(), NOTHING, AREA)
-
-
-def test_a_coil_that_warmed_while_it_was_recorded_is_refused(tmp_path):
-    bag = record(tmp_path / 'held_349um', 349e-6, warming=10.0)
-    with pytest.raises(IdentificationError, match=r'the coil temperature ran from 20\.0 to 34\.0 degC'):
-        read_ripple([bag], Mapping(), NOTHING, AREA)
-
-
-def test_a_single_mcap_file_is_read_as_its_folder_is(tmp_path):
-    bag = record(tmp_path / 'held_349um', 349e-6)
-    (file,) = Path(bag).glob('*.mcap')
-    (of_file,) = read_ripple([file], Mapping(), NOTHING, AREA)
-    (of_folder,) = read_ripple([bag], Mapping(), NOTHING, AREA)
-    np.testing.assert_array_equal(of_file.inductance, of_folder.inductance)

@@ -63,35 +63,30 @@ def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(che
     one, figures = check('one', '--jobs', '1')
     assert one.exit_code == 0, one.output
     assert '2 of 2 manoeuvres within their 11 limits.' in one.output
-    assert all(len(line) <= 80 for line in one.output.splitlines() if 'page' not in line)
-    assert (tmp_path / 'one' / 'check.html').read_text(encoding='utf-8').count('Within all limits.') == 2
+    assert all(len(line) <= 80 for line in one.output.splitlines() if 'recordings' not in line)
     assert (tmp_path / 'one' / 'gap' / 'recording').is_dir()
     assert check('two', '--jobs', '2')[1] == figures
     gap = json.loads(figures)['manoeuvres']['gap']['figures']
     assert gap['peak_over_undamped'] < 0.71
     assert gap['pad_energy_j'] > 0.1
-    assert gap['latency_p99_us'] is None
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('options', 'caught'),
+    ('setting', 'caught'),
     [
+        ('mount_sim.mount=friction_off', {('gap', 'peak_over_undamped'), ('rack', 'friction_error_percent')}),
+        ('mount_control.policy=switched_viscous', {('gap', 'peak_over_undamped')}),
         (
-            ('--mount', 'friction_off'),
-            {('gap', 'peak_over_undamped'), ('rack', 'friction_error_percent')},
-        ),
-        (('--policy', 'switched_viscous'), {('gap', 'peak_over_undamped')}),
-        (
-            ('--set', 'mount_control.continuous_viscous.damping_coefficient=650'),
+            'mount_control.continuous_viscous.damping_coefficient=650',
             {('gap', 'peak_over_undamped'), ('rack', 'cycle_loss_over_hydromount')},
         ),
-        (('--set', 'mount_control.continuous_viscous.lead_time=0.01'), {('rack', 'friction_error_percent')}),
-        (('--set', 'mount_sim.faults=[coil_open@3.8]'), {('gap', 'peak_over_undamped')}),
+        ('mount_control.continuous_viscous.lead_time=0.01', {('rack', 'friction_error_percent')}),
+        ('mount_sim.faults=[coil_open@3.8]', {('gap', 'peak_over_undamped')}),
     ],
 )
-def test_a_worse_controller_fails_by_name(check, options, caught):
-    ended, figures = check('worse', *options)
+def test_a_worse_controller_fails_by_name(check, setting, caught):
+    ended, figures = check('worse', '--set', setting)
     assert ended.exit_code == 1, ended.output
     assert caught <= failed(figures)
     rows = [line.split() for line in ended.output.splitlines()]
@@ -103,14 +98,10 @@ def test_a_worse_controller_fails_by_name(check, options, caught):
 @pytest.mark.parametrize(
     ('options', 'word'),
     [
-        (('--through', 'core,graph'), '--through is core, lockstep, graph'),
         (('--only', 'gpa'), "'gpa' is no manoeuvre of the suite; did you mean gap"),
-        (('--set', 'mount_control.policy'), 'write NAME=VALUE or NODE.NAME=VALUE'),
         (('--set', 'mount_control.polcy=x'), 'did you mean policy'),
-        (('--policy', 'none'), 'none'),
         (('--set', 'mount_sim.motorway.gap_depth=0'), 'is set by the manoeuvre gap itself'),
         (('--suite', 'nowhere.yaml'), 'cannot be read'),
-        (('--jobs', '-1'), '--jobs'),
     ],
 )
 def test_wrong_use_drives_nothing(check, tmp_path, options, word):
@@ -121,7 +112,7 @@ def test_wrong_use_drives_nothing(check, tmp_path, options, word):
     assert not (tmp_path / 'wrong').exists()
 
 
-def test_the_manoeuvres_are_listed(check):
-    listed = CliRunner().invoke(app, ['check', '--list']).output
-    assert listed.splitlines()[0].split() == ['rest', 'Standing,', 'engine', 'off;', 'nothing', 'moves.']
-    assert len(listed.splitlines()) == 15
+def test_the_manoeuvres_are_listed(command):
+    listed = command('check', '--list').splitlines()
+    assert listed[0].split()[:2] == ['rest', 'Standing,']
+    assert len(listed) == 15

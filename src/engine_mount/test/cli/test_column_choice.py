@@ -5,17 +5,16 @@ import pytest
 
 from engine_mount.cli.calibration.given import rack_mapping
 from engine_mount.drives.external_excitation import recorded_acceleration
-from engine_mount.drives.inputs.foreign import default_gap, foreign_input, foreign_order
 from engine_mount.identification.friction.files import friction_mapping, read_recording
-from engine_mount.identification.rack import FileValues, read_force, read_ripple
+from engine_mount.identification.rack import FileValues, read_force
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.importing.reading import read_files
+from engine_mount.signals.importing.reading import read_file
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
 
 GRAVITY, POUND, INCH = 9.80665, 4.4482216152605, 0.0254
-NOTHING = FileValues(celsius_of_others=20.0)
+NOTHING = FileValues()
 TIME = np.arange(2000) / 1000.0
 WAY = 1e-3 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m
 SHAKING = 3.0 * np.sin(2.0 * np.pi * 8.0 * TIME)  # m/s^2
@@ -31,17 +30,9 @@ def drive(file, mapping):
     return np.load(recorded_acceleration(str(file), [], mapping_file=mapping).write(file.parent / 'given'))
 
 
-def replay(file, mapping):
-    order = foreign_order([], offset='0', mapping_file=mapping)
-    return foreign_input(file, order, {}, default_gap({})).controls[0].displacement
-
-
 def imported(file, mapping):
-    return (
-        read_files([str(file)], mapping_in_file(mapping).only(mapping_in_file(mapping).columns))[0]
-        .signals['displacement']
-        .values
-    )
+    chosen = mapping_in_file(mapping)
+    return read_file(file, chosen.only(chosen.columns)).signals['displacement'].values
 
 
 def invert(file, mapping):
@@ -59,9 +50,11 @@ def calibrate(file, mapping):
 
 
 FAMILIES = [
-    (drive, 'acceleration', GRAVITY, SHAKING), (invert, 'acceleration', GRAVITY, SHAKING),
-    (replay, 'displacement', 1e-3, WAY), (imported, 'displacement', 1e-3, WAY),
-    (identify, 'displacement', 1e-3, WAY), (calibrate, 'force', 1e3, FORCE),
+    (drive, 'acceleration', GRAVITY, SHAKING),
+    (invert, 'acceleration', GRAVITY, SHAKING),
+    (imported, 'displacement', 1e-3, WAY),
+    (identify, 'displacement', 1e-3, WAY),
+    (calibrate, 'force', 1e3, FORCE),
 ]  # fmt: skip
 
 
@@ -108,18 +101,6 @@ def test_a_unit_beside_it_makes_a_scale_a_calibration(rig, read, quantity, facto
         assert read(file, path) == pytest.approx(0.98 * values, rel=1e-9, abs=1e-9 * np.abs(values).max())
 
 
-def write_mdf(file, columns):
-    from asammdf import MDF, Signal
-
-    with MDF(version='4.10') as written:
-        size = len(next(iter(columns.values())))
-        written.append(
-            [Signal(values, np.arange(size) / 1000.0, name=name) for name, values in columns.items()]
-        )
-        written.save(file)
-
-
-FORMATS = [('csv', write_csv), ('mf4', write_mdf)]
 MOTION = {'Zeit': 1e3 * TIME, 'way': WAY / INCH, 'cell': FORCE / POUND, 'load': LOAD / POUND / 1e3}
 MOTION_SAID = ['time=Zeit:ms', 'displacement=way:in', 'friction_force=cell:lbf', 'normal_force=load:kip']
 GAP, CURRENT = (grid.ravel() for grid in np.meshgrid(np.linspace(300, 500, 6), np.linspace(0.2, 3.0, 9)))
@@ -128,17 +109,14 @@ FORCES = {'Spalt': GAP / 25.4, 'Strom': 1e3 * CURRENT, 'Kraft': PULL / POUND}
 FORCES_SAID = ['gap=Spalt:mil', 'current=Strom:mA', 'force=Kraft:lbf']
 
 
-@pytest.mark.parametrize(('suffix', 'write'), FORMATS, ids=[suffix for suffix, _ in FORMATS])
-def test_rigs_and_racks_are_read_in_imperial_units_of_every_format(tmp_path, suffix, write):
-    write(tmp_path / f'rig.{suffix}', MOTION)
-    found = read_recording(tmp_path / f'rig.{suffix}', friction_mapping(MOTION_SAID))
+def test_rigs_and_racks_are_read_in_imperial_units(tmp_path):
+    found = read_recording(write_csv(tmp_path / 'rig.csv', MOTION), friction_mapping(MOTION_SAID))
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
     assert found.normal_force[:, 1] == pytest.approx(LOAD, rel=1e-9)
-    write(tmp_path / f'force.{suffix}', FORCES)
     mapping = rack_mapping(FORCES_SAID, Mapping(), Stated())
-    points = read_force([tmp_path / f'force.{suffix}'], mapping, NOTHING)
+    points = read_force([write_csv(tmp_path / 'force.csv', FORCES)], mapping, NOTHING)
     assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
     assert points.current == pytest.approx(CURRENT, rel=1e-9)
     assert points.force == pytest.approx(PULL, rel=1e-9)
@@ -146,31 +124,20 @@ def test_rigs_and_racks_are_read_in_imperial_units_of_every_format(tmp_path, suf
 
 def test_titles_of_rigs_and_racks_tell_quantity_and_unit(tmp_path):
     titled = {
-        'time [ms]': 1e3 * TIME,
-        'displacement [mm]': 1e3 * WAY,
-        'friction_force (kip)': FORCE / POUND / 1e3,
+        'time [ms]': 1e3 * TIME, 'displacement [mm]': 1e3 * WAY, 'friction_force (kip)': FORCE / POUND / 1e3,
         'normal_force_n': LOAD,
-    }
-    write_csv(tmp_path / 'rig.csv', titled)
-    found = read_recording(tmp_path / 'rig.csv')
+    }  # fmt: skip
+    found = read_recording(write_csv(tmp_path / 'rig.csv', titled))
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
-    assert found.normal_force[:, 0] == pytest.approx(LOAD, rel=1e-9)
-    write_csv(tmp_path / 'F.csv', {'gap [mm]': 1e-3 * GAP, 'current_a': CURRENT, 'force_kn': 1e-3 * PULL})
-    points = read_force([tmp_path / 'F.csv'], Mapping(), NOTHING)
+    titled = {'gap [mm]': 1e-3 * GAP, 'current_a': CURRENT, 'force_kn': 1e-3 * PULL}
+    points = read_force([write_csv(tmp_path / 'F.csv', titled)], Mapping(), NOTHING)
     assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
     assert points.force == pytest.approx(PULL, rel=1e-9)
-    ripple = {'gap_um': GAP, 'current_a': CURRENT, 'inductance_mh': 20.0 / (1.0 + CURRENT) * (300.0 / GAP)}
-    write_csv(tmp_path / 'L.csv', {**ripple, 'coil_temperature_c': 20.0 + 0.0 * GAP})
-    recordings = read_ripple([tmp_path / 'L.csv'], Mapping(), NOTHING, 0.1)
-    assert {one.celsius for one in recordings} == {20.0}
-    assert np.concatenate([one.inductance for one in recordings]).max() == pytest.approx(
-        1e-3 * ripple['inductance_mh'].max()
-    )
 
 
-def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs_and_racks(tmp_path):
+def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs(tmp_path):
     (tmp_path / 'rig.yaml').write_text(
         'time: {column: Zeit, unit: ms}\ncolumns:\n  displacement: {column: way, unit: in, offset: mean}\n'
         '  force: {column: cell, unit: lbf, scale: -1}\n  normal_force: {column: load, unit: kip}\n'
@@ -179,34 +146,18 @@ def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs_and_racks(tmp_
     found = read_recording(tmp_path / 'rig.csv', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
-    (tmp_path / 'rack.yaml').write_text(
-        'columns:\n  force: {column: Kraft, unit: lbf, offset: 2.0}\n  air_gap: {column: Spalt, unit: mil}\n'
-        '  current: {column: Strom, unit: mA}\n'
-    )
-    write_csv(tmp_path / 'F.csv', FORCES)
-    mapping = rack_mapping([], mapping_in_file(tmp_path / 'rack.yaml'), Stated())
-    assert read_force([tmp_path / 'F.csv'], mapping, NOTHING).force == pytest.approx(PULL - 2.0)
 
 
 @pytest.mark.parametrize(
     ('said', 'words'),
     [
         ('displacement=way:lbf', 'is in lbf, as you say: that is of force, but displacement is of length'),
-        ('friction_force=cell:g', 'that is of acceleration, but friction_force is of force'),
         ('friction_force=load_cell:N', "has no column 'load_cell'"),
         ('normal_force=load', 'no unit is said; values from'),
         ('displacement=way:km', r'a range of 78\.7\d m is more than the 1 m'),
     ],
 )
 def test_what_cannot_be_is_refused(tmp_path, said, words):
-    write_csv(tmp_path / 'rig.csv', MOTION)
     options = {one.partition('=')[0]: one for one in (*MOTION_SAID, said)}
     with pytest.raises(SignalError, match=words):
-        read_recording(tmp_path / 'rig.csv', friction_mapping(options.values()))
-    write_csv(tmp_path / 'F.csv', FORCES)
-    with pytest.raises(SignalError, match='that is of force, but gap is of length'):
-        read_force(
-            [tmp_path / 'F.csv'],
-            rack_mapping(['gap=Spalt:N', *FORCES_SAID[1:]], Mapping(), Stated()),
-            NOTHING,
-        )
+        read_recording(write_csv(tmp_path / 'rig.csv', MOTION), friction_mapping(options.values()))

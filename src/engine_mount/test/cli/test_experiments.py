@@ -2,13 +2,10 @@
 
 import json
 
-import numpy as np
 import pytest
 import yaml
-from typer.testing import CliRunner
 
 import engine_mount
-from engine_mount.cli.command import app
 from engine_mount.experiments import (
     field_penetration,
     force_characteristic,
@@ -19,11 +16,8 @@ from engine_mount.experiments import (
 )
 from engine_mount.experiments.harness.experiment import Claim, Experiment, Holds, Outcome, holds_if
 from engine_mount.experiments.registry import NAMES, experiment, experiment_named, experiments_named
-from engine_mount.identification.rack import FileValues, read_ripple
 from engine_mount.recordings.audit import audit
-from engine_mount.signals.mapping import Mapping
 from mount_models.friction.contact import FrictionContact
-from mount_models.specimen import default_specimen
 
 PNG = b'\x89PNG'
 SHORT_SAWTOOTH = {
@@ -36,10 +30,6 @@ SHORT_SAWTOOTH = {
 }
 
 
-def command(*arguments):
-    return CliRunner().invoke(app, ['experiment', *arguments])
-
-
 def check(outcome):
     json.dumps(outcome.figures, allow_nan=False)
     assert all(picture.read_bytes().startswith(PNG) for picture in outcome.pictures)
@@ -50,26 +40,18 @@ def check(outcome):
 # Contract and command.
 
 
-def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
+def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats(command):
     for name in NAMES:
-        experiment = experiment_named(name)
-        assert experiment.name == name
-        assert experiment.title
-        assert experiment.reference.startswith('Sec' if experiment.needs else 'Fig')
-        assert list(experiment.known_settings()) == [name]
-
-
-def test_all_are_those_that_need_nothing_and_those_that_are_named_besides():
+        known = experiment_named(name)
+        assert known.name == name
+        assert known.title
+        assert known.reference.startswith('Sec' if known.needs else 'Fig')
     needing = [name for name in NAMES if experiment_named(name).needs]
-    assert needing == ['recorded_drive', 'measured_road']
-    chosen = [each.name for each in experiments_named(['all', needing[0]])]
-    assert chosen == [name for name in NAMES if name != needing[1]]
-
-
-def test_the_list_names_every_experiment():
-    shown = command('--list')
-    assert shown.exit_code == 0
-    named = [line.split()[0] for line in shown.output.splitlines() if line[1:2].strip()]
+    assert needing == ['recorded_drive']
+    assert [each.name for each in experiments_named(['all'])] == [
+        name for name in NAMES if name not in needing
+    ]
+    named = [line.split()[0] for line in command('experiment', '--list').splitlines() if line[1:2].strip()]
     assert named[2:] == list(NAMES)  # behind the head and its line
 
 
@@ -77,11 +59,10 @@ def test_the_list_names_every_experiment():
     ('arguments', 'sentence'),
     [
         (['sawtooh'], "'sawtooh' is no experiment; known are force_characteristic"),
-        (['sawtooth', '--graph'], 'sawtooth has no graph to run through'),
         (['sawtooth', '--set', 'sawtooth.amplitud=1'], 'did you mean amplitude'),
         (['sawtooth', '--set', 'sawtooth.amplitude=1'], 'must lie within 0.0005 .. 0.01 m'),
         (['sawtooth', '--set', 'mount_sim.seed=1'], "'mount_sim' is no owner of parameters here"),
-        (['sensitivity', '--set', 'sensitivity.damper=stiff'], 'no damper curve'),
+        (['sawtooth', '--set', 'sawtooth.amplitude'], 'NODE.NAME=VALUE'),
         (['bench', '--set', 'bench.damper=stiff'], 'no damper curve'),
         (
             ['bench', '--set', 'mount_sim.mount=hydro'],
@@ -90,35 +71,23 @@ def test_the_list_names_every_experiment():
         (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
     ],
 )
-def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path):
+def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path, refused):
     out = tmp_path / 'out'
-    refused = command(*arguments, '--out', str(out))
-    assert refused.exit_code != 0
-    assert isinstance(refused.exception, ValueError)
-    assert sentence in str(refused.exception)
+    assert sentence in refused('experiment', *arguments, '--out', out)
     assert not (out.exists() and any(out.iterdir()))
 
 
-def test_a_setting_without_a_value_is_a_wrong_use(tmp_path):
-    refused = command('sawtooth', '--set', 'sawtooth.amplitude', '--out', str(tmp_path / 'out'))
-    assert refused.exit_code == 2
-    assert 'NODE.NAME=VALUE' in refused.output
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_folder_that_holds_something_is_refused(tmp_path):
+def test_a_folder_that_holds_something_is_refused(tmp_path, refused):
     (tmp_path / 'precious').touch()
-    refused = command('ramp_and_hold', '--out', str(tmp_path))
-    assert 'is not empty; choose another folder' in str(refused.exception)
+    assert 'is not empty; choose another folder' in refused('experiment', 'ramp_and_hold', '--out', tmp_path)
 
 
-def test_the_command_writes_figures_page_and_pictures(tmp_path):
+def test_the_command_writes_figures_page_and_pictures(tmp_path, command):
     out, figures, written = tmp_path / 'out', tmp_path / 'r.json', tmp_path / 'docs' / 'e.md'
-    done = command(
-        'ramp_and_hold', '--out', str(out), '--json', str(figures), '--page', str(written),
+    command(
+        'experiment', 'ramp_and_hold', '--out', out, '--json', figures, '--page', written,
         '--set', 'ramp_and_hold.hold_time=2',
     )  # fmt: skip
-    assert done.exit_code == 0, done.output
     assert json.loads(figures.read_text())['time_constant_s'] > 0.0
     assert '![Ramp and hold of the sticking contact](figures/ramp_and_hold.png)' in written.read_text()
     assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
@@ -132,11 +101,11 @@ def test_the_page_puts_pictures_beside_claims_counts_the_answers_and_leads_to_an
         Claim('Fig. 1', 'it is so', 'it was not', Holds.NO),
         Claim('Fig. 2', 'so too', 'it was', Holds.YES),
     ]
-    known = Experiment('a', 'A thing', 'Fig. 1', 'How.', FrictionContact(), lambda order: None)
+    known = Experiment('bench', 'How.', FrictionContact(), lambda order: None)
     docs = tmp_path / 'docs'
-    page.write_page([Outcome(known, {}, claims, [picture], pages=[own])], docs / 'page.md')
+    page.write_page([Outcome(known, {}, claims, [picture], [], [own])], docs / 'page.md')
     text = (docs / 'page.md').read_text()
-    assert '| [A thing](#a) | Fig. 1 | 1 |  | 1 |  |' in text
+    assert f'| [{known.title}](#bench) | Fig. 13 | 1 |  | 1 |  |' in text
     assert '| Fig. 1 | it is so | it was not | no |' in text
     assert '[own.md](own.md)' in text
     assert (docs / 'own.md').read_text() == 'own'
@@ -219,15 +188,6 @@ def test_the_inductance_map_finds_the_gaps_of_the_assembled_actuator(tmp_path):
     assert any(low <= 0.2 <= high for low, high in figures['unique_currents_a'])
     (folder,) = outcome.recordings
     assert {'/coil_ripple', '/air_gap', '/session'} <= set(engine_mount.open(folder).topics)
-    _check_that_calibration_reads_the_ramp(folder, figures['ramp_inductance_at_rest_h'])
-
-
-def _check_that_calibration_reads_the_ramp(folder, inductance_at_rest):
-    turns_area = default_specimen().turns_area
-    (ripple,) = read_ripple([folder], Mapping(), FileValues({folder: 492e-6}, {}), turns_area)
-    assert ripple.celsius == 20.0
-    resting = np.abs(ripple.current - 0.2) < 0.005
-    assert np.nanmean(ripple.inductance[resting]) == pytest.approx(inductance_at_rest, rel=1e-3)
 
 
 def test_both_computations_of_the_penetration_agree_at_rest(tmp_path):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from engine_mount.experiments import bench, motorway_gap, sensitivity, sweep
-from engine_mount.experiments.harness.closed_loop import Case, run_case, run_cases
+from engine_mount.experiments.harness.closed_loop import Case, run_case
 from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.harness.measures import peak_and_rms, sweep_parameters
-from engine_mount.experiments.registry import NAMES, experiment, experiment_named
+from engine_mount.experiments.registry import experiment
 from engine_mount.experiments.sweep import defined_peak
 from engine_mount.recordings.recording import open_recording
 from mount_models.damper import damper_curve
@@ -37,9 +37,7 @@ def rack(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def swept(tmp_path_factory):
-    return experiment(
-        sweep.NAME, out=tmp_path_factory.mktemp('sweep'), last_frequency=14.5, idle_amplitude=0.0
-    )
+    return experiment(sweep.NAME, out=tmp_path_factory.mktemp('sweep'), last_frequency=14.5)
 
 
 @pytest.fixture(scope='module')
@@ -53,9 +51,11 @@ def gaps(tmp_path_factory):
 def test_the_rack_writes_recordings_pictures_and_plain_figures(rack):
     check(rack)
     assert len(rack.recordings) == 6
-    assert len(rack.figures['harmonics_n']) == 8
-    chosen = rack.figures['runs'][rack.figures['damper']]
-    assert all(rack.figures[key] == chosen[key] for key in ('harmonics_n', 'thd', 'loss_energy_j'))
+    assert len(rack.figures['runs'][rack.figures['damper']]['harmonics_n']) == 8
+    runs = rack.figures['runs']
+    assert {1, 3, 5, 7} <= set(runs['viscous_3000']['lower_than_hydromount'])
+    assert 7 not in runs['viscous_4000']['lower_than_hydromount']
+    assert runs['viscous_2000']['thd'] <= 0.5 * runs[bench.HYDRO]['thd']
 
 
 @pytest.mark.parametrize(
@@ -72,13 +72,7 @@ def test_mounts_without_control_have_their_known_harmonics_and_loss(rack, name, 
 
 
 @pytest.mark.parametrize(
-    ('damper', 'first', 'loss_stiffness'),
-    [
-        ('viscous_1000', 190.8, 59e3),
-        ('viscous_2000', 209.5, 105e3),
-        ('viscous_3000', 236.3, 151e3),
-        ('viscous_4000', 268.7, 198e3),
-    ],
+    ('damper', 'first', 'loss_stiffness'), [('viscous_1000', 190.8, 59e3), ('viscous_4000', 268.7, 198e3)]
 )
 def test_each_characteristic_gives_its_first_harmonic_and_loss(rack, damper, first, loss_stiffness):
     found = rack.figures['runs'][damper]
@@ -99,28 +93,6 @@ def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack
         assert float(told_here) == pytest.approx(here, abs=0.01)
         # the light pressure of 2 N fills the dead zone a little, the fitted force law bends the rest
         assert here == pytest.approx(exact, rel=0.1)
-
-
-def test_odd_harmonics_lie_below_those_of_the_hydromount_up_to_3000(rack):
-    for damper in ('viscous_1000', 'viscous_2000', 'viscous_3000'):
-        assert {1, 3, 5, 7} <= set(rack.figures['runs'][damper]['lower_than_hydromount'])
-    runs = rack.figures['runs']
-    assert 7 not in runs['viscous_4000']['lower_than_hydromount']
-    assert runs['viscous_2000']['thd'] <= 0.5 * runs[bench.HYDRO]['thd']
-
-
-def test_plain_coulomb_has_the_harmonics_of_a_rectangle_and_no_even_ones(rack):
-    found = rack.figures['runs'][bench.COULOMB]['harmonics_n']
-    rectangle = 400.0 / np.pi
-    expected = [np.hypot(160.0, rectangle), 0, rectangle / 3, 0, rectangle / 5, 0, rectangle / 7, 0]
-    assert found == pytest.approx(expected, rel=0.01, abs=0.1)
-
-
-def test_other_parameters_of_nodes_reach_the_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(bench, 'FAMILY', ('viscous_2000',))  # one characteristic tells it
-    loose = {'mount_sim': {'friction.scale': 0.5}}
-    outcome = experiment(bench.NAME, out=tmp_path, **loose, settling=0.5, periods=4)
-    assert outcome.figures['runs']['viscous_2000']['loss_stiffness_n_per_m'] < 70e3
 
 
 @pytest.mark.parametrize('mount', ['friction', 'hydro'])
@@ -149,10 +121,9 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
 
 def test_the_sweep_names_its_bands(swept):
     check(swept)
-    edges = swept.figures['band_edges_hz']
-    assert edges == [float(k) for k in range(1, 16)]
-    assert len(swept.figures['peak_displacement_m']) == len(edges) - 1
-    assert len(swept.figures['chassis_acceleration_rms']) == len(edges) - 1
+    chosen = swept.figures['runs'][sweep.FRICTION]
+    assert chosen['bands_hz'] == [k + 0.5 for k in range(1, 15)]
+    assert len(chosen['peak_displacement_m']) == 14
 
 
 @pytest.mark.parametrize(
@@ -172,45 +143,33 @@ def test_undamped_and_always_damped_peaks_are_those_of_the_laws(swept):
     runs = swept.figures['runs']
     assert runs[sweep.OFF]['resonance_peak_m'] == pytest.approx(3.47e-3, rel=0.03)
     assert runs[sweep.ALWAYS]['resonance_peak_m'] == pytest.approx(0.73e-3, rel=0.03)
-    before_switching = 5  # the band from 6 Hz on, in which the switched mount reaches 0.95 mm
-    assert runs[sweep.ALWAYS]['peak_displacement_m'][before_switching] == pytest.approx(0.72e-3, rel=0.03)
-    assert runs[sweep.ALWAYS]['resonance_peak_m'] <= 0.3 * runs[sweep.OFF]['resonance_peak_m']
 
 
-def test_damping_comes_and_goes_at_its_frequencies(swept):
+def test_damping_comes_and_goes_and_only_the_hydromount_shows_a_resonance_peak(swept):
     friction = swept.figures['runs'][sweep.FRICTION]
     assert friction['switched_on_hz'] == pytest.approx([6.66], abs=0.03)
     assert friction['switched_off_hz'] == pytest.approx([11.57], abs=0.06)
-
-
-def test_only_the_hydromount_shows_a_resonance_peak(swept):
-    assert swept.figures['runs'][sweep.FRICTION]['defined_peak'] is None
+    assert friction['defined_peak'] is None
     assert swept.figures['runs'][sweep.HYDRO]['defined_peak'][0] == 9.5
-    # the sweep ends before the bands of isolation
-    assert swept.figures['runs'][sweep.FRICTION]['isolation_rms'] == [None, None, None]
+    assert friction['isolation_rms'] == [None, None, None]  # the sweep ends before the bands of isolation
     assert [each.holds for each in swept.claims] == [Holds.YES] * 3 + [Holds.NOT_COMPARABLE]
 
 
 def test_a_resonance_peak_is_a_local_maximum_well_above_the_switch_on_level():
-    edges = [5.0, 6.0, 7.0, 8.0]
-    assert defined_peak(edges, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
-    assert defined_peak(edges, [0.4, 0.9, 0.6, 0.5], 0.8) is None
-    assert defined_peak(edges, [0.4, 1.1, 1.2, 1.3], 0.8) is None
+    middles = [5.5, 6.5, 7.5, 8.5]
+    assert defined_peak(middles, [0.4, 1.1, 0.6, 0.5], 0.8) == (6.5, 1.1)
+    assert defined_peak(middles, [0.4, 0.9, 0.6, 0.5], 0.8) is None
+    assert defined_peak(middles, [0.4, 1.1, 1.2, 1.3], 0.8) is None
 
 
 # Gap.
 
 
-def test_damping_comes_one_period_after_the_level_is_exceeded(gaps):
+def test_damping_comes_one_period_after_the_level_is_exceeded_and_leaves_less_ringing(gaps):
     check(gaps)
     for found in gaps.figures['gaps'].values():
         assert 0.125 <= found['on_delay_s'] <= 0.200
         assert found['off_delay_in_band_s'] == pytest.approx(0.126, abs=0.002)
-    assert gaps.figures['rms_m'] == gaps.figures['gaps']['20 mm']['rms_m']
-
-
-def test_damping_leaves_less_of_the_ringing_than_none(gaps):
-    for found in gaps.figures['gaps'].values():
         assert found['rms_m'][motorway_gap.FRICTION] < 0.6 * found['rms_m'][motorway_gap.OFF]
 
 
@@ -241,12 +200,11 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     order = sensitivity.EXPERIMENT.order(tmp_path, {sensitivity.NAME: settings})
     outcome = sensitivity.EXPERIMENT.run(order.shown_on(lambda share, what: told.append(what)))
     check(outcome)
-    assert 'sensitivity: 11 of 11 runs' in told
+    assert 'sensitivity: 9 of 9 runs' in told
     ratios = np.array(outcome.figures['peak_ratio'])[:, 0, 0, 0]
     assert ratios[1] == pytest.approx(0.72, rel=0.03)
     assert ratios[0] > 1.3
     text = outcome.pages[0].read_text()
-    assert '| displacement, V0 = 0.06 m/s, R_d = 1e+08, F_i = 0 N | 1.78 | 1.78 | yes |' in text
     assert 'at V0 = 0.12 m/s it wins whatever the rest; at V0 = 0.06 m/s it loses whatever the rest' in text
     assert [statement.holds for statement in outcome.claims] == [
         Holds.PARTLY,
@@ -257,27 +215,13 @@ def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
     assert orders == {0.25: [1, 2, 3, 4, 5, 6, 7, 8], 0.0: [1, 3, 5, 7]}
 
 
-@pytest.mark.parametrize('text', ['', 'fast', '0.1, 0.1', '0.1, 3'])
+@pytest.mark.parametrize('text', ['fast', '0.1, 0.1', '0.1, 3'])
 def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
     with pytest.raises(ParameterError, match=r'sensitivity\.road_levels'):
         experiment(sensitivity.NAME, out=tmp_path, road_levels=text)
-
-
-def test_what_fails_in_a_process_ends_the_grid_with_its_reason():
-    order = sensitivity.EXPERIMENT.order(Path(), {sensitivity.NAME: {'workers': 1}})
-    with pytest.raises(ValueError, match='nowhere'):
-        run_cases(order, {'wrong': Case({'mount_sim': {'scenario': 'nowhere'}}, peak_and_rms)})
 
 
 def test_a_job_of_the_grid_is_the_run_that_the_experiment_records(swept):
     sim = {**sweep_parameters(0.12, 14.5), 'mount': 'hydro'}
     case = Case({'mount_sim': sim, 'mount_control': {'policy': 'switched_viscous'}}, peak_and_rms)
     assert run_case(case)['peak_m'] == swept.figures['runs'][sweep.HYDRO]['highest_peak_m']
-
-
-# Contract.
-
-
-def test_closed_loop_experiments_take_the_nodes_parameters_and_the_graph():
-    closed = {name for name in NAMES if experiment_named(name).closed_loop}
-    assert closed == {'bench', 'sweep', 'motorway_gap', 'measured_road', 'recorded_drive'}

@@ -58,24 +58,16 @@ def test_it_writes_recordings_pictures_plain_figures_and_a_page_without_places(d
         assert f'(figures/{picture.name})' in text
 
 
-def test_the_chassis_moves_as_recorded(driven):
+def test_the_chassis_moves_as_recorded_and_damping_works_in_the_burst_alone(driven):
     low, middle, high = driven.figures['acceleration_band_rms_m_s2']
     assert high == pytest.approx(0.3 / np.sqrt(2), rel=0.03)
     assert middle == pytest.approx(2.0 / np.sqrt(2) * np.sqrt(1.0 / 14.0), rel=0.05)
     assert low < 0.2 * middle
-
-
-def test_damping_comes_on_in_the_burst_and_lowers_the_displacement(driven):
-    assert driven.figures['times_on'] >= 1
     assert 6.1 < driven.figures['switched_on_s'][0] < 6.6
-    at_events = {
-        name: each['displacement_band_rms_at_events_m'][1] for name, each in driven.figures['runs'].items()
-    }
-    assert at_events[FRICTION] < 0.7 * at_events[ELASTOMER]
-
-
-def test_away_from_the_burst_the_friction_mount_is_the_elastomer_alone(driven):
-    forces = {name: each['force_band_rms_else_n'][2] for name, each in driven.figures['runs'].items()}
+    runs = driven.figures['runs']
+    in_burst = {name: each['displacement_band_rms_at_events_m'][1] for name, each in runs.items()}
+    assert in_burst[FRICTION] < 0.7 * in_burst[ELASTOMER]
+    forces = {name: each['force_band_rms_else_n'][2] for name, each in runs.items()}
     assert forces[FRICTION] == pytest.approx(forces[ELASTOMER], rel=0.02)  # swinging out
     assert forces[HYDRO] > 1.1 * forces[ELASTOMER]
 
@@ -89,39 +81,25 @@ def test_a_drive_without_damping_says_so(tmp_path):
     )
     json.dumps(outcome.figures, allow_nan=False)
     assert outcome.figures['times_on'] == 0
-    assert 'Damping was never on' in outcome.pages[0].read_text()
+    assert 'Damping went on 0 times' in outcome.pages[0].read_text()
     assert outcome.claims[1].holds is Holds.NOT_COMPARABLE
-
-
-def test_a_sine_has_its_rms_in_its_own_band():
-    time = np.arange(20000) * SAMPLE_TIME
-    for frequency, expected in zip((3.0, 8.0, 20.0), np.sqrt(2.0) * np.eye(3), strict=True):
-        values = 5.0 + 2.0 * np.sin(2 * np.pi * frequency * time)
-        assert rms_in_bands(values, BANDS) == pytest.approx(expected, rel=0.01, abs=0.02)
 
 
 def test_a_part_of_the_time_has_the_rms_of_that_part():
     time = np.arange(20000) * SAMPLE_TIME
     values = np.where(time < 10.0, 1.0, 3.0) * np.sin(2 * np.pi * 8.0 * time)
-    late = time > 11.0
-    assert rms_in_bands_within(values, late)[1] == pytest.approx(3.0 / np.sqrt(2), rel=0.03)
+    assert rms_in_bands_within(values, time > 11.0)[1] == pytest.approx(3.0 / np.sqrt(2), rel=0.03)
     assert rms_in_bands_within(values, time < 9.0)[1] == pytest.approx(1.0 / np.sqrt(2), rel=0.03)
     assert rms_in_bands_within(values, np.zeros(len(values), bool)) is None
 
 
-def test_without_a_file_it_says_what_to_give(tmp_path):
-    with pytest.raises(
-        ExperimentError, match=r'needs a recorded vertical acceleration .* --set recorded_drive\.file='
-    ):
-        experiment(recorded_drive.NAME, out=tmp_path / 'other', file='')
-
-
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
+    out, file = tmp_path / 'out', str(tmp_path / 'none.csv')
+    with pytest.raises(ExperimentError, match=r'needs a recorded vertical .* --set recorded_drive\.file='):
+        experiment(recorded_drive.NAME, out=out, file='')
     with pytest.raises(SourceError, match='no such file'):
-        experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'))
-    with pytest.raises(ExperimentError, match=r'duration \(5 s\) must be at least 12\.3 s'):
-        experiment(recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'none.csv'), duration=5.0)
-    assert not (tmp_path / 'out').exists()
+        experiment(recorded_drive.NAME, out=out, file=file)
+    assert not out.exists()
 
 
 def test_alone_its_own_page_is_the_page(driven, tmp_path):

@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 from engine_mount.cli.command import app
 
 RUNNER = CliRunner(env={'COLUMNS': '80', 'NO_COLOR': '1', 'TERM': 'dumb'})
-WITHOUT_EXAMPLE = {'prepare'}
 
 
 def leaves(group, prefix=()):
@@ -24,20 +23,16 @@ def leaves(group, prefix=()):
 COMMANDS = sorted(leaves(get_command(app)))
 
 
-@pytest.mark.parametrize('words', [(), ('calibrate',), ('identify',), *COMMANDS], ids=' '.join)
-def test_help_fits_80_columns_and_names_no_type_of_python(words):
+@pytest.mark.parametrize('words', [(), ('calibrate',), *COMMANDS], ids=' '.join)
+def test_help_fits_80_columns_names_no_type_of_python_and_gives_an_example(words):
     shown = RUNNER.invoke(app, [*words, '--help'])
     assert shown.exit_code == 0
     assert max(map(len, shown.output.splitlines())) <= 80
     assert not re.search(r'<\w+|list\[|\{\w+\}', shown.output)
-
-
-@pytest.mark.parametrize('words', COMMANDS, ids=' '.join)
-def test_help_says_what_an_option_takes_and_gives_an_example(words):
-    shown = RUNNER.invoke(app, [*words, '--help']).output
-    assert words[-1] in WITHOUT_EXAMPLE or f'engine-mount {" ".join(words)}' in shown.split('╯')[-1]
-    assert words[-1] == 'prepare' or 'xit code' in shown
-    for option in re.findall(r'--[\w-]+ +NUMBER +(.*)', shown):
+    if words in COMMANDS and words != ('prepare',):
+        assert f'engine-mount {" ".join(words)}' in shown.output.split('╯')[-1]
+        assert 'xit code' in shown.output
+    for option in re.findall(r'--[\w-]+ +NUMBER +(.*)', shown.output):
         assert option.strip(' │'), 'an option without a word of help'
 
 

@@ -1,24 +1,19 @@
-"""Measured roads from the command line: Belgian blocks as OpenCRG, driven by the whole vehicle."""
+"""Measured roads from the command line: Belgian blocks, driven by the whole vehicle."""
 
-import json
 import shutil
-import struct
 
 import numpy as np
 import pytest
 import yaml
 
-from engine_mount.cli.command import main
 from engine_mount.recordings.place import recording_hash
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session
-from mount_control.policy.registry import POLICIES
 from mount_sim.excitation.road import RandomRoad, random_road
 
 pytestmark = pytest.mark.slow
 
 STONE = 0.16  # m
-SPEEDS = ('30', '60', '120')
 
 
 def stones(places, seed):
@@ -31,141 +26,56 @@ def stones(places, seed):
 
 @pytest.fixture(scope='module')
 def blocks(tmp_path_factory):
-    """An OpenCRG file of Belgian blocks, 110 m, three tracks, KRBI."""
+    """A table of Belgian blocks, 110 m."""
     places = np.arange(0.0, 110.0, 0.01)
-    table = np.stack([stones(places, seed) for seed in (1, 2, 3)], axis=1)
-    head = ['$CT', 'Belgian blocks by a formula', '$', '$ROAD_CRG', 'REFERENCE_LINE_INCREMENT = 0.01', '$']
-    head += [
-        '$KD_DEFINITION',
-        '#:KRBI',
-        *(f'D:long section at v = {v},m' for v in (-0.75, 0.0, 0.75)),
-        '$',
-        '$' * 80,
-    ]
-    numbers = table.astype('>f4').tobytes()
-    numbers += struct.pack('>f', float('nan')) * ((-len(numbers) % 80) // 4)
-    file = tmp_path_factory.mktemp('roads') / 'blocks.crg'
-    file.write_bytes(('\n'.join(head) + '\n').encode() + numbers)
+    file = tmp_path_factory.mktemp('roads') / 'blocks.csv'
+    columns = np.c_[places, stones(places, 2)]
+    np.savetxt(file, columns, delimiter=',', header='distance [m],height [m]', comments='')
     return file
-
-
-def command(*words, code=0):
-    with pytest.raises(SystemExit) as ended:
-        main([str(word) for word in words])
-    assert ended.value.code == code
 
 
 def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
 
 
-def test_belgian_blocks_are_driven_at_three_speeds_by_each_policy_and_the_hydromount(blocks, tmp_path):
-    figures = tmp_path / 'figures.json'
-    own = (f'measured_road.road={blocks}', 'measured_road.speeds=30,60,120', 'measured_road.workers=1')
-    words = [word for setting in own for word in ('--set', setting)]
-    command(
-        'experiment',
-        'measured_road',
-        *words,
-        '--out',
-        tmp_path / 'runs',
-        '--page',
-        tmp_path / 'p.md',
-        '--json',
-        figures,
-    )
-    told = json.loads(figures.read_text())
-    told = told.get('measured_road', told)
-    assert tuple(told['runs']) == SPEEDS
-    for speed, runs in told['runs'].items():
-        assert set(runs) == {*POLICIES, 'no current', 'hydromount'}
-        assert runs['no current']['friction_power_w'] < 1e-6 < runs['continuous_viscous']['friction_power_w']
-        assert runs['continuous_viscous']['displacement_rms_m'] < runs['no current']['displacement_rms_m']
-        assert runs['hydromount']['seconds'] == pytest.approx(109.99 * 3.6 / float(speed) - 1.0, abs=0.05)
-    page = (tmp_path / 'p.md').read_text()
-    assert all(f'## {speed} km/h' in page for speed in SPEEDS)
-    assert 'wavelength of 0.16 m' in page
-
-
-def test_a_drive_over_a_road_tells_its_origin_and_rolls_over_its_stones(blocks, tmp_path):
-    command(
-        'drive',
-        '--road',
-        blocks,
-        '--speed',
-        '30/3.6',
-        '--core',
-        '--no-report',
-        '--duration',
-        '4',
-        '--out',
-        tmp_path / 'run',
-    )
+def test_a_drive_over_a_road_tells_its_origin_and_can_be_moved(blocks, tmp_path, command):
+    options = ('--speed', '30/3.6', '--core', '--no-report', '--duration', 4, '--out', tmp_path / 'run')
+    command('drive', '--road', blocks, *options)
     session = yaml.safe_load(recorded_session(open_recording(tmp_path / 'run' / 'recording')))
-    assert session['scenario'] == 'road'
     given = session['given']['road.file']
-    assert (given['file'], given['format'], given['speed']) == (
-        'blocks.crg',
-        'OpenCRG',
-        '8.333 m/s (30 km/h)',
-    )
+    told = (given['file'], given['format'], given['speed'])
+    assert told == ('blocks.csv', 'text table', '8.333 m/s (30 km/h)')
     assert given['sha256'] == recording_hash(blocks)
     read = tmp_path / 'run' / given['read']['file']
     assert session['parameters']['mount_sim']['road.file'] == str(read)
     assert given['read']['sha256'] == recording_hash(read)
     shutil.rmtree(tmp_path / 'run' / 'given')  # the recording tells its road, wherever the file is
     (tmp_path / 'run').rename(tmp_path / 'moved')
-    command('info', tmp_path / 'moved')
     command('audit', tmp_path / 'moved')
     command('replay', tmp_path / 'moved', '--out', tmp_path / 'again')  # code 0: the setpoints are equal
     command('report', tmp_path / 'moved')
 
 
-def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, tmp_path):
-    quick = ('--core', '--no-report')
-    command(
-        'drive',
-        '--road',
-        blocks,
-        '--speed',
-        '60/3.6',
-        '--mount',
-        'elastomer',
-        *quick,
-        '--out',
-        tmp_path / 'first',
-    )
+def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, tmp_path, command):
+    quick = ('--speed', '60/3.6', '--mount', 'elastomer', '--core', '--no-report', '--out')
+    command('drive', '--road', blocks, *quick, tmp_path / 'first')
     words = ('--column', '/sim/chassis_acceleration.linear_acceleration.z', '--speed', '60/3.6')
-    words += ('--out', tmp_path / 'road.csv', '--json', tmp_path / 'inverted.json')
-    command('road', 'invert', tmp_path / 'first' / 'recording', *words)
-    assert json.loads((tmp_path / 'inverted.json').read_text())['error'] < 0.05
-    words = ('--road', tmp_path / 'road.csv', '--speed', '60/3.6', '--mount', 'elastomer')
-    command('drive', *words, *quick, '--out', tmp_path / 'again')
+    command('road', 'invert', tmp_path / 'first' / 'recording', *words, '--out', tmp_path / 'road.csv')
+    command('drive', '--road', tmp_path / 'road.csv', *quick, tmp_path / 'again')
     first, again = (truth(tmp_path / run, 'displacement') for run in ('first', 'again'))
     again = again[5000:]  # the recording began with 5 s of rest, and so does its road
-    count = min(first.size, again.size)
-    moved = slice(7000, count - 500)
+    moved = slice(7000, min(first.size, again.size) - 500)
     error = np.sqrt(np.mean((again[moved] - first[moved]) ** 2) / np.mean(first[moved] ** 2))
     assert error < 0.1
 
 
-def refused(capsys, *words, code=1):
-    command(*words, code=code)
-    said = capsys.readouterr()
-    return ' '.join((said.out + said.err).split())
-
-
-def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, tmp_path, capsys):
-    assert '--road needs a speed' in refused(capsys, 'drive', '--road', blocks, '--core', code=2)
-    words = ('drive', '--road', blocks, '--speed', '120', '--core')
-    assert 'is it in km/h? Write 120/3.6' in refused(capsys, *words)
-    assert 'is for a road' in refused(capsys, 'drive', '--speed', '20', '--core', code=2)
-    said = refused(
-        capsys, 'drive', '--road', blocks, '--speed', '20', '--scenario', 'bench', '--core', code=2
-    )
-    assert 'or the file' in said
-    flat = tmp_path / 'acc.csv'
-    numbers = np.random.default_rng(1).normal(0.0, 1.0, 2000)
-    flat.write_text('x [m],acc\n' + ''.join(f'{0.05 * k:.2f},{each:.4f}\n' for k, each in enumerate(numbers)))
-    said = refused(capsys, 'road', 'show', flat, '--column', 'acc')
-    assert 'no unit is said' in said
+@pytest.mark.parametrize(
+    ('words', 'sentence'),
+    [
+        ('', '--road needs a speed'),
+        ('--speed 120', 'is it in km/h? Write 120/3.6'),
+        ('--speed 20 --scenario bench', 'or the file'),
+    ],
+)
+def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, refused, words, sentence):
+    assert sentence in refused('drive', '--road', blocks, '--core', *words.split())

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from engine_mount.cli.bench import chains
 from engine_mount.cli.commands import faults, view
 from engine_mount.view import view as looking
 from engine_mount.view.feed import FeedError
@@ -29,15 +28,13 @@ def test_an_empty_part_of_the_path_is_not_the_working_directory(tmp_path, path):
     assert (ended.returncode, ended.stderr) == (0, '')
 
 
-def test_programs_of_the_command_import_nothing_from_the_working_directory(tmp_path):
-    for module in ('yaml', 'typer', 'queue', 'rclpy'):
-        (tmp_path / f'{module}.py').write_text('raise SystemExit("foreign code ran")')
+def test_a_drive_of_the_fault_matrix_imports_nothing_from_the_working_directory(tmp_path):
+    (tmp_path / 'yaml.py').write_text('raise SystemExit("foreign code ran")')
     environment = {name: value for name, value in os.environ.items() if name != 'PYTHONSAFEPATH'}
-    for command in ([*faults._DRIVE], chains._command('peer', 7530)):
-        ended = subprocess.run(
-            [*command, '--help'], cwd=tmp_path, env=environment, capture_output=True, text=True
-        )
-        assert (ended.returncode, ended.stderr) == (0, '')
+    ended = subprocess.run(
+        [*faults._DRIVE, '--help'], cwd=tmp_path, env=environment, capture_output=True, text=True
+    )
+    assert (ended.returncode, ended.stderr) == (0, '')
 
 
 def test_status_ends_with_the_reason_when_its_model_fails(monkeypatch):

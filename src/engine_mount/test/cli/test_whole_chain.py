@@ -1,28 +1,22 @@
 """From recordings of a rack to a drive: files all the way, and no truth of the plant in any of them.
 
-`python test_whole_chain.py SEED...` prints the errors of each step for other draws, as they stand in
-docs/explanation/identification.md.
+Errors of other draws stand in docs/explanation/identification.md.
 """
 
-import contextlib
 import glob
-import io
 import re
-import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from engine_mount.cli.command import main
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
-from engine_mount.settings.chosen import chosen_control, policy_of
-from mount_models.actuator.law import checked_force
+from engine_mount.settings.chosen import policy_of
+from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 from mount_models.friction.contact import FrictionContact
@@ -30,8 +24,7 @@ from mount_models.quantity import flattened
 from mount_models.specimen import DEFAULT_SPECIMEN, load_specimen
 from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.plant.ripple import current_rate, flux_rate
-from mount_sim.rack.coil import drawn_rack
-from mount_sim.rack.friction import drawn_friction
+from mount_sim.rack import drawn_friction, drawn_rack
 
 pytestmark = pytest.mark.slow
 
@@ -46,27 +39,17 @@ TARGETS = {
 TRACKING_TARGET = 0.04
 
 
-def command(*words):
-    with pytest.raises(SystemExit) as ended:
-        main([str(word) for word in words])
-    assert ended.value.code == 0
-
-
-def in_folder(folder, pattern):
-    return sorted(folder.glob(pattern))
-
-
 def globbed(word):
     """Return what a shell makes of `word`."""
     return sorted(glob.glob(word)) if glob.has_magic(word) else [word]
 
 
-def identified(folder, seed, noise=0.01):
+def identified(command, folder, seed, noise=0.01):
     """Return the specimen file that the commands make of the recordings of a drawn rack."""
     command('calibrate', 'rack', '--out', folder, '--seed', seed, '--noise', noise, '--drawn')
     file = folder / 'drawn.yaml'
     command('calibrate', 'actuator', folder / 'force.csv', '--name', 'drawn', '--out', file)
-    ripple, friction = in_folder(folder, 'ripple_*.csv'), in_folder(folder, 'friction_*.csv')
+    ripple, friction = (sorted(folder.glob(f'{kind}_*.csv')) for kind in ('ripple', 'friction'))
     command('calibrate', 'inductance', *ripple, '--base', file, '--out', file)
     command(
         'identify', 'friction', '--step', 'sawtooth', '--train', *friction, '--base', file, '--out', file,
@@ -144,8 +127,8 @@ SPEEDS = [sign * 1e-3 * step for sign in (1.0, -1.0) for step in range(1, 11)]
 
 
 @pytest.fixture(scope='module')
-def file(tmp_path_factory):
-    return identified(tmp_path_factory.mktemp('rack'), SEED)
+def file(tmp_path_factory, command):
+    return identified(command, tmp_path_factory.mktemp('rack'), SEED)
 
 
 @pytest.fixture(scope='module')
@@ -162,15 +145,7 @@ def test_a_drawn_actuator_with_drawn_pads_is_controlled_by_its_identified_files_
     assert tracking(SEED, file) <= TRACKING_TARGET
 
 
-def test_the_controller_takes_contact_and_coefficients_from_the_file(file):
-    taken = chosen_control({'mount_control': {'parameters_file': str(file), 'specimen': 'drawn'}})
-    told = load_specimen(file).friction
-    assert {**taken.friction._asdict(), **taken.contact._asdict()} == told
-    for name, usual in FrictionContact()._asdict().items():
-        assert told[name] != pytest.approx(usual, rel=0.04)  # a default that stood in would be seen
-
-
-def test_the_shipped_specimen_is_what_make_identify_writes(tmp_path):
+def test_the_shipped_specimen_is_what_make_identify_writes(tmp_path, command):
     written = tmp_path / 'written.yaml'
     recipe = MAKEFILE.read_text().split('\nidentify:', 1)[1].split('\n\n', 1)[0].splitlines()[1:]
     assert len(recipe) == 4
@@ -193,12 +168,3 @@ def test_the_shipped_specimen_is_what_make_identify_writes(tmp_path):
     for name in ('turns_area', 'spring_stiffness', 'pad_stiffness', 'rest_current', 'current_limit'):
         assert getattr(ours, name) == getattr(shipped, name)
     assert set(shipped.provenance['parts']) == {'force_law', 'gap_curves', 'friction'}
-
-
-if __name__ == '__main__':
-    print('seed', *TARGETS, 'tracking', sep=' | ')
-    for seed in map(int, sys.argv[1:]):
-        with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-            specimen = identified(Path(folder), seed)
-            found = [*step_errors(seed, specimen).values(), tracking(seed, specimen)]
-        print(seed, *(f'{value:.3g}' for value in found), sep=' | ', flush=True)

@@ -4,15 +4,13 @@ import io
 import json
 import math
 import re
-from dataclasses import fields
 from pathlib import Path
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 
 from engine_mount.experiments.check import report, run
-from engine_mount.experiments.check.run import CORE, GRAPH, LOCKSTEP, CheckError, at_samples, trials_of
+from engine_mount.experiments.check.run import CheckError, trials_of
 from engine_mount.experiments.check.suite import (
     FAILED,
     MEASURES,
@@ -29,11 +27,7 @@ from engine_mount.experiments.check.suite import (
     worst_first,
 )
 from engine_mount.recordings.screen import Screen
-from engine_mount.reports.drive.signals import Truth
-from mount_bringup.graph.nodes import GraphError
-from mount_bringup.graph.shutdown import Interrupted
 from mount_models.plain_yaml import plain_yaml
-from mount_models.quantity import ParameterError
 
 PAGE = Path(__file__).resolve().parents[4] / 'docs' / 'how-to' / 'check_a_change.md'
 LIMIT = {'at_most': 0.7, 'source': 'chosen', 'reason': 'less is no use'}
@@ -54,14 +48,11 @@ def refusal(given):
 
 
 def result(**figures):
-    truth = Truth(*np.zeros((len(fields(Truth)), 3000)))
-    truths = dict.fromkeys(('driven', 'hydromount', 'undamped'), truth)
-    figures = {'peak_over_undamped': 0.5, 'faults': 0.0, **figures}
-    return Result(figures, (), truths, ((-1.0, 0.5), (1.0, 2.0)))
+    return Result({'peak_over_undamped': 0.5, 'faults': 0.0, **figures})
 
 
-def trials(tmp_path, settings=None, through=CORE, suite=None, **more):
-    return trials_of(suite_of(suite or content()), settings or {}, tmp_path, through, **more)
+def trials(tmp_path, settings=None, suite=None):
+    return trials_of(suite_of(suite or content()), settings or {}, tmp_path)
 
 
 # What is read.
@@ -73,8 +64,7 @@ def test_the_shipped_suite_names_a_reason_and_a_source_for_every_limit_and_can_b
         each.name for each in suite
     }
     assert all(limit.reason and limit.source for each in suite for limit in each.limits)
-    for through in (CORE, LOCKSTEP, GRAPH):
-        assert len(trials_of(suite, {}, tmp_path, through)) == len(suite)
+    assert len(trials_of(suite, {}, tmp_path)) == len(suite)
 
 
 def test_a_limit_of_all_manoeuvres_is_one_of_each_on_which_it_can_be_told():
@@ -147,41 +137,27 @@ def test_settings_of_the_user_reach_every_manoeuvre(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('settings', 'more', 'sentence'),
+    ('settings', 'begin', 'sentence'),
     [
-        ({'mount_sim': {'scenario': 'sweep'}}, {}, 'mount_sim.scenario is set by the manoeuvre first itself'),
-        ({'mount_sim': {'mounts': 'left,right'}}, {}, 'a suite checks one mount'),
-        ({'mount_control': {'sample_rate': 2000.0}}, {}, 'a suite is judged at 1000 Hz'),
-        ({'mount_control': {'policy': 'none'}}, {}, 'first: '),
-        ({}, {'through': LOCKSTEP, 'jobs': 2}, 'through lockstep one manoeuvre is driven at a time'),
-        ({}, {'suite': content(evaluated_from_s=3.0)}, 'second: evaluated_from_s (3 s) must lie before'),
+        ({'mount_sim': {'scenario': 'sweep'}}, 0, 'mount_sim.scenario is set by the manoeuvre first itself'),
+        ({'mount_sim': {'mounts': 'left,right'}}, 0, 'a suite checks one mount'),
+        ({'mount_control': {'sample_rate': 2000.0}}, 0, 'a suite is judged at 1000 Hz'),
+        ({'mount_control': {'policy': 'none'}}, 0, 'first: '),
+        ({}, 3, 'second: evaluated_from_s (3 s) must lie before'),
     ],
-)  # fmt: skip
-def test_orders_that_no_manoeuvre_can_follow_are_refused_before_the_first(tmp_path, settings, more, sentence):
+)
+def test_orders_that_no_manoeuvre_can_follow_are_refused_before_the_first(
+    tmp_path, settings, begin, sentence
+):
     with pytest.raises(CheckError) as caught:
-        trials(tmp_path, settings, **more)
+        trials(tmp_path, settings, content(evaluated_from_s=begin))
     assert str(caught.value).startswith(sentence)
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize('error', [GraphError('no gap'), ParameterError('a graph already runs')])
-def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch, error):
-    monkeypatch.setattr(run, 'drive', Mock(side_effect=error))
-    made = trials(tmp_path, through=GRAPH)[0]
-    broken = run.run_trial(made)
-    assert (broken.figures, broken.broke_down) == ({}, str(error))
-    monkeypatch.setattr(run, 'drive', Mock(side_effect=Interrupted()))
-    with pytest.raises(Interrupted):
-        run.run_trial(made)
-
-
-def test_each_manoeuvre_is_handed_on_when_it_is_done_in_real_time_one_by_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(run, 'run_trial', lambda trial: result())
-    done = []
-    results = run.run_trials(
-        trials(tmp_path, through=GRAPH), 0, Screen(io.StringIO()), lambda trial, _: done.append(trial)
-    )
-    assert [trial.manoeuvre.name for trial in done] == [*results] == ['first', 'second']
+def test_a_manoeuvre_that_breaks_down_has_its_reason_and_no_figure(tmp_path, monkeypatch):
+    monkeypatch.setattr(run, 'drive', Mock(side_effect=ValueError('the plant has diverged')))
+    assert run.run_trial(trials(tmp_path)[0]) == Result({}, broke_down='the plant has diverged')
 
 
 def test_the_line_of_a_manoeuvre_is_its_worst_limit_with_its_remarks_below(tmp_path):
@@ -203,9 +179,9 @@ def test_the_line_of_a_manoeuvre_is_its_worst_limit_with_its_remarks_below(tmp_p
 # How it is judged.
 
 
-def judged(limits=None, *, real_time=False, **figures):
+def judged(limits=None, **figures):
     second = suite_of(content(**({'limits': limits} if limits else {})))[1]
-    return {v.limit.measure: v.judged for v in verdicts_of(second, result(**figures), real_time=real_time)}
+    return {v.limit.measure: v.judged for v in verdicts_of(second, result(**figures))}
 
 
 def test_a_limit_holds_up_to_its_value_and_what_is_not_known_fails():
@@ -216,22 +192,16 @@ def test_a_limit_holds_up_to_its_value_and_what_is_not_known_fails():
     least = {'switched_on': {'at_least': 1, 'source': 'chosen', 'reason': 'x'}}
     assert judged(least, switched_on=0.0)['switched_on'] is FAILED
     assert judged(least, switched_on=1.0)['switched_on'] is PASSED
-    broken = verdicts_of(suite_of(content())[0], Result({}, broke_down='no gap'), real_time=True)
+    broken = verdicts_of(suite_of(content())[0], Result({}, broke_down='no gap'))
     assert {verdict.judged for verdict in broken} == {NOT_JUDGED}
     assert not passed(broken)
-
-
-def test_latency_is_judged_in_real_time_alone():
-    limit = {'latency_p99_us': {'at_most': 1000, 'source': 'chosen', 'reason': 'x'}}
-    assert judged(limit, latency_p99_us=2000.0)['latency_p99_us'] == 'none'
-    assert judged(limit, real_time=True, latency_p99_us=2000.0)['latency_p99_us'] is FAILED
 
 
 def test_the_worst_stands_first_and_what_is_not_known_before_it():
     limits = {name: dict(LIMIT) for name in ('rms_over_undamped', 'ringing_s', 'pad_energy_j', 'switched_on')}
     manoeuvre = suite_of(content(limits=limits))[1]
     figures = result(rms_over_undamped=0.1, ringing_s=9.0, pad_energy_j=math.nan, switched_on=0.6)
-    ordered = [v.limit.measure for v in worst_first(verdicts_of(manoeuvre, figures, real_time=False))]
+    ordered = [v.limit.measure for v in worst_first(verdicts_of(manoeuvre, figures))]
     assert ordered == ['pad_energy_j', 'ringing_s', 'switched_on', 'rms_over_undamped', 'faults']
 
 
@@ -254,10 +224,10 @@ def test_a_common_limit_that_holds_everywhere_stands_once_and_one_that_fails_by_
 
 
 def test_a_manoeuvre_that_broke_down_is_one_row_with_its_reason_and_how_much_is_not_judged(tmp_path):
-    made, results, verdicts = checked(tmp_path, Result({}, broke_down='mount_sim ended with code 1 <b>'))
+    made, results, verdicts = checked(tmp_path, Result({}, broke_down='the plant has diverged'))
     table = report.table_of(results, verdicts)
     assert table.rows[0] == (
-        'fail', 'second', 'broke down: mount_sim ended with code 1 <b>; not judged: 2 limits', '', '', '',
+        'fail', 'second', 'broke down: the plant has diverged; not judged: 2 limits', '', '', '',
     )  # fmt: skip
     assert [row[1] for row in table.rows] == ['second', 'first', 'first']
     assert table.marked == {0}
@@ -265,13 +235,8 @@ def test_a_manoeuvre_that_broke_down_is_one_row_with_its_reason_and_how_much_is_
     figures = report.figures_of(made, {}, results, verdicts)
     assert not figures['passed']
     second = figures['manoeuvres']['second']
-    assert second['broke_down'] == 'mount_sim ended with code 1 <b>'
+    assert second['broke_down'] == 'the plant has diverged'
     assert [each['verdict'] for each in second['verdicts']] == ['not judged'] * 2
-    report.write_page(made, {}, results, verdicts, tmp_path / 'check.html')
-    text = (tmp_path / 'check.html').read_text(encoding='utf-8')
-    assert 'href="#second"' in text
-    assert 'data-chart="first"' in text
-    assert 'mount_sim ended with code 1 &lt;b&gt;' in text
 
 
 def test_figures_are_plain_json_with_null_for_what_is_not_known(tmp_path):
@@ -288,17 +253,6 @@ def test_figures_are_plain_json_with_null_for_what_is_not_known(tmp_path):
         'source': 'chosen',
         'reason': 'less is no use',
     }
-
-
-def test_the_truth_is_that_of_the_samples_of_the_excitation_where_some_are_missing():
-    time = np.arange(-5, 20) * 1e-3
-    whole = Truth(time, *(time + place for place in range(6)))
-    cut = at_samples(whole, 10)
-    np.testing.assert_array_equal(cut.time, time[5:15])
-    np.testing.assert_array_equal(cut.chassis_acceleration, time[5:15] + 5)
-    kept = np.delete(np.arange(25), [8, 9])
-    holed = Truth(*(getattr(whole, field.name)[kept] for field in fields(Truth)))
-    np.testing.assert_allclose(at_samples(holed, 10).displacement, cut.displacement, atol=1e-15)
 
 
 def test_the_suite_of_the_page_can_be_used_and_the_page_names_every_quantity():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engine_mount.experiments.field_penetration import equivalent_depth, flux_density_change
-from engine_mount.experiments.plate_finite_elements import PlateSurroundings, plate_field
+from engine_mount.experiments.plate_finite_elements import plate_field
 from mount_sim.plant.reluctance import ReluctanceActuator, core_field, differential_permeability
 from mount_sim.plant.ripple import (
     RippleCoil,
@@ -58,8 +58,7 @@ def test_the_change_begins_with_switching_and_a_time_outside_the_positive_phase_
 
 
 def test_two_dimensions_agree_with_one_where_the_plate_is_far_from_saturation():
-    coarse = PlateSurroundings(finest=8e-6)
-    field = plate_field(COIL, MAGNET, 0.0, GAP, coarse, periods=2)
+    field = plate_field(COIL, MAGNET, 0.0, GAP, finest=8e-6, periods=2)
     one = equivalent_depth(DEPTH, change(0.0))
     assert field.mean_change == pytest.approx(flux_rate(COIL, MAGNET, 0.0) * COIL.sample_delay, rel=1e-6)
     assert field.equivalent_depth == pytest.approx(one, rel=0.03)
@@ -68,5 +67,5 @@ def test_two_dimensions_agree_with_one_where_the_plate_is_far_from_saturation():
 
 
 def test_the_steady_field_reaches_the_mean_flux_density_of_the_circuit():
-    field = plate_field(COIL, MAGNET, 1.0, GAP, PlateSurroundings(finest=20e-6), periods=1)
+    field = plate_field(COIL, MAGNET, 1.0, GAP, finest=20e-6, periods=1)
     assert field.permeability == pytest.approx(permeability(1.0), rel=1e-4)

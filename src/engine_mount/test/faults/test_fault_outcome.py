@@ -11,7 +11,7 @@ from engine_mount.faults.judge import Course, judge, reports_fault
 from engine_mount.faults.observers import Observers, Report, Setpoint, Truth
 from engine_mount.faults.page import write_page
 from mount_ros.nodes.diagnostics import Level
-from mount_sim.electronics.faults.kinds import FAULTS
+from mount_sim.electronics.faults import FAULTS
 
 SENTENCE = 'no frames for 100 ms (limit 20 ms); are the electronics powered?'
 COURSE = Course(begun=10.0, cleared=10.6, damping_again=11.0, over=11.0)

@@ -8,7 +8,7 @@ import pytest
 from engine_mount.identification import force_law
 from engine_mount.identification.force_law import ActuatorCalibration, fit_force_law
 from engine_mount.identification.force_points import gap_groups
-from mount_models.actuator.law import TABLE_1, ForceLaw, checked_force
+from mount_models.actuator import TABLE_1, ForceLaw, checked_force
 from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, force

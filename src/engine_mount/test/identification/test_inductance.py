@@ -7,14 +7,14 @@ import pytest
 
 from engine_mount.identification.gap_curves import RippleRecording, calibrate_gap_curves, measured_point
 from engine_mount.identification.inductance import calibrate_inductance, measured_compensation
-from mount_models.coil.crossing import find_crossing
-from mount_models.coil.gap import evaluate
-from mount_models.coil.temperature import (
+from mount_models.coil.correction import (
     check_compensation,
     crossing_at_calibration,
     inductance_at_calibration,
     temperature_share,
 )
+from mount_models.coil.crossing import find_crossing
+from mount_models.coil.gap import evaluate
 from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator

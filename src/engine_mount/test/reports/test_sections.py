@@ -16,8 +16,6 @@ from engine_mount.reports.sections.periodic import (
     dominant_sine,
     evenly,
     harmonics,
-    peak_per_band,
-    rms_per_band,
     whole_periods,
 )
 from engine_mount.reports.sections.run import coil_load
@@ -98,15 +96,6 @@ def test_missing_and_unknown_samples_are_bridged_and_counted():
     assert made_up == 12
     assert grid == pytest.approx(TIME)
     assert bridged == pytest.approx(TIME)
-
-
-def test_each_band_of_a_sweep_has_its_own_peak_and_rms():
-    frequency = np.array([1.0, 1.5, 1.999, 2.0, 2.5, 5.2, np.nan])
-    values = np.array([1.0, -3.0, 2.0, 4.0, np.nan, -5.0, 100.0])
-    edges, peaks = peak_per_band(frequency, values)
-    assert edges.tolist() == [1.0, 2.0, 5.0]
-    assert peaks.tolist() == [3.0, 4.0, 5.0]
-    assert rms_per_band(frequency, values)[1] == pytest.approx([np.sqrt(14 / 3), 4.0, 5.0])
 
 
 def test_the_heat_of_a_coil_is_that_of_the_rms_current():

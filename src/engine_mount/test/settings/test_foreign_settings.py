@@ -23,7 +23,7 @@ from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE
 from mount_models.specimen import SpecimenError, default_specimen
 from mount_sim.parameters import SimParameters
 
-REFUSALS = (YamlError, ParameterError, SpecimenError, ParameterError, LawRefusedError)
+REFUSALS = (YamlError, ParameterError, SpecimenError, LawRefusedError)
 SEEDS = st.integers(0, 1 << 62)
 KNOWN = defaults_of_nodes()
 SETS = {
@@ -32,42 +32,11 @@ SETS = {
     'mount_sim': SimParameters(),
 }
 HARD = [
-    '.nan',
-    '.inf',
-    '-.inf',
-    '1e999',
-    '-1',
-    '0',
-    '-0.0',
-    '1e-320',
-    '3',
-    '3.5',
-    '0x7f',
-    '1_0',
-    '0o17',
-    '1:30',
-    'true',
-    'null',
-    '~',
-    '""',
-    "'x'",
-    '[]',
-    '{}',
-    '[1, 2]',
-    '{a: 1}',
-    '&a 1',
-    '*a',
-    '!!int 3',
-    '2026-05-04',
-    '"\\0"',
-    '9999999999999999999999999999999999999999',
-    '1e9e9e9',
-    'on',
-    '=',
-    '<<',
-    '-5e-324',
+    '.nan', '.inf', '-.inf', '1e999', '-1', '0', '1e-320', '3.5', '0x7f', '1_0', '0o17', '1:30',
+    'true', 'null', '""', '[]', '{}', '[1, 2]', '{a: 1}', '&a 1', '*a', '!!int 3', '2026-05-04',
+    '"\\0"', '9999999999999999999999999999999999999999', '1e9e9e9', 'on', '<<', '-5e-324',
     '179769313486231570000e290',
-]
+]  # fmt: skip
 
 
 def as_text(settings):
@@ -91,20 +60,13 @@ NODES, LINES = zip(
 
 
 def changed_file(seed):
-    """Return a parameter file of a few lines; one value is a hard one, or some bytes are changed."""
+    """Return a parameter file of one value, which is a hard one, or some bytes are changed."""
     draw = random.Random(seed)
     place = draw.randrange(len(LINES))
-    lines = [f'/**/{NODES[place]}:', '  ros__parameters:']
-    lines += [
-        LINES[k]
-        for k in range(place, min(place + draw.randrange(1, 4), len(LINES)))
-        if NODES[k] == NODES[place]
-    ]
+    head, line = f'/**/{NODES[place]}:\n  ros__parameters:\n', LINES[place]
     if draw.random() < 0.7:
-        name = lines[2].partition(':')[0]
-        lines[2] = f'{name}: {draw.choice(HARD)}'
-        return '\n'.join(lines)
-    return mutated('\n'.join(lines).encode(), seed).decode(errors='replace')
+        return f'{head}{line.partition(":")[0]}: {draw.choice(HARD)}'
+    return mutated((head + line).encode(), seed).decode(errors='replace')
 
 
 def assert_within(parameters):
@@ -147,13 +109,10 @@ def test_a_changed_option_is_refused_or_within_its_range(seed):
         assert_sound(checked_settings(settings_of_options([option])))
 
 
-SESSION = yaml.safe_dump(
-    {
-        'format': 1,
-        'scenario': 'motorway',
-        'parameters': {'mount_control': {'sample_rate': 1000.0, 'policy': 'continuous_viscous'}},
-    }
-)
+SESSION = """format: 1
+scenario: motorway
+parameters: {mount_control: {sample_rate: 1000.0, policy: continuous_viscous}}
+"""
 
 
 @given(SEEDS)
@@ -185,22 +144,11 @@ def test_a_changed_value_at_run_time_is_refused_or_leaves_a_sound_controller(see
 
 AT_RUN_TIME = {
     float: (
-        *(math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 5e-324, 1e308, 1e6, 0.5, 1.0, 3.0, 8.0, 20.0, 1e-3),
-        *(1e-6, 49.9, 1000.0, 0.3333333333333333),
+        *(math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 5e-324, 1e308, 0.5, 1.0, 8.0, 1e-3, 49.9, 1000.0),
     ),
     int: (0, 1, -1, 3, 1 << 62, -(1 << 63)),
     bool: (True, False),
     str: (
-        '',
-        *[
-            'x',
-            'nan',
-            'viscous_2500',
-            'viscous_1e9',
-            '{law: viscous}',
-            '\x00',
-            'continuous_viscous',
-            '../x.csv',
-        ],
+        'viscous_1e9', 'continuous_viscous', 'nan', '../x.csv', '', '{law: viscous}', '\x00',
     ),
-}
+}  # fmt: skip

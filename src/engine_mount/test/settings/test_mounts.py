@@ -3,7 +3,6 @@
 import pytest
 
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
-from mount_bringup.settings import settings_of_mount
 from mount_models.quantity import ParameterError
 
 MOUNTS = ('left', 'right')
@@ -25,6 +24,5 @@ def test_own_settings_of_a_mount_come_before_those_of_all():
 def test_one_mount_alone_has_the_settings_as_they_are():
     settings = {'mount_sim': {'seed': 2}, 'mount_control': {'policy': 'switched_viscous'}}
     assert settings_of_mounts(settings) == {'': settings}
-    assert settings_of_mount(settings, '') == settings
     with pytest.raises(ParameterError, match='its mounts are one alone'):
         mounts_of({'left/mount_control': {}})

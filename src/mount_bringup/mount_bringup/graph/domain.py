@@ -45,7 +45,7 @@ def domain_lock(domain: int, namespace: str, mounts: Sequence[str] = ()) -> Iter
     the process. Raises `ParameterError` where another graph holds one of them.
     """
     with contextlib.ExitStack() as held:
-        for mount in ('', *mounts):
+        for mount in {'', *mounts}:
             name = f'/{namespace}/{mount}'.replace('//', '/').rstrip('/') or '/'
             port = can_port(domain, name)
             place = held.enter_context(socket.socket(socket.AF_UNIX))

@@ -18,32 +18,51 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
-from mount_bringup.graph.nodes import DRIVER, RECORDER, GraphError, GraphNode, GraphSettings, name_in
-from mount_bringup.graph.reports import NodeReports
+from mount_bringup.graph.nodes import (
+    DRIVER,
+    INIT,
+    RECORDER,
+    Figures,
+    GraphError,
+    GraphNode,
+    GraphSettings,
+    name_in,
+)
 from mount_bringup.graph.shutdown import Interrupted
-from mount_ros.messages.event import read_mark
-from mount_ros.nodes.diagnostics import Level
-from mount_ros.nodes.shutdown import Deadline, leave_middleware
-from mount_ros.publishers import present_nodes
-from mount_ros.qos import publisher_qos, recording_qos
+from mount_ros.messages.event import Mark, read_mark
+from mount_ros.messages.verdicts import Level, flags_of, verdicts_in
+from mount_ros.nodes.shutdown import end_after, leave_middleware
+from mount_ros.qos import publisher_qos
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION
 
 FRESH_DIAGNOSTICS = 1.5
 """Seconds (chosen): every node reports once a second."""
 CONFIGURE, ACTIVATE, DEACTIVATE = 'configure', 'activate', 'deactivate'
-_TRANSITIONS = {
-    CONFIGURE: Transition.TRANSITION_CONFIGURE,
-    ACTIVATE: Transition.TRANSITION_ACTIVATE,
-    DEACTIVATE: Transition.TRANSITION_DEACTIVATE,
-}
 ANSWER_LIMIT = 60.0
 """Seconds (chosen) until a node answers: a first start may compile the laws, an activation has its ramp."""
+LATE_PATIENCE = 60.0  # s, chosen: until a machine that is too late for an activation is given up
+_INIT_ATTEMPTS = 2  # chosen
 _DEACTIVATION_LIMIT = 2.0  # s, chosen: then a signal has the same effect
 _MATCH_LIMIT = 20.0  # s, chosen
-_DISCOVERY = 0.5  # s, chosen: discovery of a running graph takes less with the shipped profile
 LONGEST_HANG = 30.0
 """Seconds (chosen) until this process ends if it hangs; its nodes then go to 0 A by themselves."""
+SILENCE_LIMIT = 4.0
+"""Seconds (chosen) without diagnostics, which come once a second, until a node is treated as failed."""
 _PERIOD = 0.05  # s, chosen
+_LONGEST_PAUSE = 0.5  # s, chosen: ten times this period
+
+
+class GraphObserver:
+    """Receives events of the graph; this one ignores them."""
+
+    def on_state(self, node: GraphNode, state: str) -> None:
+        """Receive that a node is `configured`, `activating` or `active` from now on."""
+
+    def on_report(self, name: str, figures: Figures) -> None:
+        """Receive a report of the node of this full name."""
+
+    def on_mark(self, mount: str, mark: Mark) -> None:
+        """Receive a mark on the topic `event` of a mount."""
 
 
 class Graph:
@@ -53,37 +72,34 @@ class Graph:
         self.nodes = tuple(nodes)
         self.settings = settings
         self.mounts = list(dict.fromkeys(node.mount for node in nodes if node.is_a(DRIVER))) or ['']
-        self.reports = NodeReports(self.nodes, settings.namespace)
-        self.figures = self.reports.figures
+        self.observer = GraphObserver()
+        self._figures: dict[str, dict[str, str]] = {}
+        self._reported: dict[str, float] = {}  # s, steady clock
+        self._checked = float('inf')
         self.notes: list[str] = []
         """Sentences for the user about what was not as it should be."""
-        self.repeats: dict[str, list[str]] = {}
-        """The reasons why a node was activated again."""
-        self.deadline = Deadline(code=1)
+        self.repeats: dict[str, str] = {}
+        """The last reason why a node was activated again."""
         self._interrupted = False  # no lock: a second signal may come during the first
         self._context = Context()
         self._clients: dict[str, Client] = {}
 
     def open(self) -> None:
         """Join the middleware and receive diagnostics and marks."""
-        try:
-            rclpy.init(
-                args=[],  # of this command, of which none is for ROS
-                context=self._context,
-                domain_id=self.settings.domain,
-                signal_handler_options=SignalHandlerOptions.NO,
-            )
-        except RuntimeError as error:
-            raise GraphError(f'the middleware does not start: {error}') from None
-        name, namespace = 'engine_mount_supervisor', self.settings.namespace
-        self.node = Node(name, namespace=namespace, context=self._context)
+        rclpy.init(
+            args=[],  # of this command, of which none is for ROS
+            context=self._context,
+            domain_id=self.settings.domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self.node = Node('engine_mount_supervisor', namespace=self.settings.namespace, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         subscribe = self.node.create_subscription
-        subscribe(DiagnosticArray, DIAGNOSTICS.name, self.reports.take, recording_qos(DIAGNOSTICS))
+        subscribe(DiagnosticArray, DIAGNOSTICS.name, self._take_report, publisher_qos(DIAGNOSTICS))
         for mount in dict.fromkeys(['', *self.mounts]):  # the recorder of several mounts marks for all
             take = partial(self._take_event, mount)
-            subscribe(String, name_in(mount, EVENT.name), take, recording_qos(EVENT))
+            subscribe(String, name_in(mount, EVENT.name), take, publisher_qos(EVENT))
         self._sessions = {
             mount: self.node.create_publisher(String, name_in(mount, SESSION.name), publisher_qos(SESSION))
             for mount in self.mounts
@@ -91,9 +107,9 @@ class Graph:
 
     def close(self) -> None:
         """Leave the middleware."""
-        self.deadline.close()
-        if self._context.ok() and not leave_middleware(self._take_down):
-            self.notes.append('the middleware of the supervisor did not come to an end and was left behind')
+        end_after(0.0)
+        if self._context.ok():
+            leave_middleware(self._take_down)
 
     def interrupt(self) -> None:
         """Make every wait end with `Interrupted`; safe in a signal handler."""
@@ -109,13 +125,13 @@ class Graph:
         begin = time.monotonic()
         try:
             while not condition():
-                self.deadline.set(LONGEST_HANG)
+                end_after(LONGEST_HANG)
                 self.check()
                 if time.monotonic() - begin > limit:
-                    raise GraphError(f'{what} did not happen within {limit:g} s; {self.reports.complaints()}')
+                    raise GraphError(f'{what} did not happen within {limit:g} s: read the logs')
                 self.serve_once()
         finally:
-            self.deadline.set(0.0)
+            end_after(0.0)
 
     def serve_for(self, duration: float) -> None:
         """Serve the graph for so many s."""
@@ -128,9 +144,38 @@ class Graph:
 
     def fresh_figures(self, node: GraphNode) -> dict[str, str]:
         """Return the next report of a node."""
-        self.reports.forget(node)
+        self.forget(node)
         self.wait_until(lambda: bool(self.figures(node)), 5.0, f'a report of {node.full_name}')
         return self.figures(node)
+
+    def figures(self, node: GraphNode) -> dict[str, str]:
+        """Return the last report of a node: its figures, `level` and `sentence`; empty if there is none."""
+        return self._figures.get(node.full_name, {})
+
+    def note_active(self, node: GraphNode) -> None:
+        """Note the activation of a node, which the node itself reports a moment later."""
+        self._figures.setdefault(node.full_name, {'level': '0', 'sentence': ''})['state'] = 'active'
+        self.observer.on_state(node, 'active')
+
+    def forget(self, node: GraphNode) -> None:
+        """Forget the report of a node, which is no longer true, and expect none until the next."""
+        self._figures.pop(node.full_name, None)
+        self._reported.pop(node.full_name, None)
+
+    def pause_silence(self) -> None:
+        """Count silence from the next `silent` on."""
+        self._reported = dict.fromkeys(self._reported, float('inf'))
+
+    def silent(self) -> list[str]:
+        """Return the names of the nodes without a report for `SILENCE_LIMIT`.
+
+        Time in which this is not called does not count: this process may have been stopped itself.
+        """
+        now = time.monotonic()
+        stopped = max(0.0, now - self._checked - _LONGEST_PAUSE)
+        self._checked = now
+        self._reported = {name: min(last + stopped, now) for name, last in self._reported.items()}
+        return [name for name, last in self._reported.items() if now - last > SILENCE_LIMIT]
 
     def client(self, kind: Any, service: str) -> Client:
         """Return the client of a service, which stays until the end.
@@ -171,7 +216,48 @@ class Graph:
         for refusal in self.change_states(nodes, transition).values():
             raise GraphError(refusal)
         for node in nodes if transition == CONFIGURE else ():
-            self.reports.observer.on_state(node, 'configured')
+            self.observer.on_state(node, 'configured')
+
+    def activate(
+        self, nodes: Sequence[GraphNode], report: Callable[[str], None] = lambda sentence: None
+    ) -> None:
+        """Activate nodes side by side; raise `GraphError` where one refuses, `mount_init` a second time.
+
+        A refusal does not count while the machine was late for setpoints, for a minute, nor while the driver
+        requests a new initialisation: the driver is deactivated and activated first.
+        """
+        begin, remaining = (
+            time.monotonic(),
+            {node: _INIT_ATTEMPTS if node.is_a(INIT) else 1 for node in nodes},
+        )
+        report(f'activating {", ".join(node.full_name for node in nodes)}')
+        for node in nodes:
+            self.observer.on_state(node, 'activating')
+        while remaining:
+            before = {node: self._late_setpoints(node) for node in remaining}
+            refused = self.change_states([*remaining], ACTIVATE)
+            for node in remaining.keys() - refused.keys():
+                self.note_active(node)
+            if refused:
+                self.serve_for(FRESH_DIAGNOSTICS)
+            for node, refusal in refused.items():
+                driver = self._driver(node)
+                figures, late = self.figures(driver), self._late_setpoints(node) > before[node]
+                renewed = node != driver and flags_of(figures).needs_initialisation
+                remaining[node] -= not (late or renewed)
+                if not remaining[node] or time.monotonic() - begin > LATE_PATIENCE:
+                    raise GraphError(refusal)
+                if late:
+                    refusal = f'{refusal} (this machine was too late for setpoints)'
+                self.repeats[node.full_name] = refusal
+                report(f'activating {node.full_name} again: {refusal}')
+                if renewed:  # before that the driver sends no setpoint
+                    self.repeats[driver.full_name] = figures['sentence']
+                    self.transition([driver], DEACTIVATE)
+                    self.forget(driver)  # the report is of the activation before
+                    self.transition([driver], ACTIVATE)
+                    self.note_active(driver)
+            remaining = {node: remaining[node] for node in refused}
 
     def deactivate(self, node: GraphNode) -> None:
         """Deactivate a node if it is active."""
@@ -189,25 +275,20 @@ class Graph:
         self._executor.spin_until_future_complete(answer, timeout_sec=_DEACTIVATION_LIMIT)
         return answer.done() and answer.result().success
 
-    def refuse_other_graph(self) -> None:
-        """Raise `GraphError` if nodes of these names run already."""
-        end = time.monotonic() + _DISCOVERY
-        space = self.node.get_namespace().rstrip('/')
-        places = {(node.name, f'{space}/{node.mount}'.rstrip('/') or '/') for node in self.nodes}
-        while time.monotonic() < end:
-            self.serve_once()
-            for name, own_space in places.intersection(present_nodes(self.node)):
-                raise GraphError(
-                    f'{name} in namespace {own_space} already runs in ROS domain {self.settings.domain}: end '
-                    'that graph, or choose another domain or namespace'
-                )
-
     def wait_for_matches(self) -> None:
         """Wait until every topic that a node needs has found its other side."""
+        lacking: dict[str, list[str]] = {}
+
+        def matched() -> bool:
+            lacking.clear()
+            lacking.update({node.full_name: self.missing_topics(node) for node in self.nodes})
+            return not any(lacking.values())
+
         try:
-            self.wait_until(lambda: not self._waiting(), _MATCH_LIMIT, 'connection of all topics')
+            self.wait_until(matched, _MATCH_LIMIT, 'connection of all topics')
         except GraphError as error:
-            raise GraphError(f'{error}: {"; ".join(self._waiting())}') from None
+            waiting = [f'{name} waits for {", ".join(topics)}' for name, topics in lacking.items() if topics]
+            raise GraphError(f'{error}; {"; ".join(waiting)}') from None
 
     def publish_session(self, mount: str, text: str) -> None:
         """Publish the session of a mount."""
@@ -225,13 +306,16 @@ class Graph:
         space = f'/{self.settings.namespace}'.replace('//', '/').rstrip('/')
         return sorted({f'{space}/{name}' for name in needed} & {*figures['unmatched'].split(', ')})
 
-    def _waiting(self) -> list[str]:
-        """Return in words which nodes wait for which topics."""
-        lacking = {node.full_name: self.missing_topics(node) for node in self.nodes}
-        return [f'{name} waits for {", ".join(topics)}' for name, topics in lacking.items() if topics]
+    def _driver(self, node: GraphNode) -> GraphNode:
+        """Return the driver of the mount of a node."""
+        return next((each for each in self.nodes if each.is_a(DRIVER) and each.mount == node.mount), DRIVER)
+
+    def _late_setpoints(self, node: GraphNode) -> int:
+        """Return how many setpoints came too late for the driver of its mount."""
+        return int(self.figures(self._driver(node)).get('late_setpoints', 0))
 
     def _request(self, node: GraphNode, transition: str) -> Any:
-        request = ChangeState.Request(transition=Transition(id=_TRANSITIONS[transition]))
+        request = ChangeState.Request(transition=Transition(label=transition))
         return self.client(ChangeState, f'{node.full_name}/change_state').call_async(request)
 
     def _reason(self, node: GraphNode) -> str:
@@ -241,8 +325,18 @@ class Graph:
             self.serve_once()
         return self.figures(node).get('sentence', '(no report)')
 
+    def _take_report(self, message: DiagnosticArray) -> None:
+        """Take a message of `/diagnostics`, which all mounts of the car share."""
+        space = f'{self.settings.namespace.strip("/")}/'.lstrip('/')
+        known = {f'{space}{node.full_name}': node.full_name for node in self.nodes}
+        for report in verdicts_in(message):
+            if name := known.get(report.node):
+                figures = {**report.figures, 'level': str(report.level), 'sentence': report.sentence}
+                self._reported[name], self._figures[name] = time.monotonic(), figures
+                self.observer.on_report(name, figures)
+
     def _take_event(self, mount: str, message: String) -> None:
-        self.reports.observer.on_mark(mount, read_mark(message.data, 0))
+        self.observer.on_mark(mount, read_mark(message.data, 0))
 
     def _take_down(self) -> None:
         self._executor.shutdown()

@@ -1,4 +1,4 @@
-"""The launch files: they check the arguments, and start the supervisor, which owns all other processes.
+"""The launch files: they start the supervisor, which checks the arguments and owns all other processes.
 
 Needs the `launch` of a ROS 2 installation; where there is none, the executable `mount_supervisor` takes the
 same arguments.
@@ -11,30 +11,26 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction
 from launch.events import Shutdown
 from launch.events.process import ProcessExited
 
-from mount_bringup.graph.launch_arguments import arguments_of, texts_of
-from mount_bringup.graph.order import launch_order
+from mount_bringup.graph.order import arguments_of, texts_of
 from mount_bringup.graph.processes import QUIET_START
 from mount_bringup.graph.run import SUPERVISOR
-from mount_ros.environment import prepare_environment
 from mount_ros.nodes.process import environment_of_children
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
 
 _PATIENCE = '86400'  # s, chosen: the supervisor has limits of its own, and a recorder may write for long
 
 
 def launch_description(graph: str) -> LaunchDescription:
     """Return the launch file of a graph; its shipped parameter file is the default of `config`."""
-    prepare_environment()  # discovery on this machine only, unless the user has chosen otherwise
     config = Path(get_package_share_directory('mount_bringup')) / 'config' / f'{graph}.yaml'
     declared = [
         DeclareLaunchArgument(
             argument.name,
             default_value=str(config) if argument.name == 'config' else argument.default,
-            description=argument.description,
+            description=argument.meaning,
             choices=argument.choices.split() or None,
         )
         for argument in arguments_of(graph)
@@ -43,18 +39,14 @@ def launch_description(graph: str) -> LaunchDescription:
 
 
 def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    given = {argument.name: context.launch_configurations[argument.name] for argument in arguments_of(graph)}
     # Where another launch file includes ours, an argument may be for that one.
     if any(Path(word).name == f'{graph}.launch.py' for word in sys.argv):
         texts_of([word for word in sys.argv if ':=' in word], graph)
-    launch_order(graph, given)
-    inherited = drop_real_time()
-    if inherited and given['priority'] == '0':
-        given['priority'] = str(inherited)
+    names = [argument.name for argument in arguments_of(graph)]
     process = ExecuteProcess(
         cmd=[
             *(sys.executable, '-c', f'{QUIET_START}from mount_bringup.graph.run import main; main()', graph),
-            *(f'{name}:={text}' for name, text in given.items()),
+            *(f'{name}:={context.launch_configurations[name]}' for name in names),
         ],
         name=SUPERVISOR,
         additional_env=environment_of_children(0),
@@ -63,8 +55,7 @@ def _supervisor(graph: str, context: LaunchContext) -> list[LaunchDescriptionEnt
         output='both',
         on_exit=_on_exit,
     )
-    notes = [LogInfo(msg=started_in_real_time(inherited))] if inherited else []
-    return [*notes, process]
+    return [process]
 
 
 def _on_exit(event: ProcessExited, _: LaunchContext) -> EmitEvent:

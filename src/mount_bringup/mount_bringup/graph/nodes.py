@@ -23,13 +23,11 @@ class GraphNode:
     """A lifecycle node of the package of its name, and the topics that it cannot do without.
 
     `mount` is the namespace of its mount within that of the graph, empty where there is one mount alone, or
-    for what all mounts share. An activation is tried `activations` times; attempts at which the machine was
-    too late for the 1 kHz loop do not count.
+    for what all mounts share.
     """
 
     name: str
     needs: tuple[str, ...] = ()
-    activations: int = 1
     mount: str = ''
 
     @property
@@ -50,11 +48,7 @@ class GraphNode:
 RECORDER = GraphNode('mount_recorder')
 DRIVER = GraphNode('mount_driver', ('current_setpoint', 'displacement', 'coil_ripple', 'coil_temperature'))
 SIM = GraphNode('mount_sim')
-INIT = GraphNode(
-    'mount_init',
-    ('coil_ripple', 'coil_temperature', 'current_setpoint'),
-    activations=2,  # chosen
-)
+INIT = GraphNode('mount_init', ('coil_ripple', 'coil_temperature', 'current_setpoint'))
 CONTROL = GraphNode('mount_control', ('displacement', 'current_setpoint', 'air_gap', 'current_force_table'))
 
 SIMULATED: tuple[GraphNode, ...] = (RECORDER, DRIVER, SIM, INIT, CONTROL)

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,12 +24,13 @@ _RECORDER_SHARE = 0.5  # chosen: of the loop's priority; before all others, for 
 class NodeProcess:
     """One process of the graph with the nodes that live in it.
 
-    It loads what it needs at once, and makes its nodes after `begin`. `reported`: the user knows of its end.
+    `begun`: its nodes have been configured. `reported`: the user knows of its end.
     """
 
     def __init__(self, nodes: Sequence[GraphNode], settings: GraphSettings, folder: Path):
         self.nodes = tuple(nodes)
         self.name = ' + '.join(node.full_name for node in nodes)
+        self.begun = False
         stem = self.name.replace('/', '_').replace(' + ', '_')
         self.log_file = folder / f'{stem}.log'
         self._settings = settings
@@ -43,35 +43,23 @@ class NodeProcess:
         self._process = self._start()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        self.begun = self.reported = False
+        self.reported = False
         with contextlib.ExitStack() as files:
             log = None if self._settings.log_to_screen else files.enter_context(self.log_file.open('ab'))
             return subprocess.Popen(
                 self._command,
-                stdin=subprocess.PIPE,
+                stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
                 env={**os.environ, **_environment(self.nodes, self._settings)},
                 start_new_session=True,  # Ctrl-C in the terminal goes to the supervisor alone
             )
 
-    def begin(self) -> None:
-        """Let it make its nodes."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self.begun = True
-
     def start_again(self) -> None:
         """Kill what is left of the process and start it with the same parameters; its log goes on."""
         self._process.kill()
         self._process.wait()
         self._process = self._start()
-        self.begin()
-
-    @property
-    def pid(self) -> int:
-        """The number of the process that runs now."""
-        return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -79,15 +67,14 @@ class NodeProcess:
         return self._process.poll()
 
     def last_words(self) -> str:
-        """Return the last error line of the log, or its last line, and where the log is."""
+        """Return the last line of the log, and where the log is."""
         if self._settings.log_to_screen:
             return 'see its log above'
         lines = [line for line in self.log_file.read_text(errors='replace').splitlines() if line.strip()]
-        errors = [line for line in lines if '[ERROR]' in line or '[FATAL]' in line or 'Error: ' in line]
-        return f'{(errors or lines or ["(its log is empty)"])[-1]} (log: {self.log_file})'
+        return f'{(lines or ["(its log is empty)"])[-1]} (log: {self.log_file})'
 
     def interrupt(self) -> None:
-        """Send SIGINT: a node goes to 0 A and ends with code 0."""
+        """Send SIGINT: a node goes to 0 A and ends with code 0. One that does nothing yet is killed."""
         if self.exit_code is None:
             self._process.send_signal(signal.SIGINT if self.begun else signal.SIGKILL)
 
@@ -118,19 +105,15 @@ def end_processes(processes: Sequence[NodeProcess], *, at_once: bool) -> list[st
     One after the other, so that none drives the coil without those that watch it, or `at_once`.
     """
     known = [process for process in processes if process.reported or not process.begun]
-    died = [process for process in processes if process.exit_code is not None]
     complaints = []
     for process in processes[::-1] if at_once else ():
         process.interrupt()
     for process in processes[::-1]:
         if not at_once:
             process.interrupt()
-        begin = time.monotonic()
         code = process.wait()
         if code not in (0, -signal.SIGINT) and process not in known:  # -SIGINT: it was still loading
-            after = f'after {time.monotonic() - begin:.1f} s'
-            when = 'before the end of the graph' if process in died else after
-            complaints.append(f'{process.name} ended with code {code} {when}: {process.last_words()}')
+            complaints.append(f'{process.name} ended with code {code}: {process.last_words()}')
     return complaints
 
 
@@ -145,13 +128,13 @@ def _environment(nodes: Sequence[GraphNode], settings: GraphSettings) -> dict[st
 
 def _program(nodes: Sequence[GraphNode], namespace: str) -> str:
     """Return a program of Python; each node has a namespace, which no remapping of ROS could tell apart."""
-    imports, creates = 'import sys; from functools import partial; ', []
+    imports, creates = 'from functools import partial; ', []
     for node in nodes:
         space = '/' + name_in(namespace.strip('/'), node.mount).rstrip('/')
         imports += f'from {node.name}.node import {node.class_name}; '
         creates.append(f'partial({node.class_name}, namespace={space!r})')
     imports += 'from mount_ros.nodes.process import run_nodes; '
-    return f'{QUIET_START}{imports}sys.stdin.read(); run_nodes([{", ".join(creates)}])'
+    return f'{QUIET_START}{imports}run_nodes([{", ".join(creates)}])'
 
 
 def _parameter_text(nodes: Sequence[GraphNode], settings: GraphSettings) -> str:

@@ -1,6 +1,7 @@
 """What follows the failure of nodes, how often, and its steps; only in real time."""
 
 import time
+from collections import defaultdict
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -103,17 +104,12 @@ class Recovery:
     More failures of a node within a minute than `restart_limit` of the settings end the graph; 0: the first.
     """
 
-    def __init__(
-        self,
-        graph: Graph,
-        processes: Sequence[NodeProcess],
-        activate: Callable[[Sequence[GraphNode]], None],
-    ):
+    def __init__(self, graph: Graph, processes: Sequence[NodeProcess]):
         self.restarts: list[Restart] = []
         self.report: Callable[[str], None] = lambda sentence: None
         """Takes the sentence about each failure at once."""
-        self._graph, self._processes, self._activate = graph, processes, activate
-        self._times: dict[str, list[float]] = {}  # node -> of its failures, s on the steady clock
+        self._graph, self._processes = graph, processes
+        self._times: dict[str, list[float]] = defaultdict(list)  # of the failures of a node, s, steady clock
         self._celsius: dict[str, float] = {}  # driver -> coil temperature of its last report
 
     def recover(self, failure: NodesFailedError) -> None:
@@ -126,9 +122,6 @@ class Recovery:
             self._count(failure)
             nodes |= dict.fromkeys(failure.nodes)
             reasons.append(str(failure))
-            for node in failure.nodes:
-                if node.is_a(DRIVER) and flags_of(figures(node)).coil_model_known:
-                    self._celsius[node.full_name] = float(figures(node)['coil_model_celsius'])
             self.report(f'{failure}; {self._action(nodes).value}')
             try:
                 action = self._bring_back(nodes, active)
@@ -138,18 +131,17 @@ class Recovery:
         took = time.monotonic() - begin
         self.restarts.append(Restart(at, tuple(nodes), '; then '.join(reasons), action, took))
 
-    def initialise_again(self, mount: str) -> str:
+    def initialise_again(self) -> str:
         """Return the gaps of a new initialisation: 0 A, a ramp, a table, and an activation of the control.
 
-        Of the mount of this name, of all if it is empty. Where it raises `GraphError` control is not active.
+        Where it raises `GraphError` control is not active.
         """
-        graph = self._graph
-        nodes = self._chain({mount} if mount else ())
+        graph, nodes = self._graph, self._chain(())
         for node in reversed(nodes):  # control first: damping off, 0 A
             graph.deactivate(node)
         graph.wait_for_matches()
         for node in nodes:
-            self._activate([node])
+            graph.activate([node])
         inits = [node for node in nodes if node.is_a(INIT)]
         return '; '.join(f'{node.full_name}: {graph.fresh_figures(node)["sentence"]}' for node in inits)
 
@@ -162,8 +154,8 @@ class Recovery:
             raise GraphError(f'{failure}; without it there is no coil to drive: the graph ends')
         now = time.monotonic()
         for name in [node.full_name for node in failure.nodes] or ['electronics']:
-            times = [at for at in self._times.get(name, ()) if now - at <= _WINDOW] + [now]
-            self._times[name] = times
+            times = self._times[name]
+            times[:] = [at for at in times if now - at <= _WINDOW] + [now]
             if len(times) > limit:
                 raise GraphError(
                     f'{failure}; {name} was lost {len(times)} times within {_WINDOW:g} s '
@@ -171,11 +163,13 @@ class Recovery:
                 )
 
     def _bring_back(self, failed: Collection[GraphNode], active: set[GraphNode]) -> RecoveryAction:
-        graph, action = self._graph, self._action(failed)
-        chain = self._chain_of(failed)
+        graph, action, chain = self._graph, self._action(failed), self._chain(failed)
         wanted = {node for node in failed if not node.is_a(INIT)} & active
         for node in failed:
-            graph.reports.forget(node)
+            figures = graph.figures(node)
+            if flags_of(figures).coil_model_known:
+                self._celsius[node.full_name] = float(figures['coil_model_celsius'])
+            graph.forget(node)
         for process in self._processes:  # first: each wait for the others would find them failed once more
             if {*process.nodes} & {*failed}:
                 process.start_again()
@@ -198,23 +192,19 @@ class Recovery:
                 return self._bring_back(failed, active)
         for node in graph.nodes:
             if node in wanted:
-                self._activate([node])
+                graph.activate([node])
         return action
 
     def _action(self, failed: Collection[GraphNode]) -> RecoveryAction:
-        chain, figures = self._chain_of(failed), self._graph.figures
+        chain, figures = self._chain(failed), self._graph.figures
         drivers, inits = ([figures(node) for node in chain if node.is_a(kind)] for kind in (DRIVER, INIT))
         return recovery_action(failed, table_holds=all(map(table_holds, drivers, inits)))
 
-    def _chain_of(self, failed: Collection[GraphNode]) -> list[GraphNode]:
-        """Return the nodes of the mounts of a failure; one of the electronics is of all."""
-        mounts = {node.mount for node in failed if node.is_a(DRIVER, INIT, CONTROL)}
-        return self._chain(mounts) if mounts or not failed else []
-
-    def _chain(self, mounts: Collection[str]) -> list[GraphNode]:
-        """Return driver, initialisation and control of these mounts, of all if there are none."""
+    def _chain(self, failed: Collection[GraphNode]) -> list[GraphNode]:
+        """Return driver, initialisation and control of the mounts of a failure; without a node of all."""
         chain = [node for node in self._graph.nodes if node.is_a(DRIVER, INIT, CONTROL)]
-        return [node for node in chain if not mounts or node.mount in mounts]
+        mounts = {node.mount for node in chain if node in failed or not failed}
+        return [node for node in chain if node.mount in mounts]
 
     def _wait_for_start(self, node: GraphNode) -> None:
         """Wait until the new node answers: not yet configured."""
@@ -232,17 +222,17 @@ class Recovery:
 
     def _prepare(self, node: GraphNode, action: RecoveryAction) -> None:
         """Set what a node that is started again needs besides the parameters of its start."""
+        values: dict[str, object] = {}
         if node.is_a(RECORDER):
             uri = self._graph.settings.parameters[node.full_name]['uri']
-            self._set(node, 'uri', str(next_recording(Path(str(uri)))))
+            values['uri'] = str(next_recording(Path(str(uri))))
         elif node.full_name in self._celsius:
-            self._set(node, 'coil_celsius_before', self._celsius[node.full_name])
+            values['coil_celsius_before'] = self._celsius[node.full_name]
         elif node.is_a(CONTROL):
-            self._set(node, 'measured_before', action is RecoveryAction.DAMP_ON)
-
-    def _set(self, node: GraphNode, name: str, value: object) -> None:
-        parameters = [Parameter(name, value=value).to_parameter_msg()]
-        service = f'{node.full_name}/set_parameters'
-        [result] = self._graph.call(SetParameters, service, parameters=parameters).results
-        if not result.successful:
-            raise GraphError(f'{node.full_name} refused {name}: {result.reason}')
+            values['measured_before'] = action is RecoveryAction.DAMP_ON
+        for name, value in values.items():
+            parameters = [Parameter(name, value=value).to_parameter_msg()]
+            service = f'{node.full_name}/set_parameters'
+            [result] = self._graph.call(SetParameters, service, parameters=parameters).results
+            if not result.successful:
+                raise GraphError(f'{node.full_name} refused {name}: {result.reason}')

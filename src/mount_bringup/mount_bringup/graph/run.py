@@ -3,22 +3,18 @@
 `mount_supervisor vehicle channel:=can0 recording:=bags/first` takes the arguments of `vehicle.launch.py`.
 """
 
-import signal
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from rclpy.logging import get_logger
 
 from mount_bringup.graph.domain import domain_lock
-from mount_bringup.graph.launch_arguments import GRAPHS, texts_of
 from mount_bringup.graph.nodes import SIM, GraphError
 from mount_bringup.graph.order import LaunchOrder, launch_order
 from mount_bringup.graph.shutdown import Interrupted, ending_signals
 from mount_bringup.graph.supervisor import Parameters, Supervisor
-from mount_bringup.settings import SettingError
 from mount_recorder.session import new_session, session_text
 from mount_ros.environment import prepare_environment
 from mount_ros.nodes.shutdown import end_process
@@ -29,22 +25,14 @@ SUPERVISOR = 'mount_supervisor'
 def main() -> None:
     """Run a graph; end with code 0 at its end or by a signal, with 1 after a refusal or a failure."""
     prepare_environment()
-    code = run(sys.argv[1:])
-    for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C
-        signal.signal(number, signal.SIG_IGN)
-    end_process(code)
+    end_process(run(sys.argv[1:]))
 
 
 def run(command: Sequence[str]) -> int:
     """Run the graph of a command line and return the exit code."""
-    if '--help' in command:
-        print(
-            f'usage: {SUPERVISOR} {"|".join(GRAPHS)} [ARGUMENT:=TEXT ...]; arguments as of the launch files'
-        )
-        return 0
     try:
-        order = ordered(command)
-        mounts = list(dict.fromkeys(node.mount for node in order.nodes if node.mount))
+        order = launch_order(command)
+        mounts = [node.mount for node in order.nodes]
         with (
             domain_lock(order.settings.domain, order.settings.namespace, mounts),
             tempfile.TemporaryDirectory(prefix=f'{SUPERVISOR}_') as folder,
@@ -53,14 +41,6 @@ def run(command: Sequence[str]) -> int:
     except ValueError as error:
         get_logger(SUPERVISOR).fatal(str(error))
         return 1
-
-
-def ordered(command: Sequence[str]) -> LaunchOrder:
-    """Return the order of a command line; a `ValueError` says what cannot be."""
-    graph, *words = command or ['']
-    if graph not in GRAPHS:
-        raise SettingError(f'{SUPERVISOR} {graph}: the first word must be one of {", ".join(GRAPHS)}')
-    return launch_order(graph, texts_of(words, graph))
 
 
 def _supervise(order: LaunchOrder, folder: Path) -> int:
@@ -73,22 +53,20 @@ def _supervise(order: LaunchOrder, folder: Path) -> int:
 
     graph = Supervisor(order.nodes, order.settings, folder)
     graph.recovery.report = logger.error
-    failed = False
+    code = 0
     with ending_signals(graph.interrupt):
         try:
             graph.start(session, logger.info)
             logger.info('all nodes are active')
-            end = time.monotonic() + order.duration
-            graph.wait_until(lambda: graph.finished or time.monotonic() > end, float('inf'), 'the end')
+            graph.wait_until(lambda: graph.finished, float('inf'), 'the end')
             logger.info('the end of the drive')
         except Interrupted:
             logger.info('interrupted')
         except GraphError as error:
             logger.error(str(error))
-            failed = True
+            code = 1
         finally:
-            complaints = graph.stop()
-        restarts = [restart.sentence for restart in graph.recovery.restarts]
-        for sentence in [*graph.notes, *complaints, *restarts]:
+            complaints = graph.stop() + [restart.sentence for restart in graph.recovery.restarts]
+        for sentence in [*graph.notes, *complaints]:
             logger.warning(sentence)
-    return 1 if failed or complaints or restarts else 0
+    return 1 if complaints else code

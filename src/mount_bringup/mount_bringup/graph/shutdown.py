@@ -21,13 +21,9 @@ def interrupt_and_remember(number: int, frame: FrameType | None) -> None:
     """Raise `KeyboardInterrupt`, and hand it on if it is lost: a handler for SIGINT.
 
     Amid the import of a library it can be lost: some take every exception for something that is missing.
+    In a destructor Python would print and drop it.
     """
     _pending.append(number)
-    raise_interrupt(frame)
-
-
-def raise_interrupt(frame: FrameType | None) -> None:
-    """Raise `KeyboardInterrupt`, but not in a destructor: Python would print and drop it there."""
     while frame is not None:
         if frame.f_code.co_name == '__del__':
             return

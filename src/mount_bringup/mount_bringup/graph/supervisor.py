@@ -2,24 +2,21 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from itertools import groupby, zip_longest
 from pathlib import Path
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
 
-from mount_bringup.graph.activation import activate
-from mount_bringup.graph.graph import CONFIGURE, LONGEST_HANG, Graph
-from mount_bringup.graph.nodes import SIM, GraphError, GraphNode, GraphSettings, ending_order, groups, name_in
+from mount_bringup.graph.graph import CONFIGURE, LONGEST_HANG, SILENCE_LIMIT, Graph
+from mount_bringup.graph.nodes import SIM, GraphError, GraphNode, GraphSettings, ending_order, groups
 from mount_bringup.graph.processes import NodeProcess, end_processes
 from mount_bringup.graph.recovery import NodesFailedError, Recovery
-from mount_bringup.graph.reports import SILENCE_LIMIT
 from mount_bringup.settings import settings_of_mount
 from mount_ros.environment import loopback_refusal
+from mount_ros.messages.verdicts import flags_of
 from mount_ros.nodes.process import Starter
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
-from mount_ros.nodes.shutdown import remove_abandoned
+from mount_ros.nodes.shutdown import end_after, remove_abandoned
 
 Parameters = dict[str, dict[str, object]]
 
@@ -36,19 +33,17 @@ class Supervisor(Graph):
         self._folder = folder
         self._starter = Starter()
         self.processes: list[NodeProcess] = []
-        self.recovery = Recovery(self, self.processes, partial(activate, self))
+        self.recovery = Recovery(self, self.processes)
         self._recovers = False
 
     def open(self) -> None:
-        """Join the middleware, and offer `~/reinitialize`, of one of several mounts `~/<mount>/reinitialize`.
+        """Join the middleware, and offer `~/reinitialize`.
 
         The answer serves the executor meanwhile: its callback group has nothing else.
         """
         super().open()
         group = MutuallyExclusiveCallbackGroup()
-        for mount in dict.fromkeys(['', *self.mounts]):
-            service, take = f'~/{name_in(mount, "reinitialize")}', partial(self._initialise_again, mount)
-            self.node.create_service(Trigger, service, take, callback_group=group)
+        self.node.create_service(Trigger, '~/reinitialize', self._initialise_again, callback_group=group)
 
     def start(self, session: Callable[[Parameters], str], report: Callable[[str], None]) -> None:
         """Start all nodes; `session` makes the session text of a mount from the parameters of its nodes."""
@@ -57,25 +52,22 @@ class Supervisor(Graph):
         remove_abandoned()
         self.open()
         report('starting the nodes')
-        if inherited := drop_real_time():
-            self.notes.append(started_in_real_time(inherited))
         of_processes = groups(self.nodes, self.settings.grouping)
         for group in of_processes:
             self.processes.append(NodeProcess(group, self.settings, self._folder))
-        self.refuse_other_graph()  # while the processes load
-        for process in self.processes:
-            process.begin()
         # Those of one process in their order: its data thread serves those first that came last.
         for side_by_side in zip_longest(*of_processes):
             self.transition([node for node in side_by_side if node is not None], CONFIGURE)
+        for process in self.processes:
+            process.begun = True
         parameters = {node.full_name: self.parameters_of(node) for node in self.nodes}
         for mount in self.mounts:
             self.publish_session(mount, session(settings_of_mount(parameters, mount)))
         self.wait_for_matches()
         for _, of_mounts in groupby(self.nodes, lambda node: node.name):
-            activate(self, list(of_mounts), report)
+            self.activate(list(of_mounts), report)
         self._recovers = not any(values.get('lockstep') for values in parameters.values())
-        self.reports.pause_silence()
+        self.pause_silence()
 
     @property
     def finished(self) -> bool:
@@ -95,22 +87,15 @@ class Supervisor(Graph):
             if not self._recovers:
                 raise
             with self._recovery_paused():
-                try:
-                    self.recovery.recover(failure)
-                except GraphError as error:
-                    if not self.finished:
-                        raise
-                    self.notes.append(f'{error}, at the end of the drive')
+                self.recovery.recover(failure)
 
     def stop(self) -> list[str]:
         """Deactivate all nodes and end; return a sentence per unclean end."""
-        self.deadline.set(LONGEST_HANG)
+        end_after(LONGEST_HANG)
         resting = [self.try_to_deactivate(node) for node in ending_order(self.nodes)]
-        self.deadline.set(0.0)  # what follows has limits of its own, and its sentences must be reported
+        end_after(0.0)  # what follows has limits of its own, and its sentences must be reported
         complaints = end_processes(self.processes, at_once=all(resting))
-        for reasons in self.repeats.values():
-            times = f', the last of {len(reasons)} times' if len(reasons) > 1 else ''
-            self.notes.append(f'{reasons[-1]}; it was activated again{times}')
+        self.notes += [f'{reason}; it was activated again' for reason in self.repeats.values()]
         self.close()
         remove_abandoned()
         return complaints
@@ -125,19 +110,21 @@ class Supervisor(Graph):
                 words = process.last_words().split(']: ', 1)[-1]
                 reason = f'{process.name} ended with code {process.exit_code}; last words: {words}'
                 raise NodesFailedError(process.nodes, reason)
-        self.reports.check_fatal()
-        if not self._recovers:
-            return
-        if silent := self.reports.silent():
-            hanging = [process.nodes for process in self.processes]
-            hanging = [nodes for nodes in hanging if {node.full_name for node in nodes} & {*silent}]
+        for node in self.nodes:
+            figures = self.figures(node)
+            flags, reason = flags_of(figures), f'{node.full_name}: {figures.get("sentence")}'
+            if flags.fatal:
+                raise GraphError(reason)
+            if flags.needs_initialisation and self._recovers:
+                raise NodesFailedError((), reason)
+        if self._recovers and (silent := self.silent()):
+            of_processes = [process.nodes for process in self.processes]
+            hanging = [nodes for nodes in of_processes if {each.full_name for each in nodes} & {*silent}]
             raise NodesFailedError(
-                sum(hanging, ()),
+                [node for nodes in hanging for node in nodes],
                 f'{", ".join(silent)}: no diagnostics for {SILENCE_LIMIT:g} s (limit {SILENCE_LIMIT:g} s): '
                 'treated as failed; check its log and the CPU load',
             )
-        if reason := self.reports.initialisation_request():
-            raise NodesFailedError((), reason)
 
     @contextmanager
     def _recovery_paused(self) -> Iterator[None]:
@@ -146,9 +133,9 @@ class Supervisor(Graph):
             yield
         finally:
             self._recovers = True
-            self.reports.pause_silence()
+            self.pause_silence()
 
-    def _initialise_again(self, mount: str, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
+    def _initialise_again(self, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
         if not self._recovers:
             answer.message = (
                 'not initialised: the graph starts, recovers or runs in lock-step; try again when all nodes '
@@ -157,7 +144,7 @@ class Supervisor(Graph):
             return answer
         with self._recovery_paused():
             try:
-                answer.message = f'initialised anew; {self.recovery.initialise_again(mount)}'
+                answer.message = f'initialised anew; {self.recovery.initialise_again()}'
                 answer.success = True
             except GraphError as error:
                 answer.message = f'not initialised, the coil stays at 0 A: {error}'

@@ -27,20 +27,18 @@ _COUNTER_MASK = 0xFFFF
 class CoilWatchParameters(NamedTuple):
     """How far the measured coil current may lie from where the setpoints put it, and how long."""
 
-    limit: Annotated[float, Quantity('A', 'greatest deviation of the coil current', 0.02, 1.0, 'chosen')] = (
-        0.1
-    )
+    limit: Annotated[float, Quantity('A', 'greatest deviation of the coil current', 0.02, 1.0)] = 0.1
     duration: Annotated[
-        float, Quantity('s', 'a deviation that lasts so long takes the coil to 0 A', 0.002, 0.1, 'chosen')
+        float, Quantity('s', 'a deviation that lasts so long takes the coil to 0 A', 0.002, 0.1)
     ] = 0.020
     bandwidth: Annotated[
-        float, Quantity('Hz', "bandwidth of the electronics' current loop", 50.0, 2000.0, 'chosen')
+        float, Quantity('Hz', "bandwidth of the electronics' current loop", 50.0, 2000.0)
     ] = 400.0
     rise_rate: Annotated[
-        float, Quantity('A/s', 'slowest rise of a working coil at low supply', 10.0, 1000.0, 'chosen')
+        float, Quantity('A/s', 'slowest rise of a working coil at low supply', 10.0, 1000.0)
     ] = 50.0
     fall_rate: Annotated[
-        float, Quantity('A/s', 'slowest fall of a working coil at low supply', 10.0, 1000.0, 'chosen')
+        float, Quantity('A/s', 'slowest fall of a working coil at low supply', 10.0, 1000.0)
     ] = 150.0
 
 
@@ -106,18 +104,15 @@ class CoilWatch:
         current = sample.coil_current
         within = self._low - self._limit <= current <= self._high + self._limit  # not so for NaN
         if within or (current != current and wanted == 0.0):
+            # Many that fit make up for one that deviated: a coil that is stuck fits now and then too.
             if self._deviating:
-                self._forgive()
+                self._fitting += 1
+                if self._fitting == _FORGIVEN:
+                    self._fitting = 0
+                    self._deviating -= 1
             return ''
         self._deviating += 1
         return self._sentence(current) if self._deviating > self._duration else ''
-
-    def _forgive(self) -> None:
-        """Forget a sample that deviated for many that fit: a coil that is stuck fits now and then too."""
-        self._fitting += 1
-        if self._fitting == _FORGIVEN:
-            self._fitting = 0
-            self._deviating -= 1
 
     def _sentence(self, current: float) -> str:
         measured = f'{current:.3f} A' if current == current else 'not valid'

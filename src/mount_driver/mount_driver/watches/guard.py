@@ -6,8 +6,7 @@ No bus here, and nothing is written to the link: each judgement is returned.
 from collections import deque
 
 from mount_driver.clock import Clock
-from mount_driver.layout import MessageLayout
-from mount_driver.link import NO_LIMITS, Fault, Limits, Link, Stamped
+from mount_driver.link import Fault, Limits, Link, Stamped
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec, Setpoint, Status
 from mount_driver.watches.coil_watch import CoilWatch
@@ -35,11 +34,9 @@ class Guard:
         heat: HeatWatch,
         law: RippleLaw,
     ):
-        self.foreign_setpoints = 0
-        """Sound setpoint frames of another sender."""
         self.writer_doubt = ''
         """Why another node may publish setpoints, so that answers are 0 A; empty where none may."""
-        self.limits = NO_LIMITS
+        self.limits = Limits()
         """What the watches allow since the last sample that they judged."""
         self.unjudged: tuple[Stamped, int] | None = None
         """The newest sample and when it came (ns), until it is judged."""
@@ -50,27 +47,13 @@ class Guard:
         self._link, self._clock = link, clock
         self._coil = CoilWatch(parameters.coil, sample_time_ns(parameters.sample_rate))
         self._health = StatusWatch(parameters.status)
-        self._samples = SenderWatch(parameters.senders, codec.measurement.name, _ALONE)
-        self._statuses = SenderWatch(parameters.senders, codec.status.name, _ALONE)
-        self._setpoints: MessageLayout = codec.setpoint
-        self._foreign_at: int | None = None
+        self._samples = SenderWatch(codec.measurement.name, _ALONE)
+        self._statuses = SenderWatch(codec.status.name, _ALONE)
         self._sent_last = 0.0  # A
         self._heating_since: int | None = None  # stamp from which the squares of the current are summed
         self._squares, self._summed = 0.0, 0
         self._breaks = 0
         heat.begin()
-
-    @property
-    def other_senders(self) -> int:
-        """How many frames came that neither our electronics nor we sent."""
-        link = self._link
-        return self.foreign_setpoints + _strangers(link) + link.statuses.strangers
-
-    @property
-    def other_sender_at(self) -> int | None:
-        """When the last of them came (ns), None where none has."""
-        times = (self._foreign_at, self._samples.last, self._statuses.last)
-        return max((time for time in times if time is not None), default=None)
 
     def judge_sample(self) -> Fault | None:
         """Return what follows from the newest sample, which is then judged; `limits` change with it."""
@@ -97,7 +80,12 @@ class Guard:
         breaks = self._link.counts.jumps + self._clock.restarts
         if breaks != self._breaks:
             self._breaks = breaks
-            return Fault(self._restart_sentence(), needs_initialisation=True)
+            jumped = self._link.counts.jumps
+            kind = 'contradict each other' if jumped else 'have jumped or begun anew, as at a restart'
+            return Fault(
+                f"the electronics' counters {kind} ({breaks} times, limit 0): check their supply",
+                needs_initialisation=True,
+            )
         sentence = self._link.rate_objection or self._coil.judge(sample, sent)
         sent.clear()
         sentence = sentence or self.ripple.judge(
@@ -107,7 +95,9 @@ class Guard:
 
     def judge_frame(self, received: int) -> Fault | None:
         """Return what follows from a measurement frame that was not used, or a sample that came once more."""
-        sentence = self._samples.judge(_strangers(self._link), self._clock.now(received))
+        link = self._link
+        strangers = link.samples.strangers + link.contradictions
+        sentence = self._samples.judge(strangers, self._clock.now(received))
         return Fault(sentence) if sentence else None
 
     def judge_status(self, status: Status | None, now: int) -> Fault | None:
@@ -119,21 +109,10 @@ class Guard:
             sentence = self._health.judge(status, now) or sentence
         return Fault(sentence) if sentence else None
 
-    def judge_foreign(self, setpoint: Setpoint | None, now: int) -> Fault:
+    def judge_foreign(self, setpoint: Setpoint | None) -> Fault:
         """Return what follows from a sound setpoint frame of another sender; None: it exceeds the limit."""
-        self.foreign_setpoints += 1
-        self._foreign_at = now
         wanted = 'a current beyond the limit' if setpoint is None else f'{setpoint.current:.3f} A'
         return Fault(
-            f'another node sends {self._setpoints.name} ({wanted}; 1 frame, limit 0): '
+            f'another node sends MountSetpoint ({wanted}; 1 frame, limit 0): '
             f'take it off the bus, only mount_driver may send it'
         )
-
-    def _restart_sentence(self) -> str:
-        jumped = self._link.counts.jumps
-        kind = 'contradict each other' if jumped else 'have jumped or begun anew, as at a restart'
-        return f"the electronics' counters {kind} ({self._breaks} times, limit 0): check their supply"
-
-
-def _strangers(link: Link) -> int:
-    return link.samples.strangers + link.contradictions

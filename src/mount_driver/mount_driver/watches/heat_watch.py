@@ -11,7 +11,9 @@ So that a coil that is warm, or may be, can be initialised all the same, each ac
 to spare from its begin on: the ramp warms the coil by less than 1 K.
 """
 
-from mount_models.coil.heating import CoilHeating, highest_current, hottest_by_current, warmed
+from math import nan
+
+from mount_models.coil.copper import CoilHeating, highest_current, hottest_by_current, warmed
 from mount_models.sampling import HIGHEST_CURRENT
 
 _LONGEST_STEP = 2.0  # s, chosen: of a longer pause nothing is known, so the coil has not cooled
@@ -23,7 +25,7 @@ _NEAR = 5.0  # K, chosen: so near to its limit nothing is spared
 class HeatWatch:
     """The temperature of the coil; it outlives an activation of the driver, as the heat does."""
 
-    def __init__(self, heating: CoilHeating, celsius: float = float('nan')):
+    def __init__(self, heating: CoilHeating, celsius: float = nan):
         """`celsius`: the temperature by what ran before, at most 10 s old; NaN where nobody knows."""
         self.known = celsius == celsius
         """Whether the temperature rests on what was measured, and not on the worst that may be."""
@@ -38,7 +40,7 @@ class HeatWatch:
     @property
     def known_celsius(self) -> float:
         """The temperature for a watch that follows this one, degC; NaN where it is not known."""
-        return self.celsius if self.known else float('nan')
+        return self.celsius if self.known else nan
 
     def begin(self) -> None:
         """Let another activation begin: it has its own current to spare."""

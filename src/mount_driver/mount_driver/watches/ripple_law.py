@@ -6,7 +6,7 @@ The defaults are those of the shipped specimen: to read its file would cost ever
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from mount_models.coil.duty import Bridge, gap_reluctance, skin_shape
+from mount_models.coil.correction import Bridge, gap_reluctance, skin_shape
 from mount_models.coil.gap import evaluate
 
 if TYPE_CHECKING:  # to load it takes a second
@@ -19,9 +19,9 @@ DUTY_STEP = 1.0 / 256.0
 class RippleLaw(NamedTuple):
     """Inductance at rest and crossing current at the calibrated gaps, and what the temperature does; SI.
 
-    `crossing` holds the crossing currents (A) at the lowest, the middle and the highest calibrated gap. The
-    inductance rises by the share `warm_rise` from `calibration_celsius` to `reference_celsius`. The curves
-    hold at `bridge.link_voltage`; `gap_reluctance` (1/H) is the share of the middle gap in 1 / L_i.
+    The crossing currents (A) are those at the lowest and the highest calibrated gap. The inductance rises
+    by the share `warm_rise` from `calibration_celsius` to `reference_celsius`. The curves hold at
+    `bridge.link_voltage`; `gap_reluctance` (1/H) is the share of the middle gap in 1 / L_i.
     """
 
     turns_area: float = 0.11808
@@ -31,7 +31,8 @@ class RippleLaw(NamedTuple):
     rest_inductance_high: float = 0.05226015296166296
     gap_low: float = 0.00025000000000000006
     gap_high: float = 0.0005500000000000001
-    crossing: tuple[float, float, float] = (1.169341254762723, 1.500349166592128, 1.754917203805684)
+    crossing_low: float = 1.169341254762723
+    crossing_high: float = 1.754917203805684
     calibration_celsius: float = 20.0
     reference_celsius: float = 80.0
     conductivity_coefficient: float = 0.0043
@@ -46,7 +47,7 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
     calibrated = curves.crossing_current_of_gap
     low, high = calibrated.low, calibrated.high
     middle = 0.5 * (low + high)
-    crossing = [float(evaluate(calibrated, gap)) for gap in (low, middle, high)]
+    cold = float(evaluate(curves.inductance_of_gap, middle))
     law = RippleLaw(
         turns_area=specimen.turns_area,
         rest_current=specimen.rest_current,
@@ -55,14 +56,14 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
         rest_inductance_high=curves.gap_of_inductance.high,
         gap_low=low,
         gap_high=high,
-        crossing=(crossing[0], crossing[1], crossing[2]),
+        crossing_low=float(evaluate(calibrated, low)),
+        crossing_high=float(evaluate(calibrated, high)),
         warm_rise=0.0,
         bridge=specimen.bridge,
-        gap_reluctance=_HALF / float(evaluate(curves.inductance_of_gap, middle)),
+        gap_reluctance=_HALF / cold,
     )
     if temperature is None:
         return law
-    cold = float(evaluate(curves.inductance_of_gap, middle))
     shift = float(evaluate(temperature.reluctance_shift, middle))
     return law._replace(
         calibration_celsius=temperature.calibration_celsius,
@@ -78,7 +79,7 @@ def ripple_law(specimen: 'Specimen') -> RippleLaw:
 def warmth(law: RippleLaw, celsius: float) -> float:
     """Return by which factor the inductance exceeds that at the calibration; 1 at an unknown temperature.
 
-    One factor for all gaps and currents, with the depth of the skin as in `mount_models.coil.temperature`: of
+    One factor for all gaps and currents, with the depth of the skin as in `mount_models.coil.correction`: of
     the simulated coil up to 1.6 A it is right to 2 % from -40 to 122 degC.
     """
     if celsius != celsius:
@@ -88,26 +89,16 @@ def warmth(law: RippleLaw, celsius: float) -> float:
 
 
 def skin_table(law: RippleLaw) -> list[float]:
-    """Return `mount_models.coil.duty.skin_shape` from a duty of 0.5 on, in steps of `DUTY_STEP`."""
+    """Return `mount_models.coil.correction.skin_shape` from a duty of 0.5 on, in steps of `DUTY_STEP`."""
     return skin_shape(law.bridge, [0.5 + k * DUTY_STEP for k in range(_DUTIES)]).tolist()
-
-
-def gap_of_crossing(law: RippleLaw, current: float) -> float:
-    """Return the gap (m) at the crossing current (A): the parabola through the three that are known."""
-    low, middle, high = law.crossing
-    step = 0.5 * (law.gap_high - law.gap_low)
-    first, second = step / (middle - low), step / (high - middle)
-    return law.gap_low + (current - low) * (first + (current - middle) * (second - first) / (high - low))
 
 
 def crossing_per_gap(law: RippleLaw) -> float:
     """Return how far the crossing current moves with the gap, A/m, on the mean over the calibrated gaps."""
-    return (law.crossing[2] - law.crossing[0]) / (law.gap_high - law.gap_low)
+    return (law.crossing_high - law.crossing_low) / (law.gap_high - law.gap_low)
 
 
-_HALF = (
-    0.5  # 1, chosen: without a second temperature, of the reluctance at rest; 0.49 of the shipped actuator
-)
+_HALF = 0.5  # 1, chosen: of the reluctance at rest, without a second temperature; 0.49 of the shipped one
 _DUTIES = 128  # from 0.5 on: the table ends before 1
 
 

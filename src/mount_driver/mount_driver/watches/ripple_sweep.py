@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mount_driver.watches.ripple_law import RippleLaw, crossing_per_gap, gap_of_crossing
+from mount_driver.watches.ripple_law import RippleLaw, crossing_per_gap
 from mount_models.sampling import HIGHEST_CURRENT
 
 NODE = 0.05
@@ -17,9 +17,7 @@ _NODES = round(HIGHEST_CURRENT / NODE) + 1
 _PEAK = 2.0  # A: the lowest peak that mount_init may have, and beyond every crossing
 _BEGUN, _ENDED = 0.3, 0.5 * NODE  # A, chosen: a sweep has begun above the one and is over below the other
 _FEWEST = 3  # readings, chosen: of fewer a node of the curve is not known
-_SATURATED = (
-    0.5  # share of the crossing inductance, chosen: below it the core is full and the gap hardly shows
-)
+_SATURATED = 0.5  # of the crossing inductance, chosen: below it the core is full and the gap hardly shows
 _SATURATED_LIMIT = 0.35  # 1, chosen: what the temperature changes there is up to 0.25
 _CURRENT_MARGIN = 0.05  # A, chosen: mount_init has refused long before
 _INDUCTANCE_MARGIN = 0.02  # 1, chosen
@@ -32,7 +30,6 @@ class Reference(NamedTuple):
     slope: list[float]
     tolerance: list[float]
     crossing_current: float
-    gap: float  # m, at the crossing: the pads are pressed there
 
 
 class Sweep:
@@ -87,13 +84,7 @@ class Sweep:
         steps = gap_limit * crossing_per_gap(law)
         tolerance = np.maximum(inductance_limit, np.abs(slope) * steps / values)
         tolerance[values < _SATURATED * law.crossing_inductance] = _SATURATED_LIMIT
-        return Reference(
-            values.tolist(),
-            slope.tolist(),
-            tolerance.tolist(),
-            float(crossing),
-            gap_of_crossing(law, float(crossing)),
-        )
+        return Reference(values.tolist(), slope.tolist(), tolerance.tolist(), float(crossing))
 
 
 def objection(reference: Reference, law: RippleLaw, wider: float) -> str:
@@ -102,17 +93,16 @@ def objection(reference: Reference, law: RippleLaw, wider: float) -> str:
     An unknown temperature makes the limits `wider` by this share of the inductance, and so many A of the
     crossing: by 0.1, 100 K shift it by 0.07 A.
     """
-    low, high = law.crossing[0] - _CURRENT_MARGIN - wider, law.crossing[2] + _CURRENT_MARGIN + wider
-    current = reference.crossing_current
+    margin, current = _CURRENT_MARGIN + wider, reference.crossing_current
+    low, high = law.crossing_low - margin, law.crossing_high + margin
     if not low <= current <= high:
         return (
             f'coil ripple in the ramp falls through {1e3 * law.crossing_inductance:g} mH at {current:.2f} A; '
             f'with a gap of {1e6 * law.gap_low:.0f} .. {1e6 * law.gap_high:.0f} um that lies within '
             f'{low:.2f} .. {high:.2f} A: check pads, gap and ripple measurement'
         )
-    inductance = reference.inductance[round(law.rest_current / NODE)]
-    least = (1.0 - _INDUCTANCE_MARGIN - wider) * law.rest_inductance_low
-    highest = (1.0 + _INDUCTANCE_MARGIN + wider) * law.rest_inductance_high
+    margin, inductance = _INDUCTANCE_MARGIN + wider, reference.inductance[round(law.rest_current / NODE)]
+    least, highest = (1.0 - margin) * law.rest_inductance_low, (1.0 + margin) * law.rest_inductance_high
     if not least <= inductance <= highest:
         return (
             f'coil ripple in the ramp gives {1e3 * inductance:.1f} mH at {law.rest_current:g} A; with a gap '

@@ -16,7 +16,7 @@ below 0.7 A; above 1.8 A, where the core is full, only missing pads show.
 Noise: readings of 1 % (sigma) leave 0.18 % on a mean of 16 and 0.3 % with that of the reference. The limit of
 5 % lies 16 sigma away, and 8 behind an error of temperature and supply of 2.5 %: 6e-16 for each mean, and so
 less than one false alarm in 1e5 years. The mean shows a missing pad after 5 readings within 0.1 A and a
-blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Reported is what lasts for `duration`:
+blocked gap after 10 to 25, which takes a damped engine 0.1 s at most. Reported is what lasts for `_DURATION`:
 three statuses, as supply and temperature are that late.
 
 Worn pads show between 0.75 A and the crossing, where an engine that is damped once for 0.1 s may come by only
@@ -24,15 +24,15 @@ once, with a few readings in each zone. There a mean over all currents joins the
 reported also if none comes again.
 """
 
+from math import nan
 from typing import Annotated, NamedTuple
 
-from mount_driver.watches.ripple_law import DUTY_STEP, RippleLaw, crossing_per_gap, skin_table, warmth
+from mount_driver.watches.ripple_law import DUTY_STEP, RippleLaw, skin_table, warmth
 from mount_driver.watches.ripple_sweep import NODE, Reference, Sweep, objection
-from mount_models.coil.heating import COPPER_CELSIUS, CoilHeating
+from mount_models.coil.copper import REFERENCE_CELSIUS, CoilHeating
 from mount_models.quantity import Quantity
 
 _SHARE = 1.0 / 16.0  # of a new reading in the means of voltage, validity and inductance, chosen
-_SLOW_SHARE = 1.0 / 256.0  # in that of the gap, chosen
 _NOISE_SHARE = 1.0 / 64.0  # in that of the scatter, chosen
 _FARTHEST = 4.0  # in tolerances, chosen: so that one reading moves a mean by a quarter of it at most
 _ODD = 0.5  # 1, chosen: no difference of two readings counts as more
@@ -41,6 +41,7 @@ _UNKNOWN_CELSIUS = 0.1  # 1, chosen: what 100 K do
 _UNKNOWN_RESISTANCE = 0.4  # 1, chosen: likewise
 _BLIND = 0.75  # A, chosen: up to here worn pads change L_i by less than 1 % for each 10 um
 _NEAR = 0.2  # A, chosen: so near to the crossing a deviation is reported as a gap
+_DURATION = 300_000_000  # ns, chosen: what deviates, scatters or is missing for so long is a fault
 _PAUSE = 50_000_000  # ns, chosen: of a longer time without samples nothing is known
 _SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back below 1
 _CERTAIN = 48  # readings over the zones, chosen: enough without a later one, as an engine may be damped once
@@ -53,33 +54,17 @@ class RippleWatchParameters(NamedTuple):
     """How far the ripple may lie from what ramp, specimen and supply let expect, and how long."""
 
     inductance_limit: Annotated[
-        float, Quantity('1', 'greatest relative deviation of the inductance', 0.03, 0.5, 'chosen')
+        float, Quantity('1', 'greatest relative deviation of the inductance', 0.03, 0.5)
     ] = 0.05
     gap_limit: Annotated[
-        float, Quantity('m', 'greatest change of the closed gap, 12 % of the force', 1e-5, 2e-4, 'chosen')
+        float, Quantity('m', 'greatest change of the closed gap, 12 % of the force', 1e-5, 2e-4)
     ] = 30e-6
-    gap_warning: Annotated[
-        float, Quantity('m', 'change of the closed gap that is warned of', 5e-6, 2e-4, 'chosen')
-    ] = 15e-6
     voltage_limit: Annotated[
-        float, Quantity('1', 'greatest relative deviation of the voltage', 0.05, 0.5, 'chosen')
+        float, Quantity('1', 'greatest relative deviation of the voltage', 0.05, 0.5)
     ] = 0.15
     noise_limit: Annotated[
-        float, Quantity('1', 'greatest standard deviation of the inductance', 0.02, 0.5, 'chosen')
+        float, Quantity('1', 'greatest standard deviation of the inductance', 0.02, 0.5)
     ] = 0.05
-    duration: Annotated[
-        float,
-        Quantity('s', 'what deviates, scatters or is missing for so long is a fault', 0.1, 5.0, 'chosen'),
-    ] = 0.3
-
-
-class RippleFigures(NamedTuple):
-    """What the watch knows at present; NaN where it knows nothing."""
-
-    gap: float  # m, at the crossing current in the ramp: the pads are pressed there
-    gap_change: float  # m, since then
-    noise: float  # 1, standard deviation of one reading of the inductance
-    voltage: float  # V, of the bridge by the ripple
 
 
 class RippleWatch:
@@ -87,42 +72,30 @@ class RippleWatch:
 
     def __init__(self, parameters: RippleWatchParameters, law: RippleLaw, heating: CoilHeating):
         self._parameters, self._law, self._heating = parameters, law, heating
-        self._duration = round(1e9 * parameters.duration)
-        self._turns_area, self._crossing_per_gap = law.turns_area, crossing_per_gap(law)
+        self._turns_area = law.turns_area
         self._link_voltage, self._skin = law.bridge.link_voltage, skin_table(law)
         self._sweep = Sweep()
         self._reference: Reference | None = None
         self._means = [0.0] * (_ZONES + 1)  # of the deviations in tolerances, each of 0.1 A, and over zones
-        self._noise, self._last = 0.0, 0.0
+        self.noise = nan
+        """Standard deviation of one reading of the inductance, 1; NaN before the ramp was seen."""
+        self._last = 0.0
         self._beyond = [0] * (_ZONES + 1)  # readings of a zone since its mean has been beyond its limit
         self._beyond_since = [0] * (_ZONES + 1)  # ns
         self._joint_at = 0.0, 0.0, 0.0  # A, H, 1: current, expected inductance and tolerance
-        self._beyond_last = -10 * self._duration  # ns: when a mean was beyond its limit last
-        self._change = float('nan')  # m
-        self._supply = float('nan')
         self._cold = 1.0  # factor to the temperature of the calibration
-        self._volts = float('nan')
+        self.voltage = nan
+        """Of the bridge by the ripple, V; NaN before the first reading."""
         self._missing = 0.0  # share
         self._judged = 0  # ns: when a sample came last
         self._finding, self._begun = '', 0  # what is wrong with the readings, and since when
-        self._take(float('nan'))
-
-    @property
-    def figures(self) -> RippleFigures:
-        """Return what is known at present."""
-        gap = float('nan') if self._reference is None else self._reference.gap
-        noise = float('nan') if self._reference is None else self._noise
-        return RippleFigures(gap, self._change, noise, self._volts)
+        self.take_status(nan, nan)
 
     def take_status(self, supply: float, celsius: float) -> None:
         """Take supply (V) and coil temperature (degC) as reported; NaN where not known."""
-        self._supply = supply
-        self._take(celsius)
-
-    def _take(self, celsius: float) -> None:
-        heating = self._heating
+        self._supply, heating = supply, self._heating
         known = celsius == celsius
-        warmer = celsius - COPPER_CELSIUS if known else 0.0
+        warmer = celsius - REFERENCE_CELSIUS if known else 0.0
         self._resistance = heating.resistance * (1.0 + heating.copper * warmer)
         self._unknown_resistance = 0.0 if known else _UNKNOWN_RESISTANCE * heating.resistance
         self._wider = 0.0 if known else _UNKNOWN_CELSIUS
@@ -147,15 +120,15 @@ class RippleWatch:
         self._missing += _SHARE * ((0.0 if valid else 1.0) - self._missing)
         if valid:
             volts = flux_volts + self._resistance * current
-            mean = self._volts
-            self._volts = mean + _SHARE * (volts - mean) if mean == mean else volts
+            mean = self.voltage
+            self.voltage = mean + _SHARE * (volts - mean) if mean == mean else volts
         # What is wrong with the readings at present, empty where nothing is.
         p, supply = self._parameters, self._supply
-        finding = 'noise' if self._noise > p.noise_limit else ''
+        finding = 'noise' if self.noise > p.noise_limit else ''  # not so for NaN
         limit = p.voltage_limit * supply + self._unknown_resistance * current
         if self._missing > 0.5:
             finding = 'missing'
-        elif self._volts - supply > limit or supply - self._volts > limit:  # not so for an unknown supply
+        elif self.voltage - supply > limit or supply - self.voltage > limit:  # not so for an unknown supply
             finding = 'voltage'
         if finding or self._finding:
             sentence = self._lasting(finding, now)
@@ -166,10 +139,10 @@ class RippleWatch:
         return self._judge_inductance(current, flux_volts / current_rate, now)
 
     def _judge_inductance(self, current: float, inductance: float, now: int) -> str:
-        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.duty` does.
+        # Carried to voltage and temperature of the gap curves, as `mount_models.coil.correction` does.
         held, volts, skin = self._resistance * current, self._link_voltage, []
-        if 0.0 <= held < self._volts and held < volts:
-            for supply in (volts, self._volts):
+        if 0.0 <= held < self.voltage and held < volts:
+            for supply in (volts, self.voltage):
                 place = 0.5 * (held / supply) / DUTY_STEP
                 below = min(int(place), len(self._skin) - 2)
                 skin.append(self._skin[below] + (place - below) * (self._skin[below + 1] - self._skin[below]))
@@ -178,7 +151,14 @@ class RippleWatch:
         inductance *= self._cold
         reference = self._reference
         if reference is None:
-            return self._learn() if self._sweep.take(current, inductance) else ''
+            if not self._sweep.take(current, inductance):
+                return ''
+            p = self._parameters
+            reference = self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
+            if reference is None:
+                return ''
+            self.noise = 0.0
+            return objection(reference, self._law, self._wider)
         place = int(current / NODE + 0.5)
         if place >= len(reference.inductance):
             return ''
@@ -189,14 +169,12 @@ class RippleWatch:
         step = deviation - self._last
         self._last = deviation
         step = step if step >= 0.0 else -step
-        self._noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self._noise)
-        if self._noise > self._parameters.noise_limit:  # such readings show no gap
+        self.noise += _NOISE_SHARE * (_TO_STD * (step if step < _ODD else _ODD) - self.noise)
+        if self.noise > self._parameters.noise_limit:  # such readings show no gap
             return ''
         sentence, tolerance = '', reference.tolerance[place] + self._wider
         excess = deviation / tolerance
         excess = _FARTHEST if excess > _FARTHEST else -_FARTHEST if excess < -_FARTHEST else excess
-        if -_NEAR < current - reference.crossing_current < _NEAR:
-            self._note_gap(deviation * expected / -reference.slope[place])
         # A mean for each 0.1 A, and one over all currents at which worn pads show.
         joint = _BLIND < current < reference.crossing_current + _NEAR
         if joint:
@@ -205,70 +183,35 @@ class RippleWatch:
             self._means[zone] = mean = self._means[zone] + _SHARE * (excess - self._means[zone])
             if -1.0 <= mean <= 1.0:
                 self._beyond[zone] = 0
-            elif self._lasts_beyond(zone, now) and zone != _JOINT:
+                continue
+            if self._beyond[zone] == 0:
+                self._beyond_since[zone] = now
+            self._beyond[zone] += 1
+            lasted = now - self._beyond_since[zone] >= _DURATION
+            if lasted and self._beyond[zone] >= _SURE and zone != _JOINT:
                 sentence = self._gap_sentence(current, expected, tolerance, mean)
-        if not sentence and self._beyond[_JOINT] >= _CERTAIN and self._has_lasted(_JOINT, now):
+        certain = self._beyond[_JOINT] >= _CERTAIN and now - self._beyond_since[_JOINT] >= _DURATION
+        if certain and not sentence:
             return self._gap_sentence(*self._joint_at, self._means[_JOINT])
         return sentence
-
-    def _learn(self) -> str:
-        """Take the sweep that has ended for the reference; return why it cannot be right, empty if it may."""
-        p = self._parameters
-        self._reference = self._sweep.reference(self._law, p.inductance_limit, p.gap_limit)
-        return '' if self._reference is None else objection(self._reference, self._law, self._wider)
-
-    def _lasts_beyond(self, zone: int, now: int) -> bool:
-        """Whether the mean of a zone, now beyond its limit, has stayed there for long enough."""
-        if self._beyond[zone] == 0:
-            self._beyond_since[zone] = now
-        self._beyond[zone] += 1
-        self._beyond_last = now
-        return self._beyond[zone] >= _SURE and self._has_lasted(zone, now)
-
-    def _has_lasted(self, zone: int, now: int) -> bool:
-        return now - self._beyond_since[zone] >= self._duration
-
-    def _note_gap(self, current: float) -> None:
-        """Take by how much (A) the crossing has moved by the last reading."""
-        change = current / self._crossing_per_gap
-        before = self._change if self._change == self._change else 0.0
-        self._change = before + _SLOW_SHARE * (change - before)
-
-    @property
-    def warning(self) -> str:
-        """Return what is to be warned of, empty where nothing is."""
-        p = self._parameters
-        change = self._change
-        slow = self._judged - self._beyond_last > 2 * self._duration  # else a fault is about to be reported
-        if slow and (change > p.gap_warning or -change > p.gap_warning):
-            return (
-                f'closed gap has changed by {1e6 * change:+.0f} um since the initialisation (limit '
-                f'{1e6 * p.gap_warning:g} um), and the force with it: initialise again, check the pads'
-            )
-        if 0.5 * p.noise_limit < self._noise <= p.noise_limit:  # beyond it is a fault
-            return (
-                f'coil ripple scatters by more than {50.0 * p.noise_limit:g} % (off at '
-                f'{100.0 * p.noise_limit:g} %): check its sensors and cables'
-            )
-        return ''
 
     def _lasting(self, finding: str, now: int) -> str:
         """Return the sentence on what is found at present where it has been found for long enough."""
         if finding != self._finding:
             self._finding, self._begun = finding, now
-        if not finding or now - self._begun < self._duration:
+        if not finding or now - self._begun < _DURATION:
             return ''
-        lasted = f'for {self._parameters.duration:g} s'
+        lasted = f'for {1e-9 * _DURATION:g} s'
         if finding == 'missing':
             missing = f'coil ripple is not valid {lasted} (limit), gap and coil are not watched'
             return f'{missing}: check its measurement'
         if finding == 'noise':
             return (
-                f'coil ripple scatters by {100.0 * self._noise:.0f} % {lasted}, limit '
+                f'coil ripple scatters by {100.0 * self.noise:.0f} % {lasted}, limit '
                 f'{100.0 * self._parameters.noise_limit:g} %: check its sensors and cables'
             )
         return (
-            f'voltage of the coil by its ripple ({self._volts:.1f} V) must lie within '
+            f'voltage of the coil by its ripple ({self.voltage:.1f} V) must lie within '
             f'{100.0 * self._parameters.voltage_limit:g} % of the supply ({self._supply:.1f} V); it has not '
             f'{lasted}: check the coil for shorted turns, and the ripple measurement'
         )

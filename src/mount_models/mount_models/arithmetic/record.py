@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mount_models.arrays import ByteArray
 
 Field = tuple[str, Any]  # name, and type as numpy takes it
 
@@ -21,13 +22,18 @@ def record_type(fields: Sequence[Field]) -> np.dtype:
     return np.dtype((np.record, list(fields)))
 
 
+def number_record(*names: str) -> np.dtype:
+    """Return the type of a record of float64 numbers."""
+    return record_type([(name, 'f8') for name in names])
+
+
 @functools.cache
 def record_dtype(kind: type[NamedTuple]) -> np.dtype:
     """Return the record type of a named tuple of numbers, or of such tuples, from its annotations."""
     return record_type([(name, _field_type(hint)) for name, hint in get_type_hints(kind).items()])
 
 
-def record_bytes(parameters: NamedTuple) -> NDArray[np.uint8]:
+def record_bytes(parameters: NamedTuple) -> ByteArray:
     """Return the record of `parameters` as bytes, to be viewed as `record_dtype(type(parameters))`."""
     record = np.zeros(1, record_dtype(type(parameters)))
     _fill(record[0], parameters)

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mount_models.arrays import FloatArray
 
 
 class StreamedSeries:
@@ -12,14 +13,14 @@ class StreamedSeries:
     `make` gives the numbers `first` .. `behind` - 1; each has to be the same to the bit in whatever part.
     """
 
-    def __init__(self, count: int, make: Callable[[int, int], NDArray[np.float64]]):
+    def __init__(self, count: int, make: Callable[[int, int], FloatArray]):
         self._count = count
         self._make = make
 
     def __len__(self) -> int:
         return self._count
 
-    def __getitem__(self, part: slice) -> NDArray[np.float64]:
+    def __getitem__(self, part: slice) -> FloatArray:
         first, behind, _ = part.indices(self._count)
         return self._make(first, behind) if first < behind else np.empty(0)
 
@@ -27,19 +28,13 @@ class StreamedSeries:
         """Return its first numbers, at most `count`."""
         return StreamedSeries(min(count, self._count), self._make)
 
-    def plus(self, other: 'StreamedSeries') -> 'StreamedSeries':
-        """Return the sums of its numbers and those of a series of the same length."""
-        return StreamedSeries(self._count, lambda first, behind: self[first:behind] + other[first:behind])
 
-
-def series_of(values: NDArray[np.float64]) -> StreamedSeries:
+def series_of(values: FloatArray) -> StreamedSeries:
     """Return `values` (n,), which are in memory, as a series."""
     return StreamedSeries(len(values), lambda first, behind: values[first:behind])
 
 
-def series_over_time(
-    count: int, step_time: float, at: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> StreamedSeries:
+def series_over_time(count: int, step_time: float, at: Callable[[FloatArray], FloatArray]) -> StreamedSeries:
     """Return the series of what `at` gives for the times 0, `step_time`, .. in s."""
     return StreamedSeries(
         count, lambda first, behind: at(step_time * np.arange(first, behind, dtype=np.float64))

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from mount_models.arrays import FloatArray
 from mount_models.quantity import LawRefusedError, OutsideLawError
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class ScaledPolynomial(NamedTuple):
@@ -74,13 +73,11 @@ def crossing_current_from_gap(curves: GapCurves, gap: npt.ArrayLike) -> FloatArr
 
 def gap_per_inductance(curves: GapCurves, inductance: npt.ArrayLike) -> FloatArray:
     """Return d(gap)/d(inductance) (m/H, negative) at the rest current, to carry a standard deviation over."""
-    _check_inside(curves.gap_of_inductance, inductance, 'rest inductance', 'mH', 1e3)
     return slope(curves.gap_of_inductance, inductance)
 
 
 def gap_per_crossing_current(curves: GapCurves, current: npt.ArrayLike) -> FloatArray:
     """Return d(gap)/d(crossing current) (m/A, positive), to carry a standard deviation over."""
-    _check_inside(curves.gap_of_crossing_current, current, 'crossing current', 'A', 1.0)
     return slope(curves.gap_of_crossing_current, current)
 
 
@@ -116,13 +113,6 @@ def slope(polynomial: ScaledPolynomial, x: npt.ArrayLike) -> FloatArray:
 
 
 def _value(polynomial: ScaledPolynomial, x: npt.ArrayLike, name: str, unit: str, factor: float) -> FloatArray:
-    _check_inside(polynomial, x, name, unit, factor)
-    return evaluate(polynomial, x)
-
-
-def _check_inside(
-    polynomial: ScaledPolynomial, x: npt.ArrayLike, name: str, unit: str, factor: float
-) -> None:
     x = np.asarray(x, float)
     rounding = 1e-9 * (polynomial.high - polynomial.low)
     inside = (x >= polynomial.low - rounding) & (x <= polynomial.high + rounding)
@@ -132,14 +122,20 @@ def _check_inside(
             f'{polynomial.low * factor:.3f} .. {polynomial.high * factor:.3f} {unit}, where the gap curves '
             f'are calibrated; check the coil ripple signals, or calibrate over a wider range of gaps'
         )
+    return evaluate(polynomial, x)
 
 
-def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
+def check_range_of(name: str, polynomial: ScaledPolynomial) -> None:
+    """Raise `LawRefusedError` unless scale and range of a polynomial can be."""
     if not (polynomial.low < polynomial.high and polynomial.scale > 0.0):
         raise LawRefusedError(
             f'{name} must have a positive scale ({polynomial.scale:g}) and a range in rising order '
             f'({polynomial.low:g} .. {polynomial.high:g}); calibrate again'
         )
+
+
+def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
+    check_range_of(name, polynomial)
     x = np.linspace(polynomial.low, polynomial.high, 301)
     steps = np.sign(slope(polynomial, x))
     falters = ~((steps == steps[0]) & (steps != 0.0))

@@ -45,23 +45,13 @@ def table_message(stamp: int, table: npt.ArrayLike) -> bytes:
 
 def from_message(message: Any) -> ForceTable:
     """Return activation stamp and table of a `Float64MultiArray`, or raise `MessageError`."""
-    shape = [(dimension.size, dimension.stride) for dimension in message.layout.dim]
-    offset, numbers = message.layout.data_offset, np.array(message.data, float)
+    numbers, layout = np.array(message.data, float), message.layout
     count = numbers.size // 2
-    # The stride of the first dimension says nothing that its size does not.
-    if len(shape) != 2 or (shape[0][0], *shape[1], offset) != (2, count, count, 0) or numbers.size % 2:
-        raise _refusal(
-            f'must hold 2 x N numbers, row by row; instead it holds {numbers.size} with offset {offset} and '
-            f'(size, stride) {shape}'
-        )
-    rows_label, activation = (dimension.label for dimension in message.layout.dim)
-    if rows_label != _ROWS_LABEL:
-        raise _refusal(f'must have the label {_ROWS_LABEL!r}; instead received {rows_label!r}')
-    stamp = re.fullmatch(rf'{_ACTIVATION_LABEL}([0-9]+)', activation)
-    if stamp is None:
-        raise _refusal(
-            f'must name its activation as "{_ACTIVATION_LABEL}<stamp ns>"; instead received {activation!r}'
-        )
+    found = [(each.label, each.size, each.stride) for each in layout.dim]
+    stamp = re.fullmatch(rf'{_ACTIVATION_LABEL}([0-9]+)', found[-1][0] if found else '')
+    wanted = [(_ROWS_LABEL, 2, 2 * count), (stamp[0] if stamp else 'activation <stamp ns>', count, count)]
+    if stamp is None or found != wanted or layout.data_offset or numbers.size % 2:
+        raise _refusal(f'must hold 2 x N numbers as {wanted}; instead it holds {numbers.size} as {found}')
     rows = numbers.reshape(2, count)
     _check(rows)
     return ForceTable(int(stamp[1]), rows[0], rows[1])

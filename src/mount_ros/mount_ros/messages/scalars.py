@@ -18,7 +18,6 @@ from mount_ros.messages.cdr import deserialise, joint_state
 from mount_ros.topics import COIL_TEMPERATURE, JOINT_STATE, Topic, control_trace
 
 _STAMP = struct.Struct('<iI')
-_NUMBER = struct.Struct('<d')
 _STAMP_OFFSET = 4  # behind the CDR encapsulation header
 _STAMP_END = _STAMP_OFFSET + _STAMP.size
 _NANOSECONDS = 1_000_000_000
@@ -61,10 +60,8 @@ class _Layout:
             raise MessageError(
                 f'stamps must lie within {_LAST_SECOND} s around 0, these reach {stamps.max()} ns'
             )
-        columns: list[tuple[int, NDArray[Any] | None, str]] = [
-            (_STAMP_OFFSET, seconds, '<i4'),
-            (_STAMP_OFFSET + 4, nanoseconds, '<u4'),
-        ]
+        columns: list[tuple[int, Any, str]] = [(_STAMP_OFFSET, seconds, '<i4')]
+        columns += [(_STAMP_OFFSET + 4, nanoseconds, '<u4')]
         columns += [(offset, run, '<f8') for offset, run in zip(self._offsets, runs, strict=False)]
         for offset, values, kind in columns:
             if values is not None:
@@ -169,7 +166,7 @@ class OneNumberLayout(_Layout):
     def pack(self, stamp: int, number: float) -> bytes:
         """Return the message of time `stamp` (ns) with this number."""
         _STAMP.pack_into(self._template, _STAMP_OFFSET, *divmod(stamp, _NANOSECONDS))
-        _NUMBER.pack_into(self._template, self._offsets[0], number)
+        self._numbers.pack_into(self._template, self._offsets[0], number)
         return bytes(self._template)
 
 

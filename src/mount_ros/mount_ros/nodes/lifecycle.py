@@ -3,11 +3,9 @@
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from mount_ros.data_path import DataPath
@@ -19,18 +17,14 @@ from mount_ros.nodes.diagnostics import (
     Finding,
     SlidingWindow,
     Verdict,
+    verdict_on,
 )
 from mount_ros.nodes.parameters import ParameterNode
 from mount_ros.nodes.real_time import RealTime, RealTimeThreads
 from mount_ros.publishers import PublisherWatch
 
-SPIN_PERIOD = 60.0
-"""Longest sleep of an executor, s (chosen): it is woken when it shall end; this is for when it is not."""
-
 _LOCKSTEP = 'time stands in the stamps alone: each sample waits for its answer; one value in the whole graph'
 _SUCCESS, _FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
-
-T = TypeVar('T')
 
 
 class SafeLifecycleNode(ParameterNode):
@@ -50,7 +44,8 @@ class SafeLifecycleNode(ParameterNode):
         super().__init__(name, **arguments)
         self._registered_name = name  # its own one may have been remapped
         descriptor = ParameterDescriptor(description=_LOCKSTEP)
-        self._lockstep = bool(self.declare_parameter('lockstep', False, descriptor).value)
+        self.lockstep = bool(self.declare_parameter('lockstep', False, descriptor).value)
+        """Whether time stands in the stamps alone; as it was when the node was configured."""
         self.data_path: Any = None
         """What carries its data, and ends with the node: a `DataPath`, or what has the same figures."""
         self._publisher_watch: PublisherWatch | None = None  # of the topics of the data path
@@ -98,11 +93,6 @@ class SafeLifecycleNode(ParameterNode):
         """The sentence of the present verdict."""
         return self._present_verdict().sentence
 
-    @property
-    def lockstep(self) -> bool:
-        """Whether time stands in the stamps alone; as it was when the node was configured."""
-        return self._lockstep
-
     def open_data_path(self) -> DataPath:
         """Create the data path of this node; the node starts it when all subscriptions stand."""
         path = DataPath(
@@ -115,16 +105,6 @@ class SafeLifecycleNode(ParameterNode):
         )
         self.data_path, self._publisher_watch = path, path.publisher_watch
         return path
-
-    def report_publisher_conflict(self) -> None:
-        """Call `on_publisher_conflict` with what holds now: for a node that has just begun to work."""
-        if self._publisher_watch is not None:
-            self._publisher_watch.report()
-
-    def wait_for_sole_publishers(self) -> None:
-        """Return when topics have their own writers alone, or raise `PublisherConflictError`."""
-        if self._publisher_watch is not None:
-            self._publisher_watch.wait_for_sole(self.ending)
 
     def report_failure(self, sentence: str) -> None:
         """Report that a thread of the node has ended by itself; the process ends the node then."""
@@ -145,8 +125,9 @@ class SafeLifecycleNode(ParameterNode):
     # Transitions.
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._lockstep = bool(self.get_parameter('lockstep').value)
-        outcome = self._attempt('configure', self._configure, undo=self._release)
+        self.lockstep = bool(self.get_parameter('lockstep').value)
+        self._path_errors = SlidingWindow(0)
+        outcome = self._attempt('configure', self.refuse_given, self.configure, undo=self._release)
         if outcome == _SUCCESS:
             self.fix_parameters()
             place = f'; its topics are those of the node {self.data_path.name}' if self.data_path else ''
@@ -180,31 +161,22 @@ class SafeLifecycleNode(ParameterNode):
 
     on_error = on_shutdown
 
-    def serve_transition(self, answer: Callable[[], Any]) -> Any:
-        # An activation may take seconds, and parameters and state are served meanwhile.
-        assert self.executor is not None
-        return run_in_thread(self.executor, answer, f'{self.get_name()} transition')
-
     def change_state(self, transition_id: int) -> TransitionCallbackReturn:
         # rclpy lets a transition that is not valid in the present state end the process with an
         # exception; a node that drives a coil answers "no" and goes on.
         try:
-            with self._diagnostics.pause, self.parameters_held():
+            with self._diagnostics.pause:
                 return super().change_state(transition_id)
         except Exception as error:
             self.get_logger().warning(f'transition {transition_id} refused: {error}')
             return _FAILURE
 
-    def _configure(self) -> None:
-        self.refuse_given()
-        self._path_errors = SlidingWindow(0)
-        self.configure()
-
     def _attempt(
-        self, what: str, step: Callable[[], None], undo: Callable[[], None]
+        self, what: str, *steps: Callable[[], None], undo: Callable[[], None]
     ) -> TransitionCallbackReturn:
         try:
-            step()
+            for step in steps:
+                step()
         except Exception as error:
             # The border of the node: whatever the reason, say it, be safe, stay alive.
             known = isinstance(error, ValueError | OSError)
@@ -237,9 +209,8 @@ class SafeLifecycleNode(ParameterNode):
     # The verdict.
 
     def _check_and_judge(self) -> Verdict:
-        watch = self._publisher_watch
-        if watch is not None:
-            watch.check()
+        if self._publisher_watch is not None:
+            self._publisher_watch.check()
         return self._present_verdict()
 
     def _present_verdict(self) -> Verdict:
@@ -247,10 +218,8 @@ class SafeLifecycleNode(ParameterNode):
         other = (watch.confirmed or watch.suspected) if watch is not None else ''
         if self._refusal:
             verdict = Verdict(Level.ERROR, self._refusal)
-        elif self.active:
-            verdict = self.judge()
         else:
-            verdict = Verdict(Level.OK, 'inactive')
+            verdict = self.judge() if self.active else Verdict(Level.OK, 'inactive')
         figures = {
             **verdict.figures,
             'state': 'active' if self.active else 'inactive',
@@ -270,33 +239,14 @@ class SafeLifecycleNode(ParameterNode):
                 figures['fatal'] = True
             elif lately and verdict.level is Level.OK:
                 text = f'errors in the data path ({lately}, limit: none), the last: {path.refusal}'
-                verdict = Verdict(Level.WARN, text, {}, (Finding(Level.WARN, 'path errors', text),))
+                verdict = verdict_on([Finding(Level.WARN, 'path errors', text)], '', {})
         verdict = self._findings.keep(verdict)
         level, sentence = verdict.level, verdict.sentence
-        if real_time.given_back:
-            reason = real_time.given_back
+        if reason := real_time.given_back:
             sentence = reason if level is Level.OK else f'{sentence}; {reason}'
             level = max(level, Level.WARN)
         return Verdict(level, sentence, figures)
 
 
-def wake(executor: Executor) -> None:
-    """End the `spin_once` of another thread; `Executor.wake` alone lets it check and sleep on."""
-    executor.create_task(_nothing)
-
-
-def run_in_thread(executor: Executor, work: Callable[[], T], name: str) -> T:
-    """Return what `work` returns, done in a thread `name`, while `executor` serves in this one.
-
-    It is called in a callback of the executor. Nothing of the same callback group is served meanwhile.
-    """
-    with ThreadPoolExecutor(1, thread_name_prefix=name) as pool:
-        result = pool.submit(work)
-        result.add_done_callback(lambda _: wake(executor))
-        while not result.done():
-            executor.spin_once(SPIN_PERIOD)
-    return result.result()
-
-
 def _nothing() -> None:
-    """No process of its own; something that an executor can do."""
+    """No process of its own."""

@@ -2,13 +2,11 @@
 
 import contextlib
 import math
-import threading
 from array import array
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -57,10 +55,7 @@ def declare(node: Node, defaults: NamedTuple, prefix: str = '', only: Collection
 def read(node: Node, defaults: P, prefix: str = '') -> P:
     """Return the declared parameter set with the node's present values, or raise `ParameterError`."""
     values = {name: node.get_parameter(name).value for name in flattened(defaults, prefix)}
-    try:
-        return with_flattened(defaults, values, prefix)
-    except ParameterError as error:
-        raise ParameterError(f'{node.get_name()}: {error}') from None
+    return with_flattened(defaults, values, prefix)
 
 
 class SpecimenValues:
@@ -116,9 +111,7 @@ class ParameterNode(OpenLifecycleNode):
 
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
-        self._of_rclpy = self._parameter_names()  # such as use_sim_time
         self._in_use: dict[str, Any] = {}  # all values while they are fixed
-        self._holder: int | None = None  # the thread that makes a transition
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
 
@@ -130,21 +123,11 @@ class ParameterNode(OpenLifecycleNode):
 
     def fix_parameters(self) -> None:
         """From now on the node works with what its parameters are."""
-        own = self._parameter_names() - self._of_rclpy
-        self._in_use = {name: self.get_parameter(name).value for name in own}
+        self._in_use = {name: self.get_parameter(name).value for name in self._parameter_names()}
 
     def free_parameters(self) -> None:
         """Let everything be set again; safe to call twice."""
         self._in_use = {}
-
-    @contextlib.contextmanager
-    def parameters_held(self) -> Iterator[None]:
-        """Let nothing be set but by this thread: the node is in a transition."""
-        before, self._holder = self._holder, threading.get_ident()
-        try:
-            yield
-        finally:
-            self._holder = before
 
     def refuse_given(self) -> None:
         """Raise `ParameterError` for a value given at the start to an unknown name, and for simulated time.
@@ -157,14 +140,10 @@ class ParameterNode(OpenLifecycleNode):
             raise ParameterError(f'{self.get_name()}: {_SIM_TIME_REFUSED}')
 
     def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
-        """Declare a parameter; raises `ParameterError` where what was given at the start does not fit it."""
+        """Declare a parameter; a whole number given at the start for a float becomes one."""
         if isinstance(value, float):
             integer_as_float(self, name)
-        try:
-            return super().declare_parameter(name, value, *arguments, **options)
-        except ParameterException as error:
-            reason = str(error).removesuffix(f': {name}')
-            raise ParameterError(f'{self.get_name()}: {reason}') from None
+        return super().declare_parameter(name, value, *arguments, **options)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Set each parameter; see `set_parameters_atomically`."""
@@ -193,28 +172,22 @@ class ParameterNode(OpenLifecycleNode):
         return frozenset(self.get_parameters_by_prefix(''))
 
     def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        reason = self._refusal_of(parameters)
-        return SetParametersResult(successful=not reason, reason=reason)
-
-    def _refusal_of(self, parameters: list[Parameter]) -> str:
+        changes, reason = self._changes(parameters), ''
+        fixed = [name for name in changes if name not in self.run_time_parameters]
         if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
-            return _SIM_TIME_REFUSED
-        if self._holder not in (None, threading.get_ident()):
-            what, node = parameters[0].name, self.get_name()
-            return f'{what} cannot be set during a transition of {node}: wait for its end'
-        changes = self._changes(parameters)
-        if fixed := [name for name in changes if name not in self.run_time_parameters]:
+            reason = _SIM_TIME_REFUSED
+        elif fixed:
             known = ', '.join(sorted(self.run_time_parameters)) or 'nothing'
-            return (
+            reason = (
                 f'{fixed[0]} can be set before configure: deactivate and clean up first; '
                 f'what can be set at run time is {known}'
             )
-        try:
-            if changes:
+        elif changes:
+            try:
                 self.check_parameters({**self._in_use, **{name: each.new for name, each in changes.items()}})
-        except ValueError as error:
-            return str(error)
-        return ''
+            except ValueError as error:
+                reason = str(error)
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply_parameters(self, parameters: list[Parameter]) -> None:
         if changes := self._changes(parameters):
@@ -231,20 +204,15 @@ class ParameterNode(OpenLifecycleNode):
 
 
 def _descriptor(quantity: Quantity, kind: type) -> ParameterDescriptor:
-    descriptor = ParameterDescriptor(
-        description=f'{quantity.meaning} [{quantity.unit}]; {quantity.source}'
-        + '; nan: unknown' * quantity.may_be_unknown
-    )
-    ends = [math.isfinite(quantity.low), math.isfinite(quantity.high)]
-    if quantity.words:
-        descriptor.additional_constraints = f'one of {quantity.limits}'
-    elif quantity.may_be_unknown:  # rclpy holds NaN to be outside every range; `read` checks this one
-        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}, or nan'
-    elif any(ends) and not all(ends):  # ROS knows ranges with two ends alone
-        descriptor.additional_constraints = f'{quantity.limits} {quantity.unit}'
-    elif all(ends) and kind is float:
-        span = FloatingPointRange(from_value=float(quantity.low), to_value=float(quantity.high))
-        descriptor.floating_point_range = [span]
-    elif all(ends) and kind is int:
-        descriptor.integer_range = [IntegerRange(from_value=int(quantity.low), to_value=int(quantity.high))]
+    limits, low, high = quantity.limits, quantity.low, quantity.high
+    descriptor = ParameterDescriptor(description=f'{quantity.meaning} [{quantity.unit}]; {quantity.source}')
+    # ROS knows ranges of numbers with two ends alone, and rclpy holds NaN to be outside each.
+    if quantity.may_be_unknown:
+        descriptor.additional_constraints = f'{limits} {quantity.unit}, or nan: unknown'
+    elif kind is float and math.isfinite(high - low):
+        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+    elif kind is int and math.isfinite(high - low):
+        descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+    elif limits:
+        descriptor.additional_constraints = f'{limits} {quantity.unit}'
     return descriptor

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.logging import get_logger
@@ -21,14 +22,16 @@ from rclpy.signals import SignalHandlerOptions
 from mount_models.quantity import ParameterError
 from mount_ros.data_thread import DataThread
 from mount_ros.environment import prepare_environment
-from mount_ros.nodes.lifecycle import SPIN_PERIOD, SafeLifecycleNode, wake
+from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.real_time import WATCH_PERIOD, RealTime
-from mount_ros.nodes.scheduling import drop_real_time, started_in_real_time
+from mount_ros.nodes.scheduling import lock_memory
 from mount_ros.nodes.shutdown import end_process, leave_middleware, remove_abandoned_of_the_dead
 
 # What a process gets from its starter. By the environment, so that it holds for nodes of the supervisor and
 # of `ros2 launch` alike; without it a node stands for itself.
 _STARTER, _PRIORITY = 'ENGINE_MOUNT_STARTER', 'ENGINE_MOUNT_PRIORITY'
+
+_SPIN_PERIOD = 60.0  # s, chosen: longest sleep of an executor, which is woken when it shall end
 
 Create = Callable[[], SafeLifecycleNode]
 
@@ -37,46 +40,42 @@ class TransitionError(ValueError):
     """A node refused a transition; the text names it and its reason."""
 
 
-def run_node(create: Create, args: list[str] | None = None) -> None:
+def run_node(create: Create) -> None:
     """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM, or its starter ends."""
-    run_nodes([create], args)
+    run_nodes([create])
 
 
-def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
+def run_nodes(creates: Sequence[Create]) -> None:
     """Run several lifecycle nodes in this process: one data thread for all, one thread for each one's rest.
 
     At the end they are closed in reverse order, so that the sender of setpoints ends before the driver.
     An exception in one of them or in a thread of its data ends all in the same way, with exit code 1.
     """
-    inherited = drop_real_time()
-    real_time = RealTime(int(os.environ.get(_PRIORITY, '0')) or inherited)
+    real_time = RealTime(int(os.environ.get(_PRIORITY, '0')))
     prepare_environment()
     ending = _Ending()
-    ending.add_signals(signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)
-    nodes = _created(creates, args)
-    data_thread = DataThread(nodes[0].context, nodes[0].report_failure, shared=len(nodes) > 1)
+    nodes = _created(creates)
+    data_thread = DataThread(nodes[0].context, nodes[0].report_failure)
     for node in nodes:
-        node.data_thread = data_thread
+        node.data_thread = data_thread if len(nodes) > 1 else None
         node.after_configure = _freeze
         node.after_failure = ending.report_failure
         node.real_time = real_time
     logger = nodes[0].get_logger()
-    if inherited:
-        logger.warning(started_in_real_time(inherited))
     _freeze()
-    real_time.keep_memory()
-    services = [_Service(node, ending) for node in nodes]
+    # While nothing is active: all threads that want new memory wait for it, 14 ms on a quiet machine.
+    real_time.memory_locked = bool(real_time.priority) and lock_memory()
+    end_services = [_start_service(node, ending) for node in nodes]
     ending.wait(real_time, logger.warning)
     for node in nodes:
         node.ending.set()
     if ending.starter.ended:
         logger.error(f'{ending.starter.name} has ended, so this one ends too, at 0 A: start the graph again')
     # This order ends with code 0: threads are joined, the nodes leave their work, then the context ends.
-    for service in services:
-        service.end()
+    for end_service in end_services:
+        end_service()
     for node in reversed(nodes):
         node.close()
-    real_time.close()  # until here no load keeps the coil from 0 A
 
     def take_down() -> None:
         for node in reversed(nodes):
@@ -84,7 +83,7 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
         rclpy.try_shutdown()
 
     code = 1 if ending.failed else 0
-    left = leave_middleware(take_down, code=code)
+    left = leave_middleware(take_down)
     if ending.starter.ended:
         remove_abandoned_of_the_dead()  # that of the starter; what it started takes its own
     for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C: Python restores other handlers first
@@ -96,24 +95,6 @@ def run_nodes(creates: Sequence[Create], args: list[str] | None = None) -> None:
 def environment_of_children(priority: int) -> dict[str, str]:
     """Return what processes need that shall end with this one and run their loops at `priority` (0: none)."""
     return {_STARTER: str(os.getpid()), _PRIORITY: str(priority)}
-
-
-_TIED = """
-import ctypes, os, signal, sys
-ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
-if os.getppid() != int(sys.argv[1]):  # it ended before
-    sys.exit(1)
-os.execvp(sys.argv[2], sys.argv[2:])
-"""
-
-
-def tied(command: Sequence[str]) -> list[str]:
-    """Return the command that runs `command`, a foreign program, and is killed when this process ends.
-
-    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
-    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
-    """
-    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]
 
 
 # Nodes in a process that also does other work.
@@ -136,17 +117,17 @@ def transition(step: Callable[[], TransitionCallbackReturn], node: SafeLifecycle
         raise TransitionError(f'{name} refused: {node.sentence}')
 
 
-def _created(creates: Sequence[Create], args: list[str] | None) -> list[SafeLifecycleNode]:
+def _created(creates: Sequence[Create]) -> list[SafeLifecycleNode]:
     """Return the nodes, or end the process with code 1 and why its arguments do not fit."""
     try:
         # Our own handlers: the context must still be valid while the nodes take the current to 0 A.
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # a parameter file that is missing or no YAML
         print(f'[FATAL] {" ".join(str(error).split())}', file=sys.stderr)
         sys.exit(1)
     try:
         return [create() for create in creates]
-    except ParameterError as error:
+    except (ParameterError, ParameterException) as error:
         get_logger(Path(sys.argv[0]).name).fatal(str(error))
         rclpy.try_shutdown()
         sys.exit(1)
@@ -167,10 +148,10 @@ class Starter:
     def __init__(self) -> None:
         self.descriptors: list[int] = []
         """What can be read once it has ended; none where it is not known, or had ended before."""
-        number = os.environ.get(_STARTER)
+        number = os.environ.get(_STARTER, '')
         self._had_ended = False
         self.name = f'the process that started this one ({number})'
-        if number is not None:
+        if number:
             try:
                 self.descriptors = [os.pidfd_open(int(number))]
             except ProcessLookupError:
@@ -195,11 +176,8 @@ class _Ending:
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
         self.starter = Starter()
-
-    def add_signals(self, *signals: int) -> None:
-        """Wake the main thread by these signals too."""
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
-        for number in signals:
+        for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: None)
 
     def end(self) -> None:
@@ -213,46 +191,38 @@ class _Ending:
     def wait(self, real_time: RealTime, warn: Callable[[str], object]) -> None:
         """Look after the priority of the process until it shall end; `warn` takes why it was given back."""
         period = WATCH_PERIOD if real_time.priority else None
-        while not self.starter.ended:
-            ready, _, _ = select.select([self._read, *self.starter.descriptors], [], [], period)
-            # The numbers of the signals that came, 46 of what is no signal; nothing after a period.
-            signals = os.read(self._read, 4096) if self._read in ready else b''
-            if any(number != signal.SIGXCPU for number in signals):
-                return
-            sentence = real_time.ran_without_sleep() if signals else real_time.check()
-            if sentence:
+        descriptors = [self._read, *self.starter.descriptors]
+        while not self.starter.ended and self._read not in select.select(descriptors, [], [], period)[0]:
+            if sentence := real_time.check():
                 warn(sentence)
 
 
-class _Service:
-    """The thread that serves the rest of a node: transitions, parameters, questions about its state.
+def _start_service(node: SafeLifecycleNode, ending: _Ending) -> Callable[[], None]:
+    """Serve the rest of a node in a thread: transitions, parameters, questions about its state.
 
-    A transition is made in another thread meanwhile. It sleeps until something arrives: whatever wakes Python
-    there takes the interpreter from the data path.
+    It sleeps until something arrives: whatever wakes Python there takes the interpreter from the data path.
+    Return the function that ends the service once `ending` of the node is set.
     """
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
 
-    def __init__(self, node: SafeLifecycleNode, ending: _Ending):
-        self._node = node
-        self._ending = ending
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._serve, name=node.get_name())
-        self._thread.start()
-
-    def end(self) -> None:
-        self._node.ending.set()
-        wake(self._executor)
-        self._thread.join()
-        self._executor.remove_node(self._node)
-        self._executor.shutdown()
-
-    def _serve(self) -> None:
+    def serve() -> None:
         try:
-            while rclpy.ok() and not self._node.ending.is_set():
-                self._executor.spin_once(SPIN_PERIOD)
+            while rclpy.ok() and not node.ending.is_set():
+                executor.spin_once(_SPIN_PERIOD)
         except Exception as error:
             # The border of the process: without it the nodes would not be closed.
             traceback.print_exc()
-            self._node.report_failure(f'{type(error).__name__}: {error}')
+            node.report_failure(f'{type(error).__name__}: {error}')
         finally:
-            self._ending.end()
+            ending.end()
+
+    def end() -> None:
+        executor.create_task(lambda: None)  # `wake` alone lets its `spin_once` check and sleep on
+        thread.join()
+        executor.remove_node(node)
+        executor.shutdown()
+
+    thread = threading.Thread(target=serve, name=node.get_name())
+    thread.start()
+    return end

@@ -7,12 +7,8 @@ threads wanted to run on two cores; the loop came up to 140 ms late beside an or
 place from its start on (`scheduling`).
 
 A watch gives the priority back, for all of them until an activation after 30 s or more, when
-
-- one of them used more than its share of a core (a loop that spins, or more work than the machine carries);
-- an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
-- a thread ran for 1 s without a sleep, as the system reports.
-
-The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
+one of them used more than its share of a core: a loop that spins, or more work than the machine carries. The
+watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
 or threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
 process; the electronics then go to 0 A by their own watch.
 """
@@ -21,24 +17,20 @@ import math
 import re
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from mount_ros.nodes.scheduling import Threads, limit_without_sleep, lock_memory
+from mount_ros.nodes.scheduling import Threads, limit_without_sleep
 
 HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
-_WINDOW = 5  # periods, chosen: 1 s
-_SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
 _REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
-_STARVED = 3  # periods without a pulse, chosen: 0.6 s; Linux leaves 50 ms of each second at least
-_WITHOUT_SLEEP = 1.0  # s of processor time between two sleeps, chosen; after a stall of 2 s it is 0.6 s
-_LAST = 3.0  # s, chosen: the same, until the process is killed
+_WINDOW = 1.0  # s, chosen
+_SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
+_LAST = 3.0  # s of processor time between two sleeps, chosen: then the process is killed
 # Threads of Fast DDS that take data and call its readers. By the rule of RTPS for ports (7400 + 250 domain
 # + 11 + 2 participant) theirs are odd, those of discovery even.
 _MIDDLEWARE = re.compile(r'dds\.udp\.\d*[13579]')
-_ORDINARY = 'dds.ev.'  # the middleware's timers: an ordinary thread that wakes often, without the interpreter
 
 
 class RealTimeThreads(NamedTuple):
@@ -49,12 +41,6 @@ class RealTimeThreads(NamedTuple):
     """Whether it cannot wait 0.1 s for the interpreter: threads that take turns with it come behind it."""
 
 
-class RealTimeLoop(Protocol):
-    """A node with threads that work in real time."""
-
-    real_time_threads: RealTimeThreads
-
-
 class RealTime:
     """Gives the threads of active nodes their priority, looks after it, and gives it back."""
 
@@ -62,8 +48,7 @@ class RealTime:
         self, priority: int, threads: Threads | None = None, clock: Callable[[], float] = time.monotonic
     ):
         self.priority = min(priority, HIGHEST)
-        """Of SCHED_FIFO; 0: none is ever taken."""
-        self.permitted = True
+        """Of SCHED_FIFO; 0: none is ever taken, or the system does not permit it."""
         self.given_back = ''
         """Why the priority was given back since the last activation, with value, limit and remedy."""
         self.memory_locked = False
@@ -71,27 +56,19 @@ class RealTime:
         self._threads = threads or Threads()
         self._clock = clock
         self._watcher = self._threads.own
-        self._loops: list[RealTimeLoop] = []
+        self._loops: list[Any] = []
         self._ordinary_until = -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
-        self._past: deque[tuple[float, dict[int, float]]] = deque(maxlen=_WINDOW + 1)
-        """Time and processor time of each thread with the priority at the last checks, s."""
-        self._starved: tuple[float, int] = (math.nan, 0)  # processor time of the ordinary thread; periods
+        self._used: tuple[float, dict[int, float]] = (-math.inf, {})
+        """When the processor time of each thread with the priority was taken, and what it was, s."""
 
     @property
     def held(self) -> int:
         """The priority at which threads run at present; 0: none does."""
         return self.priority if self._held else 0
 
-    def keep_memory(self) -> None:
-        """Keep the process's memory in place if its loops will have a priority and the system permits it.
-
-        While nothing is active: all threads that want new memory wait for it, 14 ms on a quiet machine.
-        """
-        self.memory_locked = bool(self.priority) and lock_memory()
-
-    def begin(self, loop: RealTimeLoop) -> None:
+    def begin(self, loop: Any) -> None:
         """Give the threads of `loop` their priority, those too that it will make while it is active."""
         with self._guard:
             if not self.priority or loop in self._loops:
@@ -99,22 +76,15 @@ class RealTime:
             self._loops.append(loop)
             if self._clock() >= self._ordinary_until:
                 self.given_back = ''
-            self._past.clear()
-            limit_without_sleep(_WITHOUT_SLEEP, _LAST)
+            limit_without_sleep(_LAST)
             self._give()
 
-    def end(self, loop: RealTimeLoop) -> None:
+    def end(self, loop: Any) -> None:
         """Take it back from the threads that no other active node of the process has in it."""
         with self._guard:
             if loop in self._loops:
                 self._loops.remove(loop)
                 self._give()
-
-    def close(self) -> None:
-        """End for good: all threads are ordinary ones from now on."""
-        with self._guard:
-            self._loops.clear()
-            self._give()
 
     def check(self) -> str:
         """Look after the priority, once per `WATCH_PERIOD`; return why it was just given back, if it was."""
@@ -122,27 +92,35 @@ class RealTime:
             if not self._loops or self.given_back:
                 return ''
             self._give()
-            used = {number: self._threads.processor_time(number) for number in self._held}
-            self._past.append((self._clock(), used))
-            reason = self._overuse() or self._starvation()
-            return self._give_back(reason) if reason else ''
-
-    def ran_without_sleep(self) -> str:
-        """Give the priority back since the system has reported (SIGXCPU) a thread that does not sleep."""
-        with self._guard:
-            if not self._loops or self.given_back:
+            now, (begin, before) = self._clock(), self._used
+            if now - begin < _WINDOW:
                 return ''
-            text = f'a thread of the loop has used the processor for {_WITHOUT_SLEEP:g} s without a sleep'
-            return self._give_back(f'{text} (limit {_WITHOUT_SLEEP:g} s)')
+            used = {number: self._threads.processor_time(number) for number in self._held}
+            self._used = now, used
+            for number in before.keys() & used.keys():
+                share = (used[number] - before[number]) / (now - begin)
+                if share > _SHARE:
+                    return self._give_back(self._threads.names().get(number, str(number)), share)
+            return ''
+
+    def _give_back(self, thread: str, share: float) -> str:
+        self._ordinary_until = self._clock() + _REST
+        self.given_back = (
+            f'real-time priority {self.priority} given back: thread {thread} used {share:.2f} of a core in '
+            f'{_WINDOW:g} s (limit {_SHARE:g}); lower the load of this machine or the number of its graphs, '
+            f'then activate again, not before {_REST:g} s'
+        )
+        self._give()
+        return self.given_back
 
     def _give(self) -> None:
         """Let the threads of the loops, and no others, have the priority."""
-        wanted = self._wanted() if self._loops and self.permitted and not self.given_back else {}
+        wanted = self._wanted() if self._loops and not self.given_back else {}
         try:
             for number, priority in wanted.items() - self._held.items():
                 self._threads.run(number, priority)
         except PermissionError:
-            self.permitted, wanted = False, {}
+            self.priority, wanted = 0, {}
         for number in self._held.keys() - wanted.keys():
             self._threads.run(number, 0)
         self._held = wanted
@@ -158,36 +136,3 @@ class RealTime:
             if name in own or _MIDDLEWARE.fullmatch(name):
                 wanted[number] = self.priority
         return {**wanted, self._watcher: self.priority + 1}
-
-    def _give_back(self, reason: str) -> str:
-        self._ordinary_until = self._clock() + _REST
-        self.given_back = (
-            f'real-time priority {self.priority} given back: {reason}; lower the load of this machine or '
-            f'the number of graphs on it, then activate again, not before {_REST:g} s'
-        )
-        self._give()
-        limit_without_sleep(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
-        return self.given_back
-
-    def _overuse(self) -> str:
-        if len(self._past) <= _WINDOW:
-            return ''
-        (begin, before), (end, now) = self._past[0], self._past[-1]
-        for number in before.keys() & now.keys():
-            share = (now[number] - before[number]) / (end - begin)
-            if share > _SHARE:
-                name = self._threads.names().get(number, str(number))
-                return f'thread {name} used {share:.2f} of a core in {end - begin:.1f} s (limit {_SHARE:g})'
-        return ''
-
-    def _starvation(self) -> str:
-        names = self._threads.names().items()
-        number = next((number for number, name in names if name.startswith(_ORDINARY)), None)
-        if number is None:
-            return ''
-        used, (before, periods) = self._threads.processor_time(number), self._starved
-        waits = used == before and self._threads.waits(number)
-        self._starved = (used, periods + 1 if waits else 0)
-        limit = _STARVED * WATCH_PERIOD
-        text = f'an ordinary thread had to wait for a processor for {limit:g} s (limit {limit:g} s)'
-        return text if self._starved[1] >= _STARVED else ''

@@ -6,12 +6,12 @@ import os
 import resource
 import threading
 import time
+from math import nan
 from pathlib import Path
 
 _TASKS = Path('/proc/self/task')
 _THREAD_CLOCK = 6  # per thread, processor time: CPUCLOCK_PERTHREAD_MASK | CPUCLOCK_SCHED of the Linux kernel
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT of Linux
-_MAY_LOCK = 1 << 14  # CAP_IPC_LOCK
 
 
 class Threads:
@@ -41,39 +41,12 @@ class Threads:
         """Return the numbers of the threads that take turns with the interpreter."""
         return {thread.native_id for thread in threading.enumerate() if thread.native_id is not None}
 
-    def waits(self, number: int) -> bool:
-        """Return whether a thread that wants to run has no processor, or runs just now."""
-        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            return (_TASKS / str(number) / 'stat').read_text().rsplit(')', 1)[1].split()[0] == 'R'
-        return False
-
     def processor_time(self, number: int) -> float:
         """Return the processor time that a thread has used, s; NaN where it has ended."""
         try:
             return time.clock_gettime(~number << 3 | _THREAD_CLOCK)
         except OSError:
-            return float('nan')
-
-
-def drop_real_time() -> int:
-    """Run all threads of this process ordinarily; return the real-time priority that they had, 0: none.
-
-    A process started in real time would import, compile and find its peers before all others of the
-    machine, and wait in vain there for any of lower priority.
-    """
-    highest = 0
-    for number in (int(task.name) for task in _TASKS.iterdir()):
-        with contextlib.suppress(ProcessLookupError):
-            priority = os.sched_getparam(number).sched_priority
-            if priority:
-                os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
-            highest = max(highest, priority)
-    return highest
-
-
-def started_in_real_time(priority: int) -> str:
-    """Return the sentence on a process that `drop_real_time` has found at a `priority`."""
-    return f'started at real-time priority {priority}, now ordinary: only loops of active nodes have it'
+            return nan
 
 
 def lock_memory() -> bool:
@@ -88,22 +61,16 @@ def lock_memory() -> bool:
     _, highest = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if highest == resource.RLIM_INFINITY:
         resource.setrlimit(resource.RLIMIT_MEMLOCK, (highest, highest))
-    else:
-        status = Path('/proc/self/status').read_text()
-        effective = next(line for line in status.splitlines() if line.startswith('CapEff:'))
-        if not int(effective.split()[1], 16) & _MAY_LOCK:
-            return False
+    elif os.geteuid() != 0:
+        return False
     return ctypes.CDLL(None).mlockall(_CURRENT | _FUTURE | _ON_FAULT) == 0
 
 
-def limit_without_sleep(soft: float, hard: float) -> None:
-    """Let the system send SIGXCPU when a thread in real time has run for `soft` s without a sleep.
+def limit_without_sleep(limit: float) -> None:
+    """Let the system kill this process when a thread in real time has run for `limit` s without a sleep.
 
-    After `hard` s it kills the process. A lower limit that is set already stays.
+    A lower limit that is set already stays.
     """
-    _, highest = resource.getrlimit(resource.RLIMIT_RTTIME)
-    limits = [round(1e6 * seconds) for seconds in (soft, hard)]
-    if highest != resource.RLIM_INFINITY:
-        limits = [min(limit, highest) for limit in limits]
+    number = round(1e6 * limit)
     with contextlib.suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_RTTIME, (limits[0], limits[1]))
+        resource.setrlimit(resource.RLIMIT_RTTIME, (number, number))

@@ -3,13 +3,14 @@
 import math
 import select
 import time
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from mount_driver.bus import Frame, Reception, may_have_frames
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, E2EReceiver, Measurement, MountCodec, Setpoint, Status
-from mount_driver.watches.message_watches import SenderLimits, SenderWatch
+from mount_driver.watches.message_watches import SenderWatch
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Reading
 
@@ -22,16 +23,11 @@ _CREDIBLE_AGE = 10.0  # s, chosen: a frame's time stamp that is farther from now
 _OFF = Setpoint(0.0, _COUNTER_MASK, enable=False)
 
 
-@dataclass(frozen=True)
-class ReceivedSetpoint:
+class ReceivedSetpoint(NamedTuple):
     """A setpoint with the time of its arrival by the system clock (s), NaN where the bus does not tell it."""
 
     setpoint: Setpoint
     arrival: float
-
-    def answers(self, counter: int) -> bool:
-        """Whether it answers the sample with this counter."""
-        return self.setpoint.enable and self.setpoint.answered_counter == counter
 
     def late(self, number: int) -> int:
         """Return how many samples too late it is for sample `number`, which takes it over; it may be off.
@@ -55,8 +51,8 @@ class CanEnd:
         """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
-        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.setpoint, self._codec.setpoint_of)
-        self._hosts = SenderWatch(SenderLimits(), self._codec.setpoint.name, 'one host only may send it')
+        self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.setpoint)
+        self._hosts = SenderWatch(self._codec.setpoint.name, 'one host only may send it')
         self._now = 0  # ns, by the samples
         self._off_until = 0
 
@@ -102,23 +98,16 @@ class CanEnd:
         """Send a frame as it is."""
         self._bus.send(frame)
 
-    def wait_for_answer(self, number: int, limit: float) -> ReceivedSetpoint | None:
-        """Return the setpoint that answers sample `number`, or None after `limit` s without it.
+    def answer_to(self, number: int) -> ReceivedSetpoint | None:
+        """Return the setpoint that answers sample `number`, None if it has not come.
 
-        With a limit of 0 s it takes one frame if there is one. A frame that switches off answers none,
-        whatever number it carries.
+        A frame that switches off answers none, whatever number it carries.
         """
-        if limit == 0.0 and not may_have_frames(self._bus):
-            return None
-        end = time.monotonic() + limit
-        while True:
-            remaining = end - time.monotonic()
-            frame = self._reception.frame(self._bus, max(0.0, remaining))
-            received = None if frame is None else self._setpoint_in(frame)
-            if received is not None and received.answers(number & _COUNTER_MASK):
+        counter = number & _COUNTER_MASK
+        for received in self._received():
+            if received.setpoint.enable and received.setpoint.answered_counter == counter:
                 return received
-            if remaining <= 0.0:
-                return None
+        return None
 
     def wait_for_frame(self, limit: float) -> None:
         """Return when there is a frame to take, or after `limit` s; at once on a bus without a socket."""
@@ -127,10 +116,13 @@ class CanEnd:
 
     def newest(self) -> ReceivedSetpoint | None:
         """Take all frames that have come since the last call and return the last sound setpoint in them."""
-        newest = None
+        received = list(self._received())
+        return received[-1] if received else None
+
+    def _received(self) -> Iterator[ReceivedSetpoint]:
         while may_have_frames(self._bus) and (frame := self._reception.frame(self._bus, 0.0)) is not None:
-            newest = self._setpoint_in(frame) or newest
-        return newest
+            if (received := self._setpoint_in(frame)) is not None:
+                yield received
 
     def close(self) -> None:
         """End the bus; safe to call twice."""

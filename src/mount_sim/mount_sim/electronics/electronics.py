@@ -3,10 +3,10 @@
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
+from mount_models.arrays import FloatArray
 from mount_models.quantity import Quantity
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_sim.plant.reluctance import mean_incremental_inductance
@@ -66,16 +66,16 @@ class Noise:
         """`place`: the number of the mount where there are several; each has sequences of its own."""
         self._random = RandomNumbers(seed if place is None else (seed, 2, 1 + place))
         self._random_times = RandomNumbers((seed, 1) if place is None else (seed, 1, 1 + place))
-        self._numbers: NDArray[np.float64] = np.empty((0, self.NUMBERS))
+        self._numbers: FloatArray = np.empty((0, self.NUMBERS))
         self._place = 0
 
-    def next(self) -> NDArray[np.float64]:
+    def next(self) -> FloatArray:
         """Return the numbers of the next sample."""
         numbers = self.ahead(1)[0]
         self.skip(1)
         return numbers
 
-    def ahead(self, count: int) -> NDArray[np.float64]:
+    def ahead(self, count: int) -> FloatArray:
         """Return the numbers of the next `count` samples, (count, NUMBERS); they remain the next."""
         while len(self._numbers) - self._place < count:
             times = self._random_times.normal(self._BLOCK, 1)

@@ -1,4 +1,10 @@
-"""The excitation that comes of the parameters of a scenario."""
+"""The excitation that comes of the parameters of a scenario, or of an array on disk.
+
+The desk makes the file of recordings and roads. It is NPY, its array (n,) of records with
+one field of float64, little-endian, `STEP_TIME` apart:
+`chassis_acceleration` in m/s^2 upwards, its mean removed (scenario recorded), or `road_height` in m upwards
+(scenario road). The name of the field says what the numbers are, so no other array is taken for one.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,18 +12,55 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.elementary import cosines, sines
-from mount_models.arithmetic.series import StreamedSeries, series_over_time
-from mount_models.quantity import ParameterError, checked
-from mount_sim.excitation.array_file import read_excitation
-from mount_sim.excitation.excitation import Excitation, Seat, idle_force
+from mount_models.arithmetic.series import StreamedSeries, series_of, series_over_time
+from mount_models.arrays import FloatArray
+from mount_models.quantity import ParameterError
+from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
-from mount_sim.excitation.scenario import SCENARIO_NAMES, STEP_TIME, TipIn
+from mount_sim.excitation.scenario import SCENARIO_NAMES, STEP_TIME, IdleForce, TipIn
 from mount_sim.parameters import SimParameters
 
-FloatArray = NDArray[np.float64]
+FIELDS = {Seat.ACCELERATED_CHASSIS: 'chassis_acceleration', Seat.VEHICLE: 'road_height'}
+_BLOCK = 1 << 20
+_REMEDY = (
+    'the simulator takes excitations at its own step alone; engine-mount drive makes them of recordings '
+    'and roads, and leaves them in given/ of a drive'
+)
+
+
+def write_excitation(file: Path, excitation: Excitation) -> Path:
+    """Write what shakes the plant, without the force on the engine; return `file`."""
+    count, field = len(excitation.values), FIELDS[excitation.seat]
+    rows = np.lib.format.open_memmap(file, 'w+', np.dtype([(field, '<f8')]), (count,))
+    for first in range(0, count, _BLOCK):
+        rows[field][first : first + _BLOCK] = excitation.values[first : first + _BLOCK]
+    rows.flush()
+    return file
+
+
+def read_excitation(file: str, seat: Seat) -> StreamedSeries:
+    """Return the numbers (n,) in `file`, or raise `ParameterError`."""
+    field, values = FIELDS[seat], np.empty(0)
+    try:
+        rows = np.load(file, mmap_mode='r')
+    except (OSError, ValueError, EOFError) as error:
+        raise ParameterError(f'the excitation {file} cannot be read as NPY ({error}): {_REMEDY}') from None
+    if isinstance(rows, np.ndarray) and rows.ndim == 1 and rows.dtype == np.dtype([(field, '<f8')]):
+        values = rows[field]
+    if not values.size:
+        raise ParameterError(
+            f'the excitation {file} is no array of at least one {field}, each {1e6 * STEP_TIME:g} us: '
+            + _REMEDY
+        )
+    finite = np.isfinite(values)
+    if not finite.all():
+        raise ParameterError(
+            f'the excitation {file} is not finite at number {int(finite.argmin())}: make it again'
+        )
+    return series_of(values)
+
 
 _DEFAULT_DURATION = 15.0  # s, chosen
 
@@ -42,19 +85,19 @@ def build_excitation(sim: SimParameters, made: tuple[str, StreamedSeries] | None
             f'{name} ({size:g} N) has no effect in scenario {sim.scenario}, where a '
             'rack imposes the displacement; set it to 0 or choose another scenario'
         )
-    count, step_time = len(shaken.values), shaken.step_time
-    forces = None
+    force = series_over_time(len(shaken.values), shaken.step_time, partial(_engine_force, idle, tip_in))
+    return replace(shaken, engine_forces=force)
+
+
+def _engine_force(idle: IdleForce, tip_in: TipIn, time: FloatArray) -> FloatArray:
+    """Return the force (N) of the idling engine and of one that rises linearly and stays."""
+    force = np.zeros_like(time)
     if idle.amplitude != 0.0:
-        forces = idle_force(idle.amplitude, idle.frequency, idle.second_share, count, step_time)
+        turns = idle.frequency * time
+        force += idle.amplitude * (sines(turns) + idle.second_share * sines(2.0 * turns))
     if tip_in.force != 0.0:
-        pushed = series_over_time(count, step_time, partial(_pushed, tip_in))
-        forces = pushed if forces is None else forces.plus(pushed)
-    return replace(shaken, engine_forces=forces)
-
-
-def _pushed(tip_in: TipIn, time: FloatArray) -> FloatArray:
-    """Return a force (N) that rises linearly and stays."""
-    return np.asarray(tip_in.force * np.clip((time - tip_in.time) / tip_in.rise, 0.0, 1.0))
+        force += tip_in.force * np.clip((time - tip_in.time) / tip_in.rise, 0.0, 1.0)
+    return force
 
 
 def _bench(sim: SimParameters) -> Excitation:
@@ -76,7 +119,7 @@ def _motorway(sim: SimParameters) -> Excitation:
             f'motorway.gap_time ({gap_time:g} s) must lie before the end of the drive ({duration:g} s); '
             'make the drive longer, the gap earlier, or gap_depth 0'
         )
-    road = checked(RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=sim.seed))
+    road = RandomRoad(roughness=motorway.roughness, speed=motorway.speed, seed=sim.seed)
     position = motorway.speed * gap_time
     gap = Gap(motorway.gap_depth, position, motorway.gap_length, motorway.speed)
 

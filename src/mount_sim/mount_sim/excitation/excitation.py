@@ -4,17 +4,15 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mount_models.arithmetic.elementary import sines
-from mount_models.arithmetic.series import StreamedSeries, series_over_time
+from mount_models.arithmetic.series import StreamedSeries
+from mount_models.arrays import FloatArray
 from mount_models.quantity import ParameterError
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 
 SHORT_BLOCK, LONG_BLOCK = 50, 500
 """Samples, chosen: where a block must be made within a part of a sample (real time); for a compiled loop."""
 
-Rows = NDArray[np.float64]
 
 _WHOLE = 1e-9  # relative, derived: a quotient so near to a whole number is one
 
@@ -48,18 +46,6 @@ class Excitation:
         return len(self.values) * self.step_time
 
 
-def idle_force(
-    amplitude: float, frequency: float, second_share: float, count: int, step_time: float
-) -> StreamedSeries:
-    """Return the force (n,) in N of an idling engine: a sine (N, Hz) and a share of twice its frequency."""
-
-    def force(time: NDArray[np.float64]) -> NDArray[np.float64]:
-        turns = frequency * time
-        return np.asarray(amplitude * (sines(turns) + second_share * sines(2.0 * turns)))
-
-    return series_over_time(count, step_time, force)
-
-
 def steps_of_sample(sample_rate: float, step_time: float) -> int:
     """Return how many steps of the plant (s) lie between two samples; raises `ParameterError`."""
     between = 1e-9 * sample_time_ns(sample_rate) / step_time
@@ -91,12 +77,12 @@ class Shaking:
         self._afterwards = 0.0 if excitation.seat is Seat.ACCELERATED_CHASSIS or not last.size else last[0]
         self._make(self.start, SHORT_BLOCK)  # loads what is compiled before time begins to run
 
-    def at(self, sample: int) -> tuple[Rows, Rows]:
+    def at(self, sample: int) -> tuple[FloatArray, FloatArray]:
         """Return excitation and force on the engine, (steps,) each, from `sample` to the next."""
         values, forces = self.ahead(sample, 1, SHORT_BLOCK)
         return values[0], forces[0]
 
-    def ahead(self, sample: int, count: int, block: int = LONG_BLOCK) -> tuple[Rows, Rows]:
+    def ahead(self, sample: int, count: int, block: int = LONG_BLOCK) -> tuple[FloatArray, FloatArray]:
         """Return both, (n, steps), for n samples from `sample` on: at least one, at most `count`."""
         if not self._first <= sample < self._first + len(self._values):
             self._make(sample, block)
@@ -109,7 +95,7 @@ class Shaking:
         self._values = self._rows(self._excitation.values, self._afterwards, block)
         self._forces = self._rows(self._excitation.engine_forces, 0.0, block)
 
-    def _rows(self, series: StreamedSeries | None, afterwards: float, block: int) -> Rows:
+    def _rows(self, series: StreamedSeries | None, afterwards: float, block: int) -> FloatArray:
         rows = np.zeros((block, self._steps))
         begin, end = (min(max(at - self._first, 0), block) for at in (self.start, self.samples))
         if series is not None and begin < end:

@@ -1,39 +1,54 @@
-"""The simulated truth of one engine on several mounts in one compiled step."""
+"""One engine on several mounts in one compiled step; do parameters fit the length of a step?
 
-from collections.abc import Sequence
+The steps are linearised about rest, so nothing of them is written a second time: each number of what moves is
+shifted a little, and what becomes of it in one step is a column of the matrix of the step. Where an
+eigenvalue of that lies outside the unit circle, a motion grows from step to step.
+"""
+
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
+from mount_models.arrays import ByteArray, FloatArray
+from mount_models.friction.contact import check_friction
+from mount_models.quantity import ParameterError, flattened
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.engine_body import (
     BODY_STATE,
     SUPPORT,
     SUPPORT_STATE,
     RigidEngine,
-    Support,
-    accelerated_engine_step,
     car_step,
-    support_records,
 )
+from mount_sim.plant.hydromount import HYDROMOUNT_STATE
+from mount_sim.plant.mounts import Contents
 from mount_sim.plant.plant import (
     PLANT,
     STATE,
-    PlantSimulation,
+    Plant,
     advance,
+    advance_bench,
     advance_magnet,
     force_beside_elastomer,
     take_motion,
 )
-from mount_sim.plant.vehicle import MountMotion, Vehicle
+from mount_sim.plant.vehicle import ENGINE_STATE, VEHICLE_STATE, MountMotion, Vehicle
 
 QUARTERS = 2.0
 """Of the vehicle, `Vehicle` each: the front half of the car, whose two wheels move alike (chosen)."""
+GROWTH_ALLOWED = 1e-6
+"""Of a motion in one step, chosen: far above rounding, 2 % in a second."""
 
-_BENCH, _ACCELERATED_CHASSIS = int(Seat.BENCH), int(Seat.ACCELERATED_CHASSIS)
+_BENCH = int(Seat.BENCH)
+_SHIFT, _SHIFT_OF_CAR = 1e-6, 1e-9  # SI, chosen: small for heights, angles and forces of branches
+_SHIFTS = {'volume': 1e-12, 'flow': 1e-9}  # m^3, m^3/s (chosen): within one piece of the hydromount's laws
+_MOVING = [*VEHICLE_STATE.names, *ENGINE_STATE.names, *HYDROMOUNT_STATE.names]  # first in `STATE`
+_DISPLACEMENT = STATE.fields['displacement'][1] // 8
+_NUMBERS = STATE.itemsize // 8
+_NOTHING = np.zeros(1)
 
 
 class CarLaw(NamedTuple):
@@ -49,105 +64,116 @@ _CAR = record_dtype(CarLaw)
 class CarMemory(NamedTuple):
     """Parameters and state as bytes of records, those of the mounts one behind the other."""
 
-    law: NDArray[np.uint8]  # `CarLaw`
-    plants: NDArray[np.uint8]  # `PLANT`
-    states: NDArray[np.uint8]  # `STATE`
-    supports: NDArray[np.uint8]  # `SUPPORT`
-    body: NDArray[np.uint8]  # `BODY_STATE`
-    motions: NDArray[np.uint8]  # `SUPPORT_STATE`
-
-
-class CarSimulation:
-    """Mounts, engine and vehicle; of the mounts those with electronics come first.
-
-    `mounts` are the simulations of the single mounts, whose states stand here from now on: each is read by
-    itself, and all are advanced together.
-    """
-
-    def __init__(
-        self,
-        law: CarLaw,
-        mounts: Sequence[PlantSimulation],
-        supports: Sequence[Support],
-        seat: Seat,
-        step_time: float,
-    ):
-        self.memory = CarMemory(
-            record_bytes(law),
-            np.concatenate([mount.memory.plant for mount in mounts]),
-            np.concatenate([mount.memory.state for mount in mounts]),
-            support_records(supports).view(np.uint8),
-            np.zeros(BODY_STATE.itemsize, np.uint8),
-            np.zeros(len(supports) * SUPPORT_STATE.itemsize, np.uint8),
-        )
-        bytes_of_each = (np.split(part, len(mounts)) for part in (self.memory.plants, self.memory.states))
-        for mount, plant, state in zip(mounts, *bytes_of_each, strict=True):
-            mount.stand_in(plant, state)
-        self._seat = int(seat)
-        self._step_time = step_time
-
-    def advance(
-        self,
-        values: NDArray[np.float64],
-        engine_forces: NDArray[np.float64],
-        wanted_currents: NDArray[np.float64],
-    ) -> None:
-        """Advance by one step for each of the excitation's `values`, with setpoints (A) of the first mounts.
-
-        `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.
-        """
-        advance_car(*self.memory, self._seat, values, engine_forces, wanted_currents, self._step_time)
+    law: ByteArray  # `CarLaw`
+    plants: ByteArray  # `PLANT`
+    states: ByteArray  # `STATE`
+    supports: ByteArray  # `SUPPORT`
+    body: ByteArray  # `BODY_STATE`
+    motions: ByteArray  # `SUPPORT_STATE`
 
 
 @compiled
 def advance_car(law, plants, states, supports, body, motions, seat, values, engine_forces, wanted, dt):
-    """Advance all mounts by one step of `dt` s for each excitation value; see `CarSimulation.advance`."""
+    """Advance all mounts by one step of `dt` s for each excitation value, with setpoints `wanted` (A).
+
+    `engine_forces` (N, upwards) act on the engine in the same steps. On a bench every mount stands on a rack
+    of its own; all racks impose the same displacement.
+    """
     laws, nows, places = plants.view(PLANT), states.view(STATE), supports.view(SUPPORT)
-    if seat == _BENCH:
-        _advance_benches(plants, states, len(places), values, wanted, dt)
-        return
     car, moved, moves = law.view(_CAR)[0], body.view(BODY_STATE)[0], motions.view(SUPPORT_STATE)
     beside = np.zeros(len(places))
-    for k in range(len(wanted)):
+    for k in range(len(places)):
         nows[k].wanted_current = wanted[k]
     for index in range(len(values)):
-        for k in range(len(places)):
-            if k < len(wanted):  # without electronics no current flows
-                advance_magnet(laws[k], nows[k], dt)
-            beside[k] = force_beside_elastomer(laws[k], nows[k], nows[k].displacement, dt)
         value, force = values[index], engine_forces[index]
-        if seat == _ACCELERATED_CHASSIS:
-            accelerated_engine_step(car.engine, places, moved, moves, value, force, beside, dt)
-        else:
-            car_step(car.vehicle, QUARTERS, car.engine, places, moved, moves, value, force, beside, dt)
         for k in range(len(places)):
-            _take_motion_of(laws[k], nows[k], moves[k], moved, seat, value, dt)
+            advance_magnet(laws[k], nows[k], dt)
+            if seat == _BENCH:
+                advance_bench(laws[k], nows[k], value, dt)
+            else:
+                beside[k] = force_beside_elastomer(laws[k], nows[k], nows[k].displacement, dt)
+        if seat == _BENCH:
+            continue
+        car_step(car.vehicle, QUARTERS, car.engine, places, moved, moves, value, force, beside, dt)
+        for k in range(len(places)):
+            _take_motion_of(laws[k], nows[k], moves[k], moved, value, dt)
 
 
 @compiled
-def _advance_benches(plants, states, count, values, wanted, dt):
-    """Every mount stands on a rack of its own; all racks impose the same displacement."""
-    nothing = np.zeros(len(values))
-    law, state = len(plants) // count, len(states) // count
-    for k in range(count):
-        current = wanted[k] if k < len(wanted) else 0.0
-        advance(
-            plants[k * law : (k + 1) * law],
-            states[k * state : (k + 1) * state],
-            _BENCH,
-            values,
-            nothing,
-            current,
-            dt,
+def _take_motion_of(law, now, motion, body, value, dt):
+    moved = MountMotion(motion.displacement, motion.velocity, motion.mount_force, motion.chassis_acceleration)
+    take_motion(law, now, moved, dt)
+    now.road_height = value
+    now.vehicle.wheel_height = body.wheel_height
+    now.vehicle.chassis_height = motion.chassis_height
+    now.vehicle.engine_height = motion.engine_height
+
+
+def checked_plant(plant: Plant, seat: Seat, step_time: float) -> Plant:
+    """Return `plant` if it can be simulated in steps of `step_time` s, or raise a `ValueError` that says why.
+
+    Checked are combinations; each number by itself is checked where the plant is made.
+    """
+    if plant.mount.contents == Contents.PADS:
+        check_friction(plant.friction, plant.contact)
+    values, defaults = flattened(plant), flattened(Plant())
+    parts = ('vehicle.', 'hydromount.')
+    changed = [
+        f'{name} ({value:g})'
+        for name, value in values.items()
+        if name.startswith(parts) and value != defaults[name]
+    ]
+    _check_growth(growth(plant, seat, step_time), ', '.join(changed), step_time)
+    return plant
+
+
+def check_car(memory: CarMemory, seat: Seat, step_time: float) -> None:
+    """Raise `ParameterError` if in steps of `step_time` s a motion of the engine would grow without end."""
+    _check_growth(car_growth(memory, seat, step_time), 'engine.*, vehicle.* and places.*', step_time)
+
+
+def _check_growth(found: float, names: str, step_time: float) -> None:
+    if found > 1.0 + GROWTH_ALLOWED:
+        raise ParameterError(
+            f'{names} do not fit together: in steps of {1e6 * step_time:g} us the motion of the simulated '
+            f'plant would grow without end, {found:.6g} times in a step; set them closer to their defaults'
         )
 
 
-@compiled
-def _take_motion_of(law, now, motion, body, seat, value, dt):
-    moved = MountMotion(motion.displacement, motion.velocity, motion.mount_force, motion.chassis_acceleration)
-    take_motion(law, now, moved, dt)
-    if seat != _ACCELERATED_CHASSIS:
-        now.road_height = value
-        now.vehicle.wheel_height = body.wheel_height
-        now.vehicle.chassis_height = motion.chassis_height
-        now.vehicle.engine_height = motion.engine_height
+def growth(plant: Plant, seat: Seat, step_time: float) -> float:
+    """Return by how much the fastest growing free motion about rest is greater after a step, 1 for not."""
+    law, rest = record_bytes(plant), np.zeros(_NUMBERS)
+    rest.view(STATE)['gap'] = plant.mechanics.rest_gap
+
+    def step(state: FloatArray) -> None:
+        advance(law, state.view(np.uint8), int(seat), _NOTHING, _NOTHING, 0.0, step_time)
+
+    shifts = [next((by for word, by in _SHIFTS.items() if word in name), _SHIFT) for name in _MOVING]
+    return _growth(step, rest, [*range(len(_MOVING)), _DISPLACEMENT], [*shifts, _SHIFT])
+
+
+def car_growth(memory: CarMemory, seat: Seat, step_time: float) -> float:
+    """Return the same for an engine on several mounts; the fluid of each is checked where it stands alone."""
+    body, rest = memory.body.size, memory.body.size + memory.motions.size
+    whole = np.concatenate([memory.body, memory.motions, memory.states]).view(np.float64)
+    currents = np.zeros(memory.states.size // STATE.itemsize)
+
+    def step(state: FloatArray) -> None:
+        numbers = state.view(np.uint8)
+        trial = memory._replace(body=numbers[:body], motions=numbers[body:rest], states=numbers[rest:])
+        advance_car(*trial, int(seat), _NOTHING, _NOTHING, currents, step_time)
+
+    moving = [*range(rest // 8), *range(rest // 8 + _DISPLACEMENT, whole.size, _NUMBERS)]
+    return _growth(step, whole, moving, [_SHIFT_OF_CAR] * len(moving))
+
+
+def _growth(
+    step: Callable[[FloatArray], None], rest: FloatArray, moving: list[int], shifts: Sequence[float]
+) -> float:
+    """Return the greatest eigenvalue of a `step`, which changes its state in place, for what is `moving`."""
+    states = np.tile(rest, (len(moving) + 1, 1))
+    states[range(len(moving)), moving] += shifts
+    for state in states:
+        step(state)
+    after = states[:, moving]
+    return float(np.abs(np.linalg.eigvals((after[:-1] - after[-1]).T / shifts)).max())

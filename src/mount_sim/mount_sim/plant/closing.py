@@ -1,7 +1,7 @@
 """How the simulated actuator closes: magnet against spring and pads, quasi-static, with snap-through.
 
-It belongs to the plant: the magnet is `actuator.reluctance`. The controller's estimate of the same
-forces is `force_table`.
+It belongs to the plant: the magnet is `reluctance`. The controller's estimate of the same
+forces is `mount_models.actuator`.
 """
 
 import math
@@ -55,24 +55,6 @@ def contact_force(mechanics):
     return mechanics.spring_stiffness * (mechanics.rest_gap - mechanics.contact_gap)
 
 
-@compiled
-def contact_current(mechanics, actuator):
-    """Return the current (A) that just holds the pads in touch, where closed pads begin to open again."""
-    wanted = contact_force(mechanics)
-    low, high = 0.0, 1e-3
-    while force(actuator, high, mechanics.contact_gap) < wanted:
-        low, high = high, 2.0 * high
-        if high > _HOPELESS_CURRENT:
-            return math.nan
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if force(actuator, middle, mechanics.contact_gap) < wanted:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
 def checked_closing(mechanics: ClosingMechanics, actuator: ReluctanceActuator) -> ClosingMechanics:
     """Return `mechanics` with every value in range, or raise `ParameterError`.
 
@@ -84,7 +66,7 @@ def checked_closing(mechanics: ClosingMechanics, actuator: ReluctanceActuator) -
             f'contact_gap ({mechanics.contact_gap * 1e6:.1f} um) must lie below rest_gap '
             f'({mechanics.rest_gap * 1e6:.1f} um): without current the pads must be free of the rod'
         )
-    if math.isnan(contact_current(mechanics, actuator)):
+    if force(actuator, _HOPELESS_CURRENT, mechanics.contact_gap) < contact_force(mechanics):
         raise ParameterError(
             f'contact force ({contact_force(mechanics):.1f} N) is beyond what the magnet reaches at a gap of '
             f'{mechanics.contact_gap * 1e6:.1f} um; lower spring_stiffness or bring the gaps closer together'
@@ -118,7 +100,10 @@ def _gap_from_open(mechanics, actuator, current, gap):
         return _gap_above(mechanics, actuator, current, gap)
     for _ in range(60):
         if slope <= 0.0 or gap - pull / slope <= mechanics.contact_gap:
-            return _gap_at_contact(mechanics, actuator, current)
+            contact = mechanics.contact_gap
+            if _pull(mechanics, actuator, current, contact)[0] < 0.0:
+                return _gap_above(mechanics, actuator, current, contact)
+            return contact
         step = pull / slope
         gap -= step
         if abs(step) < _GAP_RESOLUTION:
@@ -127,14 +112,6 @@ def _gap_from_open(mechanics, actuator, current, gap):
         if pull < 0.0:
             return _gap_above(mechanics, actuator, current, gap)
     return gap
-
-
-@compiled
-def _gap_at_contact(mechanics, actuator, current):
-    """Return the contact gap, or the equilibrium above it where the spring wins there."""
-    if _pull(mechanics, actuator, current, mechanics.contact_gap)[0] < 0.0:
-        return _gap_above(mechanics, actuator, current, mechanics.contact_gap)
-    return mechanics.contact_gap
 
 
 @compiled

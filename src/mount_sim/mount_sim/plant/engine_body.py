@@ -1,60 +1,50 @@
-"""The engine as a rigid body on several mounts: heave, roll and pitch; below it a vehicle or a moved chassis.
+"""The engine as a rigid body on several mounts: heave, roll and pitch; below it a vehicle.
 
     m z'' = F_z - sum F_i
-    I_x phi'' = y_F F_z - sum y_i F_i
-    I_y theta'' = -x_F F_z + sum x_i F_i - h F_r
+    I_x phi'' = -sum y_i F_i
+    I_y theta'' = sum x_i F_i - h F_r
     d_i = z + y_i phi - x_i theta - z_ci,  F_i: force of mount i on the chassis at displacement d_i
     F_r: elastomer of the torque rod at s = h theta
 
 Axes: x forward, y left, z up, origin in the centre of gravity; phi (roll) lifts the left side, theta (pitch)
-lowers the front; small angles. z: heave of the centre of gravity; F_z: force on the engine at (x_F, y_F).
+lowers the front; small angles. z: heave of the centre of gravity; F_z: force on the engine there.
 
 Below the mounts stand q quarters of a vehicle that move alike (`mount_sim.plant.vehicle`), with one piece of
 local chassis at each mount:
 
     m_u z_u'' = k_t (z_r - z_u) - F_s,  q m_b z_b'' = q F_s - sum F_ci,  m_ci z_ci'' = F_ci + F_i
 
-or a chassis whose acceleration is given; heave is relative to it then. The step is that of
-`mount_sim.plant.vehicle`: semi-implicit Euler.
+The step is that of `mount_sim.plant.vehicle`: semi-implicit Euler.
 """
 
-from collections.abc import Sequence
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
-from mount_models.quantity import Quantity
-from mount_sim.plant.vehicle import BRANCHES, Elastomer, elastomer_force, stretch_branches
+from mount_models.arithmetic.record import number_record, record_dtype
+from mount_models.arrays import FloatArray
+from mount_models.quantity import ParameterError, Quantity
+from mount_sim.plant.vehicle import BRANCHES, Elastomer, Vehicle, elastomer_force, stretch_branches
 
-FloatArray = npt.NDArray[np.float64]
+_LOWEST_MODE = 0.5  # Hz, chosen: below it the engine is held by nothing
 
-_BODY_NAMES = ('wheel', 'body', 'engine', 'roll', 'pitch')
-BODY_STATE = record_type(
-    [
-        (f'{name}_{what}', 'f8')
-        for name in _BODY_NAMES
-        for what in (('angle', 'rate') if name in ('roll', 'pitch') else ('height', 'velocity'))
-    ]
-    + BRANCHES
+BODY_STATE = number_record(
+    *(f'{name}_{what}' for name in ('wheel', 'body', 'engine') for what in ('height', 'velocity')),
+    *(f'{name}_{what}' for name in ('roll', 'pitch') for what in ('angle', 'rate')),
+    *BRANCHES,
 )
 """Heights (m), velocities (m/s), angles (rad) and their rates (rad/s); forces (N) of the rod's branches."""
-SUPPORT_STATE = record_type(
-    [
-        (name, 'f8')
-        for name in (
-            'chassis_height',
-            'chassis_velocity',
-            'displacement',
-            'velocity',
-            'mount_force',
-            'chassis_acceleration',
-            'engine_height',
-        )
-    ]
-    + BRANCHES
+SUPPORT_STATE = number_record(
+    'chassis_height',
+    'chassis_velocity',
+    'displacement',
+    'velocity',
+    'mount_force',
+    'chassis_acceleration',
+    'engine_height',
+    *BRANCHES,
 )
 """Of one mount, SI: the chassis under it, its motion, force and acceleration of the last step, branches."""
 
@@ -73,31 +63,19 @@ class RigidEngine(NamedTuple):
         float, Quantity('kg m^2', 'I_x: about the longitudinal axis, of a box', 0.1, 1e4)
     ] = 15.6
     pitch_inertia: Annotated[float, Quantity('kg m^2', 'I_y: about the crank, of a box', 0.1, 1e4)] = 8.1
-    force_x: Annotated[float, Quantity('m', 'x_F: where the force of the idling engine acts', -1.0, 1.0)] = (
-        0.0
-    )
-    force_y: Annotated[float, Quantity('m', 'y_F: likewise', -1.0, 1.0)] = 0.0
     rod_lever: Annotated[float, Quantity('m', 'h: torque rod below the centre of gravity', 0.0, 1.0)] = 0.25
     rod: Elastomer = Elastomer(3e5, 3e4, 3e4, 3e4)
 
 
 class Support(NamedTuple):
-    """One mount of the engine: its place, its elastomer, the chassis below it."""
+    """One mount of the engine: its place; of the `vehicle` its elastomer and the chassis below it."""
 
     x: float
     y: float
-    chassis_mass: float
-    chassis_stiffness: float
-    chassis_damping: float
-    elastomer: Elastomer
+    vehicle: Vehicle
 
 
 SUPPORT = record_dtype(Support)
-
-
-def support_records(supports: Sequence[Support]) -> npt.NDArray[Any]:
-    """Return the supports (n,) as records of `SUPPORT` for the steps."""
-    return np.concatenate([record_bytes(support).view(SUPPORT) for support in supports])
 
 
 @compiled
@@ -114,50 +92,33 @@ def car_step(vehicle, quarters, engine, supports, body, states, road_height, eng
     ) + vehicle.suspension_damping * (body.wheel_velocity - body.body_velocity)
     carriers = 0.0
     for k in range(len(supports)):
-        support, state = supports[k], states[k]
-        _note_force(support, state, beside[k])
-        carrier = support.chassis_stiffness * (
+        chassis, state = supports[k].vehicle, states[k]
+        state.mount_force = elastomer_force(chassis.elastomer, state.displacement, state) + beside[k]
+        carrier = chassis.chassis_stiffness * (
             body.body_height - state.chassis_height
-        ) + support.chassis_damping * (body.body_velocity - state.chassis_velocity)
+        ) + chassis.chassis_damping * (body.body_velocity - state.chassis_velocity)
         carriers += carrier
-        state.chassis_acceleration = (carrier + state.mount_force) / support.chassis_mass
+        state.chassis_acceleration = (carrier + state.mount_force) / chassis.chassis_mass
         state.chassis_velocity += dt * state.chassis_acceleration
         state.chassis_height += dt * state.chassis_velocity
     body.wheel_velocity += dt * (tyre - suspension) / vehicle.wheel_mass
     body.body_velocity += dt * (quarters * suspension - carriers) / (quarters * vehicle.body_mass)
     body.wheel_height += dt * body.wheel_velocity
     body.body_height += dt * body.body_velocity
-    _move_engine(engine, supports, body, states, engine_force, 0.0, dt)
+    _move_engine(engine, supports, body, states, engine_force, dt)
 
 
 @compiled
-def accelerated_engine_step(engine, supports, body, states, acceleration, engine_force, beside, dt):
-    """Advance the engine by `dt` seconds on a chassis with `acceleration` (m/s^2, up); others as `car_step`.
-
-    The heave is relative to the chassis, which does not move in its own frame.
-    """
-    for k in range(len(supports)):
-        _note_force(supports[k], states[k], beside[k])
-        states[k].chassis_acceleration = acceleration
-    _move_engine(engine, supports, body, states, engine_force, acceleration, dt)
-
-
-@compiled
-def _note_force(support, state, beside):
-    state.mount_force = elastomer_force(support.elastomer, state.displacement, state) + beside
-
-
-@compiled
-def _move_engine(engine, supports, body, states, engine_force, acceleration, dt):
+def _move_engine(engine, supports, body, states, engine_force, dt):
     """Move the engine by the forces noted in `states`, then the mounts with it."""
-    lift, rolling, pitching = engine_force, engine.force_y * engine_force, -engine.force_x * engine_force
+    lift, rolling, pitching = engine_force, 0.0, 0.0
     for k in range(len(supports)):
         force = states[k].mount_force
         lift -= force
         rolling -= supports[k].y * force
         pitching += supports[k].x * force
     pitching -= engine.rod_lever * elastomer_force(engine.rod, engine.rod_lever * body.pitch_angle, body)
-    body.engine_velocity += dt * (lift / engine.mass - acceleration)
+    body.engine_velocity += dt * (lift / engine.mass)
     body.roll_rate += dt * rolling / engine.roll_inertia
     body.pitch_rate += dt * pitching / engine.pitch_inertia
     body.engine_height += dt * body.engine_velocity
@@ -178,7 +139,7 @@ def _take_motion(support, state, body, dt):
         - support.x * body.pitch_rate
         - state.chassis_velocity
     )
-    stretch_branches(support.elastomer, state, state.velocity * dt, dt)
+    stretch_branches(support.vehicle.elastomer, state, state.velocity * dt, dt)
 
 
 def engine_stiffness(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray:
@@ -187,7 +148,7 @@ def engine_stiffness(engine: RigidEngine, supports: Sequence[Support]) -> FloatA
     stiffness[2, 2] = engine.rod.static_stiffness * engine.rod_lever * engine.rod_lever
     for support in supports:
         lever = np.array([1.0, support.y, -support.x])
-        stiffness += support.elastomer.static_stiffness * np.outer(lever, lever)
+        stiffness += support.vehicle.elastomer.static_stiffness * np.outer(lever, lever)
     return stiffness
 
 
@@ -199,3 +160,14 @@ def engine_modes(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray
     scale = 1.0 / np.sqrt([engine.mass, engine.roll_inertia, engine.pitch_inertia])
     squares = np.linalg.eigvalsh(engine_stiffness(engine, supports) * np.outer(scale, scale))
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), dtype=np.float64)
+
+
+def check_hold(engine: RigidEngine, supports: Mapping[str, Support]) -> None:
+    """Raise `ParameterError` if the engine could move without a force against it."""
+    lowest = engine_modes(engine, list(supports.values()))[0]
+    if lowest < _LOWEST_MODE:
+        raise ParameterError(
+            f'the engine on {", ".join(supports)} has a natural frequency of {lowest:.3g} Hz (limit '
+            f'{_LOWEST_MODE:g} Hz): nothing holds it against heave, roll or pitch; give another place a '
+            'mount (mounts), or the torque rod a lever (engine.rod_lever)'
+        )

@@ -18,7 +18,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_type
+from mount_models.arithmetic.record import number_record
 from mount_models.quantity import Quantity
 
 _RESISTANCE = 'Pa s/m^3'
@@ -61,11 +61,8 @@ class Hydromount(NamedTuple):
     stop_resistance: Annotated[float, Quantity(_RESISTANCE, 'R_st: stops of the decoupler', 0.0, 1e10)] = 6e7
 
 
-HYDROMOUNT_STATE = record_type(
-    [
-        (name, 'f8')
-        for name in ('upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume')
-    ]
+HYDROMOUNT_STATE = number_record(
+    'upper_volume', 'lower_volume', 'track_flow', 'decoupler_flow', 'passed_volume'
 )
 """V_1, C_2 P_2 and V_d in m^3, flows in m^3/s, half a step earlier."""
 
@@ -79,7 +76,9 @@ def hydromount_force(hydromount, state):
 @compiled
 def hydromount_step(hydromount, state, displacement_change, dt):
     """Advance `state`, a record of `HYDROMOUNT_STATE`, by `dt` seconds with `displacement_change` in m."""
-    pressure = upper_pressure(hydromount, state.upper_volume) - lower_pressure(hydromount, state)
+    pressure = (
+        upper_pressure(hydromount, state.upper_volume) - state.lower_volume / hydromount.lower_compliance
+    )
     track_resistance = hydromount.track_resistance + hydromount.track_turbulence * abs(state.track_flow)
     state.track_flow = _flow_after(
         hydromount.track_inertance, track_resistance, state.track_flow, pressure, dt
@@ -113,12 +112,6 @@ def upper_pressure(hydromount, volume):
         return -limit + (volume - empty) / (rest * (1.0 + asymmetry))
     # root of C_10 (P - a P^2 / (2 P_a)) = V in the form that holds for a = 0 too
     return 2.0 * volume / (rest * (1.0 + math.sqrt(1.0 - 2.0 * asymmetry * volume / (rest * limit))))
-
-
-@compiled
-def lower_pressure(hydromount, state):
-    """Return P_2 (Pa)."""
-    return state.lower_volume / hydromount.lower_compliance
 
 
 @compiled

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.record import record_bytes, record_dtype, record_type
+from mount_models.arithmetic.record import number_record, record_bytes, record_dtype, record_type
+from mount_models.arrays import ByteArray, FloatArray
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import checked
@@ -20,6 +20,7 @@ from mount_sim.plant.mounts import Contents, SeatedMount
 from mount_sim.plant.reluctance import ReluctanceActuator, gap_flux_density
 from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at
 from mount_sim.plant.vehicle import (
+    BRANCHES,
     ENGINE_STATE,
     VEHICLE_STATE,
     Vehicle,
@@ -51,44 +52,29 @@ class Plant(NamedTuple):
 PLANT = record_dtype(Plant)
 """The plant's parameters in compiled code."""
 
+_NUMBERS = (
+    'current', 'wanted_current', 'gap', 'normal_force', 'slider_position', 'deflection', 'displacement',
+    'velocity', *BRANCHES, 'friction_force', 'mount_force', 'chassis_acceleration', 'road_height',
+)  # fmt: skip
 STATE = record_type(
     [
         ('vehicle', VEHICLE_STATE),
         ('engine', ENGINE_STATE),
         ('hydromount', HYDROMOUNT_STATE),
-        *(
-            (name, 'f8')
-            for name in (
-                'current',
-                'wanted_current',
-                'gap',
-                'normal_force',
-                'slider_position',
-                'deflection',
-                'displacement',
-                'velocity',
-                'slow_force',
-                'middle_force',
-                'fast_force',
-                'friction_force',
-                'mount_force',
-                'chassis_acceleration',
-                'road_height',
-            )
-        ),
+        *((name, 'f8') for name in _NUMBERS),
     ]
 )
 """What the plant remembers from step to step, SI."""
 
-TRUTH = record_type([(name, 'f8') for name in SIM_TRUTH.names])
+TRUTH = number_record(*SIM_TRUTH.names)
 """What no sensor sees, SI: the scalars of the topic `sim/truth` in its order."""
 
 
 class Memory(NamedTuple):
     """Bytes of parameters and state, the seat's number, step of the plant in s."""
 
-    plant: NDArray[np.uint8]
-    state: NDArray[np.uint8]
+    plant: ByteArray
+    state: ByteArray
     seat: int
     step_time: float
 
@@ -99,50 +85,30 @@ class PlantSimulation:
     def __init__(self, plant: Plant, seat: Seat, step_time: float):
         plant = Plant(*(checked(part) for part in plant))
         checked_closing(plant.mechanics, plant.actuator)
-        self._plant = record_bytes(_warm(plant))
-        self._seat = int(seat)
-        self._step_time = step_time
-        self._state = np.zeros(1, STATE).view(np.uint8)
-        self._truth = np.zeros(1, TRUTH).view(np.uint8)
-        self._truth_record = self._truth.view(TRUTH)[0]
-        self._state.view(STATE)['gap'] = plant.mechanics.rest_gap
-
-    @property
-    def memory(self) -> Memory:
+        self.memory = Memory(
+            record_bytes(_warm(plant)), np.zeros(STATE.itemsize, np.uint8), int(seat), step_time
+        )
         """What the compiled `read` and `advance` need, for a compiled loop that calls them."""
-        return Memory(self._plant, self._state, self._seat, self._step_time)
-
-    def stand_in(self, plant: NDArray[np.uint8], state: NDArray[np.uint8]) -> None:
-        """Have parameters and state in these bytes from now on, where those of several mounts stand."""
-        plant[:], state[:] = self._plant, self._state
-        self._plant, self._state = plant, state
-
-    @property
-    def truth(self) -> np.void:
+        self.memory.state.view(STATE)['gap'] = plant.mechanics.rest_gap
+        self._truth = np.zeros(1, TRUTH).view(np.uint8)
+        self.truth = self._truth.view(TRUTH)[0]
         """The truth at the last `read`."""
-        return self._truth_record
 
-    @property
-    def truth_bytes(self) -> bytes:
-        """The truth at the last `read` as little-endian float64 numbers."""
-        return self._truth.tobytes()
-
-    def read(self, noise: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    def read(self, noise: FloatArray) -> tuple[float, float, float, float]:
         """Return the sensors' readings (displacement, current, di/dt, dB/dt; SI) and note the truth."""
-        return read(self._plant, self._state, self._truth, noise)
+        return read(self.memory.plant, self.memory.state, self._truth, noise)
 
-    def advance(
-        self, values: NDArray[np.float64], engine_forces: NDArray[np.float64], wanted_current: float
-    ) -> None:
+    def advance(self, values: FloatArray, engine_forces: FloatArray, wanted_current: float) -> None:
         """Advance by one step for each of the excitation's `values`, with a current setpoint in A.
 
         `engine_forces` (N, upwards) act on the engine in the same steps; a bench holds the engine.
         """
-        advance(self._plant, self._state, self._seat, values, engine_forces, wanted_current, self._step_time)
+        plant, state, seat, step_time = self.memory
+        advance(plant, state, seat, values, engine_forces, wanted_current, step_time)
 
     def change(self, plant: Plant) -> None:
         """Go on from the present state with other parameters; a fault's need not lie within their ranges."""
-        self._plant[:] = record_bytes(_warm(plant))
+        self.memory.plant[:] = record_bytes(_warm(plant))
 
 
 def _warm(plant: Plant) -> Plant:
@@ -195,16 +161,16 @@ def advance(plant, state, seat, values, engine_forces, wanted_current, dt):
     for index in range(len(values)):
         advance_magnet(law, now, dt)
         if seat == _BENCH:
-            _advance_bench(law, now, values[index], dt)
-        elif seat == _ACCELERATED_CHASSIS:
-            beside = force_beside_elastomer(law, now, now.displacement, dt)
-            motion = engine_step(law.vehicle, now.engine, values[index], engine_forces[index], beside, dt)
-            take_motion(law, now, motion, dt)
+            advance_bench(law, now, values[index], dt)
+            continue
+        value, force = values[index], engine_forces[index]
+        beside = force_beside_elastomer(law, now, now.displacement, dt)
+        if seat == _ACCELERATED_CHASSIS:
+            motion = engine_step(law.vehicle, now.engine, value, force, beside, dt)
         else:
-            now.road_height = values[index]
-            beside = force_beside_elastomer(law, now, now.displacement, dt)
-            motion = vehicle_step(law.vehicle, now.vehicle, values[index], engine_forces[index], beside, dt)
-            take_motion(law, now, motion, dt)
+            now.road_height = value
+            motion = vehicle_step(law.vehicle, now.vehicle, value, force, beside, dt)
+        take_motion(law, now, motion, dt)
 
 
 @compiled
@@ -222,7 +188,9 @@ def advance_magnet(law, now, dt):
 def force_beside_elastomer(law, now, displacement, dt):
     """Return the force (N) of what acts in the mount at `displacement` (m) beside its elastomer."""
     if law.mount.contents == _PADS:
-        _rub(law, now, displacement, dt)
+        now.friction_force, now.slider_position, now.deflection, _ = full_step(
+            law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
+        )
         return now.friction_force
     if law.mount.contents == _FLUID:
         return hydromount_force(law.hydromount, now.hydromount)
@@ -230,17 +198,7 @@ def force_beside_elastomer(law, now, displacement, dt):
 
 
 @compiled
-def _rub(law, now, displacement, dt):
-    force, slider, deflection, _ = full_step(
-        law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
-    )
-    now.friction_force = force
-    now.slider_position = slider
-    now.deflection = deflection
-
-
-@compiled
-def _advance_bench(law, now, displacement, dt):
+def advance_bench(law, now, displacement, dt):
     """The rack imposes the displacement; the mount answers with its force."""
     elastomer = law.vehicle.elastomer
     change = displacement - now.displacement

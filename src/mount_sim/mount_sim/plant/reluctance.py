@@ -1,7 +1,7 @@
 """The simulated actuator: a magnetic circuit with a saturating core, which stands for the real magnet.
 
 It belongs to the plant. The controller never sees it: it only knows the law that a calibration fits
-to this actuator's force (`actuator.law`, `actuator.fit`).
+to this actuator's force (`mount_models.actuator`).
 """
 
 import math

@@ -7,26 +7,18 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mount_models.quantity import checked, with_flattened
+from mount_models.arithmetic.record import record_bytes
+from mount_models.arrays import FloatArray
+from mount_models.quantity import ParameterError, checked, with_flattened
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Noise, Reading
-from mount_sim.electronics.faults.schedule import Faults
+from mount_sim.electronics.faults import Faults
 from mount_sim.excitation.excitation import Excitation, Seat, Shaking
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.car import CarLaw, CarSimulation
-from mount_sim.plant.check import check_car, checked_plant
-from mount_sim.plant.mounts import seated_mount
-from mount_sim.plant.places import (
-    ALONE,
-    PLACES,
-    check_hold,
-    mount_names,
-    support_of,
-    supported_places,
-    values_of_mount,
-)
+from mount_sim.plant.car import CarLaw, CarMemory, advance_car, check_car, checked_plant
+from mount_sim.plant.engine_body import BODY_STATE, SUPPORT_STATE, Support, check_hold
+from mount_sim.plant.mounts import ALONE, PLACES, mount_names, values_of_mount
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
 from mount_sim.quantisation import DISPLACEMENT_LIMIT, DISPLACEMENT_STEPS
 
@@ -52,8 +44,7 @@ class BeyondRange:
         self.samples += 1
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """Length of a simulated run in samples, where the excitation begins in it, and their rate in Hz."""
 
     samples: int
@@ -69,10 +60,10 @@ class Ahead(NamedTuple):
     """
 
     memory: Memory
-    values: NDArray[np.float64]
-    engine_forces: NDArray[np.float64]
+    values: FloatArray
+    engine_forces: FloatArray
     driver_open: bool
-    noise: NDArray[np.float64]
+    noise: FloatArray
 
 
 class SimulatedMount:
@@ -94,18 +85,18 @@ class SimulatedMount:
     ):
         """`move` moves plant and car on when all mounts have advanced."""
         self.faults = faults
-        self._shaking, self._move = shaking, move
-        self.run = run = Run(shaking.samples, shaking.start, shaking.sample_rate)
-        self._sound_plant = plant
-        self._plant = simulation
-        self._noise = noise
-        self.sample_rate = run.sample_rate
+        self._shaking, self._move, self._noise = shaking, move, noise
+        self.run = Run(shaking.samples, shaking.start, shaking.sample_rate)
+        self._sound_plant, self._plant = plant, simulation
+        self.electronics = plant.electronics
+        self.truth = simulation.truth
+        """What no sensor saw at the last `measure`."""
+        self.sample_rate = shaking.sample_rate
         """Hz"""
-        self.sample_time = sample_time_ns(run.sample_rate)
+        self.sample_time = sample_time_ns(self.sample_rate)
         """ns"""
-        self.patience = round(plant.electronics.setpoint_timeout * run.sample_rate)
+        self.patience = round(self.electronics.setpoint_timeout * self.sample_rate)
         """Samples without a setpoint after which the current goes to 0 A."""
-        self._driver_opens = plant.mount.driver_opens
         self.sample = 0
         self.beyond_range = BeyondRange()
         self.current = 0.0
@@ -134,14 +125,9 @@ class SimulatedMount:
         return self.enabled and not self._driver_open
 
     @property
-    def truth(self) -> np.void:
-        """What no sensor saw at the last `measure`."""
-        return self._plant.truth
-
-    @property
     def truth_bytes(self) -> bytes:
         """The same as little-endian float64 numbers in the order of `sim/truth`."""
-        return self._plant.truth_bytes
+        return self.truth.tobytes()
 
     def measure(self) -> Reading:
         """Return what the sensors read now; raises `DivergedError` where the plant has blown up."""
@@ -150,8 +136,13 @@ class SimulatedMount:
             faults.look(self.time)
             self._plant.change(faults.through('plant', self._sound_plant))
         reading = Reading(*self._plant.read(self._noise.next()))
-        if not abs(reading.displacement) <= FARTHEST_DISPLACEMENT:
-            self._doubt(reading.displacement)
+        if not math.isfinite(reading.displacement):
+            raise DivergedError(
+                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
+                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
+            )
+        if abs(reading.displacement) > FARTHEST_DISPLACEMENT:
+            self.beyond_range.note(self.time)
         return faults.through('reading', reading) if faults.present else reading
 
     def forget(self) -> None:
@@ -179,7 +170,7 @@ class SimulatedMount:
         setpoint do; `skip` notes how far it came.
         """
         until_open = self.run.excitation_start - self.sample
-        if self._driver_opens and until_open > 0:
+        if self._sound_plant.mount.driver_opens and until_open > 0:
             count = min(count, until_open)
         values, forces = self._shaking.ahead(self.sample, min(count, self.run.samples - self.sample))
         return Ahead(self._plant.memory, values, forces, self._driver_open, self._noise.ahead(len(values)))
@@ -190,17 +181,9 @@ class SimulatedMount:
         self._silent, self._setpoint = 0, setpoint
         self.sample += count
 
-    def _doubt(self, displacement: float) -> None:
-        if not math.isfinite(displacement):
-            raise DivergedError(
-                f'the simulated plant has diverged: at {self.time:.3f} s not all of its state is a finite '
-                f'number; set the parameters of mount_sim closer to their defaults, or excite it less'
-            )
-        self.beyond_range.note(self.time)
-
     @property
     def _driver_open(self) -> bool:
-        return self._driver_opens and self.sample >= self.run.excitation_start
+        return self._sound_plant.mount.driver_opens and self.sample >= self.run.excitation_start
 
 
 class SimulatedCar:
@@ -212,50 +195,64 @@ class SimulatedCar:
 
     def __init__(self, values: Mapping[str, Any], excitation: Excitation):
         general = mount_parameters(values)
-        names = mount_names(general.mounts)
+        names = mount_names(general.mounts) or (ALONE,)
+        chosen = {name: mount_parameters(values, name) for name in names}
         seat, step_time = excitation.seat, excitation.step_time
-        supported = supported_places(general.places, names) if names else []
-        chosen = {name: mount_parameters(values, name) for name in (*(names or (ALONE,)), *supported)}
-        plants = {name: parameters.plant for name, parameters in chosen.items()}
-        for name in supported:
-            support = getattr(general.places, name).support
-            plants[name] = plants[name]._replace(mount=seated_mount(support))
-        simulations = {name: PlantSimulation(plant, seat, step_time) for name, plant in plants.items()}
-        for plant in plants.values():
-            checked_plant(plant, seat, step_time)
-        if names:
+        self._seat, self._step_time = int(seat), step_time
+        self._plants = {name: PlantSimulation(each.plant, seat, step_time) for name, each in chosen.items()}
+        for each in chosen.values():
+            checked_plant(each.plant, seat, step_time)
+        self._memory: CarMemory | None = None
+        if ALONE not in chosen:
+            if seat is Seat.ACCELERATED_CHASSIS:
+                raise ParameterError(
+                    f'scenario recorded moves one mount alone; leave out mounts ({general.mounts}), '
+                    'or choose another scenario'
+                )
             supports = {
-                name: support_of(getattr(general.places, name), parameters.vehicle)
-                for name, parameters in chosen.items()
+                name: Support(*getattr(general.places, name), each.vehicle) for name, each in chosen.items()
             }
             if seat is not Seat.BENCH:
                 check_hold(general.engine, supports)
-            law = CarLaw(checked(general.engine), general.vehicle)
-            together = list(simulations.values()), list(supports.values())
-            self._plant: CarSimulation | PlantSimulation = CarSimulation(law, *together, seat, step_time)
-            check_car(self._plant.memory, seat, step_time)
-        else:
-            self._plant = simulations[ALONE]
+            self._memory = self._joined(CarLaw(checked(general.engine), general.vehicle), supports)
+            check_car(self._memory, seat, step_time)
         self._shaking = Shaking(excitation, general.sample_rate)
         self.mounts: dict[str, SimulatedMount] = {}
-        for name in names or (ALONE,):
+        for name, each in chosen.items():
             noise = Noise(general.seed, PLACES.index(name) if name else None)
             seed = general.seed ^ zlib.crc32(name.encode())  # unchanged for a mount alone
-            faults = Faults(chosen[name].faults, seed, general.sample_rate)
+            faults = Faults(each.faults, seed, general.sample_rate)
             self.mounts[name] = SimulatedMount(
-                plants[name], simulations[name], noise, self._shaking, faults, self._move
+                each.plant, self._plants[name], noise, self._shaking, faults, self._move
             )
+
+    def _joined(self, law: CarLaw, supports: Mapping[str, Support]) -> CarMemory:
+        """Return the memory of the car; each mount's parameters and state are its parts from now on."""
+        alone = [plant.memory for plant in self._plants.values()]
+        count = len(alone)
+        memory = CarMemory(
+            record_bytes(law),
+            np.concatenate([each.plant for each in alone]),
+            np.concatenate([each.state for each in alone]),
+            np.concatenate([record_bytes(support) for support in supports.values()]),
+            np.zeros(BODY_STATE.itemsize, np.uint8),
+            np.zeros(count * SUPPORT_STATE.itemsize, np.uint8),
+        )
+        parts = np.split(memory.plants, count), np.split(memory.states, count)
+        for simulation, plant, state in zip(self._plants.values(), *parts, strict=True):
+            simulation.memory = simulation.memory._replace(plant=plant, state=state)
+        return memory
 
     def _move(self) -> None:
         samples = {mount.sample for mount in self.mounts.values()}
         if len(samples) > 1:
             return  # not all have advanced
         values, forces = self._shaking.at(samples.pop() - 1)
-        currents = np.array([mount.current for mount in self.mounts.values()])
-        if isinstance(self._plant, CarSimulation):
-            self._plant.advance(values, forces, currents)
+        if self._memory is None:
+            self._plants[ALONE].advance(values, forces, self.mounts[ALONE].current)
         else:
-            self._plant.advance(values, forces, currents[0])
+            currents = np.array([mount.current for mount in self.mounts.values()])
+            advance_car(*self._memory, self._seat, values, forces, currents, self._step_time)
 
 
 def mount_parameters(values: Mapping[str, Any], name: str = '') -> SimParameters:

@@ -18,18 +18,18 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
-from mount_models.arithmetic.record import record_type
+from mount_models.arithmetic.record import number_record
 from mount_models.quantity import Quantity
 
 FloatArray = npt.NDArray[np.float64]
 
-BRANCHES = [('slow_force', 'f8'), ('middle_force', 'f8'), ('fast_force', 'f8')]
+BRANCHES = ('slow_force', 'middle_force', 'fast_force')
 _BODIES = ('wheel', 'body', 'chassis', 'engine')
-VEHICLE_STATE = record_type(
-    [(f'{body}_{what}', 'f8') for body in _BODIES for what in ('height', 'velocity')] + BRANCHES
+VEHICLE_STATE = number_record(
+    *(f'{body}_{what}' for body in _BODIES for what in ('height', 'velocity')), *BRANCHES
 )
 """Heights (m) and velocities (m/s) of the four bodies, forces (N) of the elastomer's branches."""
-ENGINE_STATE = record_type([('displacement', 'f8'), ('velocity', 'f8'), *BRANCHES])
+ENGINE_STATE = number_record('displacement', 'velocity', *BRANCHES)
 """Mount displacement x (m), its velocity (m/s), forces (N) of the elastomer's branches."""
 
 

@@ -1,22 +1,18 @@
-"""One process of a chain of empty nodes: CAN frame -> topic -> topic -> CAN frame, and nothing computed.
+"""A chain of empty nodes: CAN frame -> topic -> topic -> CAN frame, and nothing computed.
 
 What one would write with rclpy and python-can alone, with the same delivery and sizes as the graph: what this
-chain costs is the price of middleware and bus. `ends` stands where the driver stands, `middle` where the
-controller stands, `peer` where the electronics stand. They are served as by `rclpy.spin`, or by the
-`EventsExecutor`, which is experimental in rclpy and which the graph uses.
+chain costs is the price of middleware and bus. Run as a process, `ends` stands where the driver stands,
+`middle` where the controller stands; `measure` stands where the electronics stand.
 """
 
-import argparse
 import contextlib
-import json
-import statistics
+import sys
 import threading
 import time
 from collections.abc import Iterator
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -24,8 +20,6 @@ from sensor_msgs.msg import JointState
 from mount_driver.can_library import can
 
 GROUP = '239.74.163.3'  # chosen: a multicast group beside that of the graph
-SPIN, EVENTS = 'spin', 'events'
-EXECUTORS = {SPIN: SingleThreadedExecutor, EVENTS: EventsExecutor}
 _SAMPLE, _ANSWER = 0x100, 0x101  # chosen: identifiers of the two frames
 _SAMPLE_LENGTH, _ANSWER_LENGTH = 24, 12  # bytes: of MountMeasurement and MountSetpoint
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -34,28 +28,24 @@ _FIRST_WAIT = 30.0  # s, chosen: until the first answer must have come
 _LOOK = 0.2  # s: how often a loop looks whether it shall end
 
 
-def main() -> None:
-    """Run the part that is named until SIGINT, or the peer for a time; the peer prints what it measured."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('part', choices=('ends', 'middle', 'peer'))
-    parser.add_argument('--port', type=int, required=True)
-    parser.add_argument('--seconds', type=float, default=5.0)
-    parser.add_argument('--rate', type=float, default=1000.0, help='Hz')
-    parser.add_argument('--executor', choices=EXECUTORS, default=SPIN)
-    chosen = parser.parse_args()
-    if chosen.part == 'peer':
-        _measure(chosen.port, chosen.seconds, chosen.rate)
-        return
+def main(part: str, port: int) -> None:
+    """Run the part that is named until SIGINT."""
     rclpy.init()
-    executor = EXECUTORS[chosen.executor]()
-    node = Node(f'relay_{chosen.part}', namespace='bench_relay', enable_rosout=False)
-    executor.add_node(node)
-    work = _relay(node) if chosen.part == 'middle' else _bridge(node, _bus(chosen.port, _SAMPLE))
+    node = Node(f'relay_{part}', namespace='bench_relay', enable_rosout=False)
+    work = _relay(node) if part == 'middle' else _bridge(node, _bus(port, _SAMPLE))
     with work, contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        while rclpy.ok():
-            executor.spin_once(_LOOK)
-    executor.shutdown()
+        rclpy.spin(node)
     rclpy.try_shutdown()
+
+
+def measure(port: int, seconds: float, rate: float) -> tuple[int, list[float]]:
+    """Send at `rate` (Hz) for `seconds`; return how many samples and the latencies (s) of their answers."""
+    bus = _bus(port, _ANSWER)
+    try:
+        _wait_for_answer(bus)
+        return _sent(bus, seconds, rate)
+    finally:
+        bus.shutdown()
 
 
 def _bus(port: int, received: int) -> can.BusABC:
@@ -109,34 +99,19 @@ def _bridge(node: Node, bus: can.BusABC) -> Iterator[None]:
         bus.shutdown()
 
 
-def _measure(port: int, seconds: float, rate: float) -> None:
-    """Print the steady time (s) of the first answer, send for `seconds`, print what came of it, SI."""
-    bus = _bus(port, _ANSWER)
-    try:
-        print(_first_answer(bus), flush=True)
-        sent, late = _sent(bus, seconds, rate)
-    finally:
-        bus.shutdown()
-    percent = statistics.quantiles(late, n=100)
-    found = {'latency_median_s': percent[49], 'latency_p99_s': percent[98]}
-    print(json.dumps({'samples': sent, 'answered': len(late), **found}), flush=True)
-
-
-def _first_answer(bus: can.BusABC) -> float:
-    """Return the steady time (s) of the first answer; all that is under way has come by then."""
+def _wait_for_answer(bus: can.BusABC) -> None:
+    """Return when the chain answers, and all that is under way has come."""
     limit = time.monotonic() + _FIRST_WAIT
     while time.monotonic() < limit:
         bus.send(_frame(_SAMPLE, 0, _SAMPLE_LENGTH))
         if bus.recv(0.002) is not None:
-            first = time.monotonic()
             while bus.recv(_LOOK) is not None:
                 pass
-            return first
-    raise TimeoutError(f'no answer of the relay chain within {_FIRST_WAIT:g} s')
+            return
+    raise TimeoutError(f'no answer of the relay chain within {_FIRST_WAIT:g} s; is the machine busy?')
 
 
 def _sent(bus: can.BusABC, seconds: float, rate: float) -> tuple[int, list[float]]:
-    """Send at `rate` (Hz); return how many samples were sent and the latencies (s) of their answers."""
     count = round(seconds * rate)
     left, late = [0.0] * (count + 1), []
     begin = time.monotonic()
@@ -152,4 +127,4 @@ def _sent(bus: can.BusABC, seconds: float, rate: float) -> tuple[int, list[float
 
 
 if __name__ == '__main__':
-    main()
+    main(sys.argv[1], int(sys.argv[2]))

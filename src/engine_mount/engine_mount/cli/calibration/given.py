@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
 
+_GAPS, _TEMPERATURES = (20.0, 5000.0), (-60.0, 250.0)  # um, degC
+
 
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
@@ -19,7 +21,7 @@ def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'M
     return with_options(mapping.of(RACK), columns, known=RACK, stated=stated)
 
 
-def per_file(settings: list[str], files: list[Path], option: str, factor: float) -> dict[Path, float]:
+def per_file(settings: list[str], files: list[Path], option: str) -> dict[Path, float]:
     """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
     values = {}
     for setting in settings:
@@ -30,14 +32,20 @@ def per_file(settings: list[str], files: list[Path], option: str, factor: float)
             raise typer.BadParameter(
                 f'{option} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
             )
-        values[meant[0]] = _number(text, f'{option} {setting}') * factor
-    for file, value in values.items():
-        if option == '--gap' and not 20e-6 <= value <= 5e-3:
-            guess = '; was it meant in mm?' if 20e-6 <= value * 1e3 <= 5e-3 else ''
-            raise typer.BadParameter(
-                f'--gap {file.name}={value / factor:g}: an air gap must lie within 20 .. 5000 um{guess}'
-            )
+        values[meant[0]] = _number(text, f'{option} {setting}')
     return values
+
+
+def gaps_of(settings: list[str], files: list[Path]) -> dict[Path, float]:
+    """Return {file: air gap in m} of `--gap FILE=UM`."""
+    gaps = per_file(settings, files, '--gap')
+    for file, gap in gaps.items():
+        guess = '; was it meant in mm?' if _within(1e3 * gap, _GAPS) else ''
+        if not _within(gap, _GAPS):
+            raise typer.BadParameter(
+                f'--gap {file.name}={gap:g}: an air gap must lie within 20 .. 5000 um{guess}'
+            )
+    return {file: 1e-6 * gap for file, gap in gaps.items()}
 
 
 def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
@@ -48,20 +56,17 @@ def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) ->
     common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
     if len(common) > 1:
         raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
-    celsius = per_file(single, files, '--coil-temperature', 1.0)
+    celsius = per_file(single, files, '--coil-temperature')
     for value in (*celsius.values(), *common):
-        if not -60.0 <= value <= 250.0:
+        if not _within(value, _TEMPERATURES):
             raise typer.BadParameter(
                 f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
             )
-    return FileValues(per_file(gaps, files, '--gap', 1e-6), celsius, common[0] if common else None)
+    return FileValues(gaps_of(gaps, files), celsius, common[0] if common else None)
 
 
-def positive(value: float | None, option: str, unit: str) -> float | None:
-    """Return `value`, or raise `typer.BadParameter` unless it is None or above 0."""
-    if value is not None and not (math.isfinite(value) and value > 0.0):
-        raise typer.BadParameter(f'{option} ({value:g} {unit}) must be above 0')
-    return value
+def _within(value: float, limits: tuple[float, float]) -> bool:
+    return limits[0] <= value <= limits[1]
 
 
 def _number(text: str, where: str) -> float:

@@ -2,9 +2,8 @@
 
 import typer
 
-from engine_mount.cli.commands.options import JsonFile, RecordingPlace
+from engine_mount.cli.commands.options import JsonFile, RecordingPlace, write_figures
 from engine_mount.cli.fetching import local
-from engine_mount.cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
 control left samples without a setpoint, on faults, or when nothing can be read.
@@ -25,25 +24,20 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 """
 
 
-def audit(
-    recording: RecordingPlace,
-    json_file: JsonFile = None,
-) -> None:
+def audit(recording: RecordingPlace, json_file: JsonFile = None) -> None:
     """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
     from engine_mount import audit as audit_recording
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.reports.json_file import write_json
 
-    console = terminal()
-    place = local(recording, console)
-    with console.status('reading'):
+    screen = TerminalScreen()
+    place = local(recording, screen)
+    with screen.console.status('reading'):
         found = audit_recording(place)
-    TerminalScreen(console).table(found.table)
+    screen.table(found.table)
     for sentence in found.sentences():
-        console.print(sentence, soft_wrap=True)
+        screen.say(sentence)
     for warning in found.warnings:
-        note(console, warning)
-    if json_file is not None:
-        write_json(found.figures, json_file)
+        screen.note(warning)
+    write_figures(found.figures, json_file)
     if not found.sound:
         raise typer.Exit(1)

@@ -1,16 +1,18 @@
 """`engine-mount bench`: what matters for speed, beside its alternative."""
 
+from dataclasses import asdict
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import Domain, JsonFile
+from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
+from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option, write_figures
 from engine_mount.cli.completion import named
-from engine_mount.cli.terminal import terminal
 
-EPILOG = """Groups: `calls` (what one call costs), `storage` (recordings), `fleet` (a recorded
-second in `fleet replay`), `graph` (latency, processor time, start and memory of the graph in real time,
-beside a chain of empty nodes), `rate` (the same at 2 kHz).
+EPILOG = """Groups: `calls` (what one sample costs in core and in a replay), `storage` (loading a
+recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency and processor time of the graph in
+real time, beside a chain of empty nodes).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
 
@@ -18,28 +20,50 @@ Examples:
 
 `engine-mount bench --only graph --json bench.json` - the graph beside the bare middleware
 
-`engine-mount bench --only graph --rounds 1 --seconds 1800` - its memory over half an hour
+`engine-mount bench --only graph --sample-rate 2000` - the same at 2 kHz
 """
 
 
 def bench(
     only: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar='GROUP', help='measure this group alone; may be repeated', autocompletion=named('group')
-        ),
+        list[str] | None, option('measure this group alone; may be repeated', 'GROUP', named('group'))
     ] = None,
-    rounds: Annotated[int, typer.Option(min=1, help='of each run of the graph; the median is told')] = 5,
-    seconds: Annotated[float, typer.Option(min=1.0, help='length of a run in real time')] = 5.0,
-    priority: Annotated[
-        int, typer.Option(min=0, max=90, help='real-time priority of the graph where permitted; 0: none')
-    ] = 0,
+    rounds: Annotated[int, option('of each run of the graph; the median is told', least=1)] = 5,
+    seconds: Annotated[float, option('length of a run in real time', least=1.0)] = 5.0,
+    sample_rate: Annotated[float, option('samples per second of the graph and the chain', 'HZ')] = 1000.0,
+    priority: Priority = 0,
     domain: Domain = None,
     json_file: JsonFile = None,
 ) -> None:
     """Measure what matters for speed, each figure beside its alternative in the same run."""
-    from engine_mount.cli.bench.bench import BenchOrder, print_bench
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.recordings.screen import Table
     from mount_bringup.graph.domain import chosen_domain
 
-    order = BenchOrder(only or (), rounds, seconds, chosen_domain(domain), priority, json_file)
-    print_bench(order, terminal())
+    unknown = [name for name in only or () if name not in GROUPS]
+    if unknown:
+        raise typer.BadParameter(f'{unknown[0]!r} is no group of bench; known are {", ".join(GROUPS)}')
+    order = BenchOrder(rounds, seconds, sample_rate, chosen_domain(domain), priority)
+    screen = TerminalScreen()
+    found: dict[str, Comparison] = {}
+    with screen.console.status('measuring') as status:
+        for name in only or GROUPS:
+            status.update(f'measuring: {name}')
+            found |= import_module(f'engine_mount.cli.bench.{name}').measure(order, status.update)
+    rows = [
+        (row.what, _text(row.ours, row.unit), row.beside, _text(row.other, row.unit), f'{row.ratio:.3g}')
+        for row in found.values()
+    ]
+    heads = ('what', 'ours', 'beside', 'other', 'ratio')
+    screen.table(Table('medians, in turn; ratio: ours over the other', 'lrlrr', rows, heads))
+    write_figures({name: _figures(row) for name, row in found.items()}, json_file)
+
+
+def _figures(row: Comparison) -> dict[str, str | float | None]:
+    return asdict(row) | {'ratio': row.ratio if row.other else None}
+
+
+def _text(value: float, unit: str) -> str:
+    if unit == 's':
+        return f'{1e6 * value:.2f} µs' if value < 0.1 else f'{value:.2f} s'
+    return f'{value:.4g}' if unit == '1' else f'{value:.4g} {unit}'

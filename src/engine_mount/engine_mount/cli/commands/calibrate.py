@@ -5,20 +5,23 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import given_ripple, per_file, positive, rack_mapping
-from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
+from engine_mount.cli.calibration.given import gaps_of, given_ripple, rack_mapping
+from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
     Delimiter,
+    Figure,
     JsonFile,
     MapFile,
+    argument,
+    flag,
     mapping_of,
+    option,
     stated,
 )
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
-from engine_mount.cli.terminal import terminal
 
 app = typer.Typer(
     cls=Group,
@@ -63,21 +66,19 @@ _RACK_EPILOG = (
     EXIT_CODES
     + """
 
-`engine-mount calibrate rack --out rack` - then `calibrate actuator rack/force.csv`,
+`engine-mount calibrate rack --out rack --celsius 20 --celsius 80` - then `calibrate actuator rack/force.csv`,
 `calibrate inductance rack/ripple_*.csv`, `identify friction --train rack/friction_*.csv`
 """
 )
 
 Files = Annotated[
-    list[str], typer.Argument(help='files of any format that is read, recordings or their folders, or URIs')
+    list[str], argument('files of any format that is read, recordings or their folders, or URIs')
 ]
 Columns = Annotated[
     list[str] | None,
-    typer.Option('--column', metavar='NAME=HEADER[:UNIT]', help='which column is what, and its unit'),
+    option('which column is what, and its unit', 'NAME=HEADER[:UNIT]', None, '--column'),
 ]
-Gaps = Annotated[
-    list[str] | None, typer.Option('--gap', metavar='FILE=UM', help='air gap of a file, um; may be repeated')
-]
+Gaps = Annotated[list[str] | None, option('air gap of a file, um; may be repeated', 'FILE=UM', None, '--gap')]
 
 
 @app.command(cls=Command, epilog=_ACTUATOR_EPILOG)
@@ -100,15 +101,16 @@ def actuator(
     Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
     and falling with the gap within the measured range. Then no file is written.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
     from engine_mount.identification.rack import FileValues
     from engine_mount.identification.specimen import check_targets
 
-    console = terminal()
     check_targets(out, json_file, figure)
-    places = [local(file, console) for file in files]
+    screen = TerminalScreen()
+    places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values = FileValues(per_file(gaps or [], places, '--gap', 1e-6))
+    values = FileValues(gaps_of(gaps or [], places))
     with progress() as bar:
         result = calibrate.actuator(places, columns=mapping, values=values, base=base or '', progress=bar)
     publish(result, json_file, figure, out, name)
@@ -120,24 +122,22 @@ def inductance(
     gaps: Gaps = None,
     temperatures: Annotated[
         list[str] | None,
-        typer.Option(
-            '--coil-temperature', metavar='[FILE=]DEGC', help='of a file, or of all that do not tell theirs'
-        ),
+        option('of a file, or of all that do not tell theirs', '[FILE=]DEGC', None, '--coil-temperature'),
     ] = None,
-    rest_current: Annotated[float | None, typer.Option(help='A; default: that of the base')] = None,
-    crossing_inductance: Annotated[float | None, typer.Option(help='mH; default: that of the base')] = None,
+    rest_current: Annotated[float | None, option('A; default: that of the base', least=1e-3)] = None,
+    crossing_inductance: Annotated[float | None, option('mH; default: that of the base', least=1e-3)] = None,
     turns_area: Annotated[
-        float | None, typer.Option(help='turns times core area, m^2; default: that of the base')
+        float | None, option('turns times core area, m^2; default: that of the base', least=1e-6)
     ] = None,
     supply: Annotated[
-        float | None, typer.Option(help='voltage of the bridge meanwhile, V; default: that of the base')
+        float | None, option('voltage of the bridge meanwhile, V; default: that of the base', least=1e-3)
     ] = None,
     coefficient: Annotated[
-        float | None, typer.Option(help='rise of the resistivity of the core per kelvin, 1/K')
+        float | None, option('rise of the resistivity of the core per kelvin, 1/K')
     ] = None,
     held_out: Annotated[
         list[float] | None,
-        typer.Option('--held-out-temperature', help='degC; recordings there only judge the compensation'),
+        option('degC; recordings there only judge the compensation', None, None, '--held-out-temperature'),
     ] = None,
     columns: Columns = None,
     map_file: MapFile = None,
@@ -155,47 +155,43 @@ def inductance(
     The temperature with most recordings is that of the curves, recordings at a second one measure the
     compensation; those of one temperature alone are refused.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
     from engine_mount.identification.specimen import check_targets
 
-    console = terminal()
     check_targets(out, json_file, figure)
-    places = [local(file, console) for file in files]
+    screen = TerminalScreen()
+    places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
     values = given_ripple(places, gaps or [], temperatures or [])
-    level = positive(crossing_inductance, '--crossing-inductance', 'mH')
-    options = {
-        'rest_current': positive(rest_current, '--rest-current', 'A'),
-        'crossing_inductance': level and 1e-3 * level,
-        'turns_area': positive(turns_area, '--turns-area', 'm^2'),
-        'supply': positive(supply, '--supply', 'V'),
-    }
     with progress():
         result = calibrate.inductance(
-            places, columns=mapping, values=values, coefficient=coefficient,
-            held_out=held_out or (), base=base or '', **options,
+            places, columns=mapping, values=values, rest_current=rest_current,
+            crossing_inductance=crossing_inductance and 1e-3 * crossing_inductance, turns_area=turns_area,
+            supply=supply, coefficient=coefficient, held_out=held_out or (), base=base or '',
         )  # fmt: skip
     publish(result, json_file, figure, out, name)
 
 
 @app.command(cls=Command, epilog=_RACK_EPILOG)
 def rack(
-    out: Annotated[Path, typer.Option(metavar='FOLDER', help='folder for the recordings')],
-    seed: Annotated[int, typer.Option(help='seed of the noise, and of the actuator with --drawn')] = 0,
-    noise: Annotated[float, typer.Option(help='relative standard deviation of each sensor')] = 0.01,
+    out: Annotated[Path, option('folder for the recordings', 'FOLDER')],
+    seed: Annotated[int, option('seed of the noise, and of the actuator with --drawn')] = 0,
+    noise: Annotated[float, option('relative standard deviation of each sensor')] = 0.01,
     drawn: Annotated[
-        bool, typer.Option('--drawn', help='another actuator with other pads, drawn around the default ones')
+        bool, flag('--drawn', 'another actuator with other pads, drawn around the default ones')
     ] = False,
     celsius: Annotated[
         list[float] | None,
-        typer.Option(help='coil temperature of the ripple, degC; may be repeated; default: 20 and 80'),
+        option('coil temperature of the ripple, degC; repeatable; default: 20 and 80'),
     ] = None,
 ) -> None:
     """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
 
     with progress() as bar:
         files = calibrate.rack(
             out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0, 80.0), progress=bar
         )
-    terminal().print(f'{len(files)} recordings in {out}', soft_wrap=True)
+    TerminalScreen().say(f'{len(files)} recordings in {out}')

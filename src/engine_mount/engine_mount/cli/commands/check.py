@@ -5,8 +5,15 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import Domain, JsonFile, NewFolder, Settings
-from engine_mount.cli.terminal import terminal
+from engine_mount.cli.commands.options import (
+    JsonFile,
+    Listing,
+    NewFolder,
+    Settings,
+    changes_of,
+    option,
+    write_figures,
+)
 
 EPILOG = """Exit code: 0 when every manoeuvre stayed within its limits; 1 when a limit was exceeded; 2 for a
 wrong use of the command, of a suite or of a parameter, and nothing was driven.
@@ -17,72 +24,48 @@ Examples:
 
 `engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
 
-`engine-mount check --only gap_20mm,rack --through lockstep` - two manoeuvres through the nodes
+`engine-mount check --only gap_20mm,rack` - two manoeuvres
 
 `engine-mount check --suite ours.yaml --json check.json --out bags/check` - your own manoeuvres and limits
 """
 
 
 def check(
-    suite: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='manoeuvres and limits; default: those shipped')
-    ] = None,
-    only: Annotated[str, typer.Option(metavar='NAME,...', help='these manoeuvres only')] = '',
-    show: Annotated[bool, typer.Option('--list', help='tell which manoeuvres there are')] = False,
-    through: Annotated[
-        str, typer.Option(metavar='WORD', help='core, lockstep, or graph (in real time)')
-    ] = 'core',
+    suite: Annotated[Path | None, option('manoeuvres and limits; default: those shipped', 'FILE')] = None,
+    only: Annotated[str, option('these manoeuvres only', 'NAME,...')] = '',
+    show: Listing = False,
     settings: Settings = None,
-    policy: Annotated[str, typer.Option(help='of the controller: mount_control.policy')] = '',
-    mount: Annotated[str, typer.Option(help='in the seat: mount_sim.mount')] = '',
-    jobs: Annotated[int, typer.Option(min=0, help='core: manoeuvres at a time; 0: one per core')] = 0,
+    jobs: Annotated[int, option('manoeuvres at a time; 0: one per core', least=0)] = 0,
     json_file: JsonFile = None,
     out: NewFolder = None,
-    priority: Annotated[
-        int, typer.Option(min=0, max=90, help='graph: real-time priority where permitted; 0: none')
-    ] = 10,
-    domain: Domain = None,
 ) -> None:
     """Drive the manoeuvre suite and tell which limits hold, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.check import report
-    from engine_mount.experiments.check.run import CORE, MODES, run_trials, trials_of
+    from engine_mount.experiments.check.run import run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, passed, shipped_suite, suite_in_file
-    from engine_mount.reports.json_file import write_json
-    from engine_mount.settings.options import settings_of_options
     from engine_mount.settings.run_folder import make_run_folder, new_place
-    from mount_bringup.graph.domain import chosen_domain
 
-    console = terminal()
-    if through not in MODES:
-        raise typer.BadParameter(f'--through is {", ".join(MODES)}; instead received {through!r}')
+    screen = TerminalScreen()
+    given = changes_of(settings)
     try:
         known = shipped_suite() if suite is None else suite_in_file(suite)
         chosen = chosen_of(known, [name for name in only.split(',') if name])
         if show:
             for each in chosen:
-                console.print(f'{each.name:14}{each.about}', soft_wrap=True)
+                screen.say(f'{each.name:14}{each.about}')
             return
-        given = settings_of_options(settings or [])
-        if policy:
-            given.setdefault('mount_control', {})['policy'] = policy
-        if mount:
-            given.setdefault('mount_sim', {})['mount'] = mount
-        graph = {} if through == CORE else {'domain': chosen_domain(domain), 'priority': priority}
         place = out or new_place('check')
-        trials = trials_of(chosen, given, place, through, jobs=jobs, **graph)
+        trials = trials_of(chosen, given, place)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    file = make_run_folder(place, 'check').path / report.PAGE
-    screen = TerminalScreen(console)
+    make_run_folder(place, 'check')
     results = run_trials(
         trials, jobs, screen, lambda trial, result: report.show_result(trial, result, screen)
     )
     verdicts = report.all_verdicts(trials, results)
     screen.table(report.table_of(results, verdicts))
-    if json_file is not None:
-        write_json(report.figures_of(trials, given, results, verdicts), json_file)
-    report.write_page(trials, given, results, verdicts, file)
-    console.print(f'page       {file}', soft_wrap=True)
+    write_figures(report.figures_of(trials, given, results, verdicts), json_file)
+    screen.say(f'recordings {place}')
     if not all(map(passed, verdicts.values())):
         raise typer.Exit(1)

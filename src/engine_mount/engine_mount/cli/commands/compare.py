@@ -1,14 +1,19 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
-import functools
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import JsonFile, recording_argument
+from engine_mount.cli.commands.options import (
+    JsonFile,
+    flag,
+    option,
+    recording_argument,
+    write_figures,
+)
 from engine_mount.cli.fetching import local, named
-from engine_mount.cli.terminal import note, refuse, terminal
+from engine_mount.cli.terminal import refuse
 
 EPILOG = """Examples:
 
@@ -16,7 +21,7 @@ EPILOG = """Examples:
 
 `engine-mount compare A B --tolerance current=0.01 --tolerance switching=0.002 --tolerance 0.1%`
 
-`engine-mount compare bags/long bags/cut --common --figure difference.png`
+`engine-mount compare bags/long bags/cut --common`; drawn: `engine-mount report A --compare B`
 """
 _NOT_COMPARED = 2
 
@@ -26,18 +31,16 @@ def compare(
     b: Annotated[str, recording_argument('B', 'the other one')],
     tolerances: Annotated[
         list[str] | None,
-        typer.Option(
-            '--tolerance',
-            metavar='NAME=VALUE',
-            help='signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
+        option(
+            'signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
             'also topic=, topic.signal=, mount_left/topic.signal=',
+            'NAME=VALUE',
+            None,
+            '--tolerance',
         ),
     ] = None,
-    common: Annotated[bool, typer.Option('--common', help='compare only the time that both cover')] = False,
+    common: Annotated[bool, flag('--common', 'compare only the time that both cover')] = False,
     json_file: JsonFile = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='draw both and their difference (PNG)')
-    ] = None,
 ) -> None:
     """Tell in words how recording B differs from recording A.
 
@@ -45,7 +48,7 @@ def compare(
     no recording.
     """
     try:
-        equal = _compare(a, b, tolerances or [], common, json_file, figure)
+        equal = _compare(a, b, tolerances or [], common, json_file)
     except (ValueError, OSError) as error:
         refuse(error)
         raise typer.Exit(_NOT_COMPARED) from None
@@ -53,36 +56,26 @@ def compare(
         raise typer.Exit(1)
 
 
-def _compare(
-    a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None, figure: Path | None
-) -> bool:
+def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None) -> bool:
     """Compare, print and write what differs; return whether all is equal."""
     from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.difference import signal_table
     from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.place import open_run
-    from engine_mount.reports.json_file import write_json
 
-    console = terminal()
-    say = functools.partial(console.print, soft_wrap=True)
-    recordings = open_run(local(a, console)), open_run(local(b, console))
+    screen = TerminalScreen()
+    recordings = open_run(local(a, screen)), open_run(local(b, screen))
     comparison = compare_recordings(*recordings, tolerances, common=common)
-    say(f'A {comparison.name_a}, B {comparison.name_b}')
+    screen.say(f'A {comparison.name_a}, B {comparison.name_b}')
     for sentence in comparison.sentences():
-        say(f'- {sentence}')
+        screen.say(f'- {sentence}')
     if comparison.differing:
-        TerminalScreen(console).table(signal_table(comparison.signals))
+        screen.table(signal_table(comparison.signals))
     aligned = alignment_sentence(comparison.alignments)
-    say(f'Times are from the first displacement sample of A; {aligned}.')
+    screen.say(f'Times are from the first displacement sample of A; {aligned}.')
     for recording in recordings:
         for warning in recording.warnings:
-            note(console, f'{named(recording.path)}: {warning}')
-    if json_file is not None:
-        write_json(comparison.figures(), json_file)
-    if figure is not None:
-        from engine_mount.reports.pictures import draw_comparison
-
-        draw_comparison(comparison, *recordings, figure)
-        say(f'figure {figure}')
+            screen.note(f'{named(recording.path)}: {warning}')
+    write_figures(comparison.figures(), json_file)
     return comparison.equal

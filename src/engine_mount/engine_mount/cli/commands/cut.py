@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import RecordingPlace
+from engine_mount.cli.commands.options import RecordingPlace, option
 from engine_mount.cli.fetching import beside, local
-from engine_mount.cli.terminal import note, terminal
+
+_TIME = 'from the first displacement sample, such as 12s'
 
 EPILOG = """Exit code: 0 when the piece is written and nothing of it was unreadable, 1 when something was.
 
@@ -23,36 +24,31 @@ Examples:
 
 def cut(
     recording: RecordingPlace,
-    begin: Annotated[
-        str, typer.Option('--from', metavar='TIME', help='from the first displacement sample, such as 12s')
-    ] = '',
-    end: Annotated[
-        str, typer.Option('--to', metavar='TIME', help='from the first displacement sample, such as 20s')
-    ] = '',
+    begin: Annotated[str, option(_TIME, 'TIME', None, '--from')] = '',
+    end: Annotated[str, option(_TIME, 'TIME', None, '--to')] = '',
     event: Annotated[
-        str, typer.Option(help='around an event: its number, its kind, or kind:number, as in switch-on:2')
+        str, option('around an event: its number, its kind, or kind:number, as in switch-on:2')
     ] = '',
-    before: Annotated[str, typer.Option(metavar='TIME', help='with --event: how much before it')] = '5s',
-    after: Annotated[str, typer.Option(metavar='TIME', help='with --event: how much after it')] = '10s',
+    before: Annotated[str, option('with --event: how much before it', 'TIME')] = '5s',
+    after: Annotated[str, option('with --event: how much after it', 'TIME')] = '10s',
     out: Annotated[
         Path | None,
-        typer.Option(
-            help='folder to create; default: beside the recording, of a URI here, named by the times'
-        ),
+        option('folder to create; default: beside the recording, of a URI here, named by the times'),
     ] = None,
 ) -> None:
     """Cut a piece out of a recording; session and other latched topics come with it.
 
     The times of the messages stay as they were, so the first message may be a session from long before.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.cut import cut as cut_recording
     from engine_mount.recordings.events import event_time, find_event
     from engine_mount.recordings.place import open_run
 
     if bool(event) == bool(begin or end):
         raise typer.BadParameter('give --from and --to (or one of them), or --event')
-    console = terminal()
-    opened = open_run(local(recording, console))
+    screen = TerminalScreen()
+    opened = open_run(local(recording, screen))
     first, last = (_seconds(text) if text else None for text in (begin, end))
     reason = ''
     if event:
@@ -60,16 +56,15 @@ def cut(
         time = event_time(found, opened.time_axis)
         first, last = max(0.0, time - _seconds(before)), time + _seconds(after)
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
-    target = out or _beside(opened.path, first, last)
-    done = cut_recording(opened, target, first, last, reason)
+    times = f'_{first or 0.0:g}s_' + ('end' if last is None else f'{last:g}s')
+    done = cut_recording(opened, out or beside(opened.path, times), first, last, reason)
     around = f' around {reason}' if reason else ''
-    console.print(
+    screen.say(
         f'{done.messages} messages from {done.begin:.3f} s to {done.end:.3f} s{around}, '
-        f'{done.carried} latched ones from before\nrecording  {done.folder}',
-        soft_wrap=True,
+        f'{done.carried} latched ones from before\nrecording  {done.folder}'
     )
     for sentence in (*opened.warnings, *done.losses):
-        note(console, sentence)
+        screen.note(sentence)
     if done.losses:
         raise typer.Exit(1)
 
@@ -79,9 +74,3 @@ def _seconds(text: str) -> float:
 
     plain = text.replace('.', '', 1).isdigit()
     return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9
-
-
-def _beside(recording: Path, begin: float | None, end: float | None) -> Path:
-    times = f'{0.0 if begin is None else begin:g}s_' + ('end' if end is None else f'{end:g}s')
-    name = recording.absolute()
-    return beside(recording) / f'{name.stem if name.is_file() else name.name}_{times}'

@@ -9,32 +9,29 @@ from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
     Delimiter,
+    Distance,
     Domain,
     JsonFile,
     MapFile,
     Namespace,
     NewFolder,
+    Priority,
     Rate,
+    Scale,
     Settings,
     Snapshot,
+    SpeedText,
     Split,
     TimeColumn,
+    changes_of,
     flag,
     option,
     refuse_without,
     stated,
+    write_figures,
 )
-from engine_mount.cli.commands.road_arguments import (
-    ContactLength,
-    Distance,
-    Lateral,
-    Repeat,
-    SpeedText,
-    height_column,
-)
-from engine_mount.cli.completion import faults, listed, named
+from engine_mount.cli.completion import named
 from engine_mount.cli.fetching import local
-from engine_mount.cli.terminal import note, terminal
 from mount_bringup.graph.nodes import RESTART_LIMIT
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
@@ -54,7 +51,7 @@ Examples:
 
 `engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
-`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
+`engine-mount drive --road blocks.csv --speed 60/3.6 --core` - a measured road: height over distance
 
 `engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
 
@@ -88,7 +85,7 @@ def drive(
         option(
             'mounts with electronics under one engine: of left, right, front, rear',
             'NAME,...',
-            listed('place'),
+            named('place'),
         ),
     ] = '',
     file: Annotated[str, option('recorded: any file or folder of signals, or its URI', 'FILE')] = '',
@@ -99,24 +96,22 @@ def drive(
     dbc: Dbc = None,
     decimal: Decimal = '',
     delimiter: Delimiter = '',
-    topic: Annotated[str, option('recorded: topic of a bag, --column being the field')] = '',
-    scale: Annotated[
-        float | None,
-        option('recorded: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
-    ] = None,
-    road: Annotated[str, option('measured road: height over distance, CSV or OpenCRG', 'FILE')] = '',
+    scale: Scale = None,
+    road: Annotated[str, option('measured road: a table of height over distance', 'FILE')] = '',
     speed: SpeedText = '',
-    lateral: Lateral = 0.0,
     distance: Distance = '',
-    contact_length: ContactLength = None,
-    repeat: Repeat = False,
+    contact_length: Annotated[
+        float | None,
+        option('road: on so much of it the tyre stands; default: 0.1', 'M', least=0.0, most=0.5),
+    ] = None,
+    repeat: Annotated[bool, flag('--repeat', 'road: drive it forth and back until the end')] = False,
     fault: Annotated[
         list[str] | None,
         option(
             'a fault from t s after the start of the simulator on, for so many s or for good; may be '
             'repeated; list: what there is',
             'NAME@t[:duration]',
-            faults,
+            named('fault'),
         ),
     ] = None,
     lockstep: Annotated[
@@ -142,16 +137,11 @@ def drive(
     report: Annotated[
         bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
-    on_full: Annotated[
-        str, option('full disk: stop the run, or continue without recording', 'WORD', named('on_full'))
-    ] = 'stop',
     split: Split = None,
     snapshot: Snapshot = '',
-    priority: Annotated[
-        int, option('real-time priority of the 1 kHz loop where permitted; 0: none', min=0, max=90)
-    ] = 10,
+    priority: Priority = 10,
     restarts: Annotated[
-        int, option('times that a node may be lost within a minute before the drive ends; 0: none', min=0)
+        int, option('times that a node may be lost within a minute before the drive ends; 0: none', least=0)
     ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',
@@ -161,55 +151,49 @@ def drive(
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
     from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
-    from engine_mount.reports.json_file import write_json
     from engine_mount.settings.amounts import checked_recorder, recorder_options
-    from engine_mount.settings.options import settings_of_options
-    from mount_bringup.settings import SettingError
 
+    screen = TerminalScreen()
     if 'list' in (fault or []):
-        _list_faults()
-        raise typer.Exit
+        from engine_mount.recordings.screen import Table
+        from mount_sim.electronics.faults import FAULTS
+
+        rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
+        screen.table(Table('', 'll', rows, ('name', 'fault')))
+        return
     if not file:
-        others = {} if road else {'column': column}
         refuse_without(
-            'file', 'recording', time=time, rate=rate, map_file=map_file, dbc=dbc, topic=topic, scale=scale,
-            decimal=decimal, delimiter=delimiter, **others,
+            'file', 'recording', time=time, rate=rate, map_file=map_file, dbc=dbc, scale=scale,
+            decimal=decimal, delimiter=delimiter, column=None if road else column,
         )  # fmt: skip
-    of_roads = {'lateral': lateral, 'distance': distance, 'contact_length': contact_length, 'repeat': repeat}
     if not road:
-        refuse_without('road', 'road', speed=speed, **of_roads)
+        refuse_without(
+            'road', 'road', speed=speed, distance=distance,
+            contact_length=contact_length, repeat=repeat,
+        )  # fmt: skip
     elif file:
         raise typer.BadParameter('--road is a scenario of its own; leave out --file')
-    try:
-        parameters = settings_of_options(settings or [])
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
-    recorder = recorder_options(split or [], snapshot)
-    if on_full != 'stop':
-        recorder['on_full'] = on_full
-    if recorder:
+    parameters = changes_of(settings)
+    if recorder := recorder_options(split or [], snapshot):
         parameters.setdefault('mount_recorder', {}).update(recorder)
-    console = terminal()
     excitation = None
     if road:
         from engine_mount import road as read_road
         from engine_mount.drives.external_excitation import measured_road
 
-        if not speed:
-            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s), or a file of it over time')
-        named = height_column(column or [])
-        found = read_road(road, lateral=lateral, column=named, distance=distance, speed=speed)
+        if len(column or []) > 1:
+            raise typer.BadParameter('--column is given once for a road: the column of its height')
+        height = ''.join(column or [])
+        found = read_road(road, column=height, distance=distance, speed=speed)
         length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
         excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:
         from engine_mount.drives.external_excitation import recorded_acceleration
 
-        columns = [f'{topic}.{name}' if topic else name for name in column or []]
         excitation = recorded_acceleration(
-            str(local(file, console)), columns, time=time, rate=rate, scale=scale, mapping_file=map_file,
+            str(local(file, screen)), column or [], time=time, rate=rate, scale=scale, mapping_file=map_file,
             stated=stated(dbc, decimal, delimiter),
         )  # fmt: skip
-    screen = TerminalScreen(console)
     try:
         driven = run_drive(
             core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
@@ -224,23 +208,13 @@ def drive(
         told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
     else:
         told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
-    if json_file is not None:
-        write_json(told.figures, json_file)
+    write_figures(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []
     for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):
         for place in places:
-            console.print(f'{word:<10} {place}', soft_wrap=True)
+            screen.say(f'{word:<10} {place}')
     complaints = [*driven.complaints, *told.complaints]
     for complaint in complaints:
-        note(console, complaint)
+        screen.note(complaint)
     if complaints:
         raise typer.Exit(1)
-
-
-def _list_faults() -> None:
-    from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.screen import Table
-    from mount_sim.electronics.faults.kinds import FAULTS
-
-    rows = [(name, kind.meaning) for name, kind in FAULTS.items()]
-    TerminalScreen(terminal()).table(Table('', 'll', rows, ('name', 'fault')))

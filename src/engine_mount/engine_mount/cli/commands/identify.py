@@ -4,21 +4,22 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Figure, Name, Out, progress, publish
+from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
     Delimiter,
+    Figure,
     JsonFile,
     MapFile,
     Rate,
     TimeColumn,
     mapping_of,
+    option,
     stated,
 )
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
-from engine_mount.cli.terminal import terminal
 
 app = typer.Typer(
     cls=Group,
@@ -54,24 +55,21 @@ def _top() -> None:
 @app.command(cls=Command, epilog=EPILOG)
 def friction(
     train: Annotated[
-        list[str] | None,
-        typer.Option(metavar='FILE...', help='recordings to fit: files of any format, recordings, URIs'),
+        list[str] | None, option('recordings to fit: files of any format, recordings, URIs', 'FILE...')
     ] = None,
     held_out: Annotated[
-        list[str] | None, typer.Option(metavar='FILE...', help='recordings that no fit sees, to judge by')
+        list[str] | None, option('recordings that no fit sees, to judge by', 'FILE...')
     ] = None,
-    file: Annotated[
-        list[str] | None,
-        typer.Option(metavar='FILE...', help='train on each, predict each other one'),
-    ] = None,
-    step: Annotated[str, typer.Option(help='auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
+    file: Annotated[list[str] | None, option('train on each, predict each other one', 'FILE...')] = None,
+    step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            'column, or MCAP topic.field, of a quantity; repeatable',
+            'NAME=COLUMN:UNIT',
+            None,
             '--channel',
             '--column',
-            metavar='NAME=COLUMN:UNIT',
-            help='column, or MCAP topic.field, of a quantity; repeatable',
         ),
     ] = None,
     map_file: MapFile = None,
@@ -81,16 +79,13 @@ def friction(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     clamp: Annotated[
-        str,
-        typer.Option(help="JSON: normal force from the band's pull while sliding, at rest, or none"),
+        str, option("JSON: normal force from the band's pull while sliding, at rest, or none")
     ] = 'sliding',
     zero: Annotated[
         str,
-        typer.Option(
-            help='zero of the force: law (from the loop) or recorded; default: law for JSON of a damper'
-        ),
+        option('zero of the force: law (from the loop) or recorded; default: law for JSON of a damper'),
     ] = '',
-    seed: Annotated[int, typer.Option(help='seed of the starts of the searches')] = 0,
+    seed: Annotated[int, option('seed of the starts of the searches')] = 0,
     json_file: JsonFile = None,
     base: Base = None,
     name: Name = '',
@@ -102,6 +97,7 @@ def friction(
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.
     """
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import identify
     from engine_mount.identification.friction.files import friction_mapping
     from engine_mount.identification.specimen import check_targets
@@ -110,9 +106,9 @@ def friction(
     check_targets(out, json_file, figure)
     mapping = with_options(mapping_of(map_file), (), time, rate)
     columns = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
-    console = terminal()
+    screen = TerminalScreen()
     training, unseen, files = (
-        [local(place, console) for place in places or []] for places in (train, held_out, file)
+        [local(place, screen) for place in places or []] for places in (train, held_out, file)
     )
     with progress() as bar:
         result = identify.friction(

@@ -1,9 +1,7 @@
-"""`engine-mount import`: files of others as a recording that every command takes."""
+"""`engine-mount import`: a foreign file as a recording that every command takes."""
 
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Annotated
 
 from engine_mount.cli.commands.options import (
     Columns,
@@ -14,13 +12,14 @@ from engine_mount.cli.commands.options import (
     MapFile,
     Rate,
     TimeColumn,
+    option,
     recording_argument,
     stated,
+    write_figures,
 )
 from engine_mount.cli.fetching import local
-from engine_mount.cli.terminal import note, terminal
 
-EPILOG = """Exit code: 0 when the recording is written, 1 when a file was refused, with the reason.
+EPILOG = """Exit code: 0 when the recording is written, 1 when the file was refused, with the reason.
 
 A column that is named without a unit must tell it in its header. Quantities are displacement,
 engine_displacement, chassis_displacement, acceleration, force, current and others; a wrong one lists them.
@@ -31,20 +30,19 @@ Examples:
 
 `engine-mount import rack.csv --map-file rack_2.yaml --out bags/rack` - what a team agreed on
 
-`engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --from 12 --to 60 --out bags/weg`
+`engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
-`engine-mount import weg.csv kraft.csv --rate 1000 --column Weg:mm --column F:kN --out bags/two` - two files
+Of several files each is imported; `engine-mount merge --different-sessions` joins what they became, and
+`engine-mount cut` takes a part.
 """
 
 
-def import_files(
-    files: Annotated[
-        list[str],
-        recording_argument('FILE...', instead='CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
+def import_file(
+    file: Annotated[
+        str,
+        recording_argument('FILE', 'CSV, NPY, Parquet, MATLAB, Excel, MDF4, CAN log, bag, or URI'),
     ],
-    out: Annotated[
-        Path, typer.Option(metavar='RECORDING', help='folder to create; of several parts RECORDING_1, ...')
-    ],
+    out: Annotated[Path, option('folder to create; of several parts RECORDING_1, ...', 'RECORDING')],
     map_file: MapFile = None,
     column: Columns = None,
     time: TimeColumn = '',
@@ -52,48 +50,34 @@ def import_files(
     dbc: Dbc = None,
     decimal: Decimal = '',
     delimiter: Delimiter = '',
-    first: Annotated[
-        float | None, typer.Option('--from', metavar='S', help='s after the first sample of all files')
-    ] = None,
-    last: Annotated[
-        float | None, typer.Option('--to', metavar='S', help='s after the first sample of all files')
-    ] = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Make a recording of files of others, in SI units, with a session that tells what it was made of.
+    """Make a recording of a foreign file, in SI units, with a session that tells its origin.
 
     The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
     were sampled. A gap of more than 0.125 s parts the recording.
     """
-    from engine_mount import import_files as run_import
-    from engine_mount.cli.screen import progress_bar
-    from engine_mount.reports.json_file import write_json
+    from engine_mount import import_file as run_import
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping
 
-    console = terminal()
-    places = [local(file, console) for file in files]
-    with progress_bar(console, transient=True) as progress:
-        task = progress.add_task('reading', total=1.0)
+    screen = TerminalScreen()
+    place = local(file, screen)
+    with screen.bar('reading', transient=True) as show:
         imported = run_import(
-            places, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
-            stated=stated(dbc, decimal, delimiter),
-            first=first, last=last,
-            progress=lambda share, what: progress.update(task, completed=share, description=what),
+            place, out, columns=column or [], time=time, rate=rate, mapping=map_file or Mapping(),
+            stated=stated(dbc, decimal, delimiter), progress=show,
         )  # fmt: skip
     for topic, count in imported.samples.items():
-        console.print(f'{topic:<28}{count} samples', soft_wrap=True)
+        screen.say(f'{topic:<28}{count} samples')
     for sentence in imported.notes:
-        note(console, sentence)
+        screen.note(sentence)
     for place, length in zip(imported.recordings, imported.lengths, strict=True):
-        console.print(f'recording  {place} ({length:.3f} s)', soft_wrap=True)
-    if json_file is not None:
-        write_json(_figures(imported), json_file)
-
-
-def _figures(imported: Any) -> dict[str, Any]:
-    return {
+        screen.say(f'recording  {place} ({length:.3f} s)')
+    figures = {
         'recordings': [str(place) for place in imported.recordings],
         'lengths_s': imported.lengths,
         'samples': imported.samples,
         'notes': imported.notes,
     }
+    write_figures(figures, json_file)

@@ -1,5 +1,6 @@
 """Options that several sub-commands have."""
 
+from collections.abc import Mapping as Figures
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,14 +13,26 @@ if TYPE_CHECKING:
     from engine_mount.signals.mapping import Mapping
 
 
-def option(text: str, metavar: str | None = None, complete: Completer | None = None, **more: Any) -> Any:
-    """Return an option with its help `text` and the placeholder of its value."""
-    return typer.Option(help=text, metavar=metavar, autocompletion=complete, **more)
+def option(
+    text: str,
+    metavar: str | None = None,
+    complete: Completer | None = None,
+    *names: str,
+    least: float | None = None,
+    most: float | None = None,
+) -> Any:
+    """Return an option with its help `text`, the placeholder of its value, and limits."""
+    return typer.Option(*names, help=text, metavar=metavar, autocompletion=complete, min=least, max=most)
 
 
 def flag(name: str, text: str) -> Any:
     """Return an option without a value, which is never negated."""
     return typer.Option(name, help=text)
+
+
+def argument(text: str, metavar: str | None = None, complete: Completer | None = None) -> Any:
+    """Return an argument with its help `text` and its placeholder."""
+    return typer.Argument(metavar=metavar, help=text, autocompletion=complete)
 
 
 def refuse_without(source: str, kind: str, **options: object) -> None:
@@ -33,77 +46,97 @@ def refuse_without(source: str, kind: str, **options: object) -> None:
 def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
     """Return the argument that takes a recording by path or URI; `fetching.local` brings it here."""
     what = 'folder of a run or of a recording, one of its files, or the URI of either'
-    return typer.Argument(metavar=metavar, help=instead or what, autocompletion=recordings)
+    return argument(instead or what, metavar, recordings)
+
+
+def changes_of(settings: list[str] | None) -> dict[str, dict[str, Any]]:
+    """Return {node: {parameter: value}} of `--set`; raises `BadParameter` where it is written wrongly."""
+    from engine_mount.settings.options import settings_of_options
+    from mount_bringup.settings import SettingError
+
+    try:
+        return settings_of_options(settings or [])
+    except SettingError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def write_figures(figures: Figures[str, Any], file: Path | None) -> None:
+    """Write figures where a file is named."""
+    from engine_mount.reports.json_file import write_json
+
+    if file is not None:
+        write_json(figures, file)
 
 
 RecordingPlace = Annotated[str, recording_argument()]
 RecordingPlaces = Annotated[list[str], recording_argument('RECORDING...')]
-NewFolder = Annotated[Path | None, typer.Option(help='folder to create; default: a new one in bags')]
-JsonFile = Annotated[
-    Path | None, typer.Option('--json', metavar='FILE', help='write all figures to this file')
-]
+NewFolder = Annotated[Path | None, option('folder to create; default: a new one in bags')]
+JsonFile = Annotated[Path | None, option('write all figures to this file', 'FILE', None, '--json')]
+Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE')]
+Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE')]
+Listing = Annotated[bool, flag('--list', 'tell which there are')]
 Split = Annotated[
-    list[str] | None,
-    typer.Option(metavar='LIMIT', help='largest or longest file: 500MB, 60s; may be given once for each'),
+    list[str] | None, option('largest or longest file: 500MB, 60s; may be given once for each', 'LIMIT')
 ]
-Snapshot = Annotated[
-    str, typer.Option(metavar='DURATION', help='record only around events, with so much before: 30s')
-]
+Snapshot = Annotated[str, option('record only around events, with so much before: 30s', 'DURATION')]
 Settings = Annotated[
     list[str] | None,
-    typer.Option(
+    option('any parameter of any node; may be repeated', '[NODE.]NAME=VALUE', setting, '--set'),
+]
+OtherThanRecorded = Annotated[
+    list[str] | None,
+    option(
+        'a parameter other than recorded, of mount_control or mount_init; may be repeated',
+        '[NODE.]NAME=VALUE',
+        setting,
         '--set',
-        metavar='[NODE.]NAME=VALUE',
-        help='any parameter of any node; may be repeated',
-        autocompletion=setting,
     ),
 ]
-Domain = Annotated[int | None, typer.Option(help='ROS domain; default: ROS_DOMAIN_ID or 0')]
-Namespace = Annotated[str, typer.Option(help='namespace of the mount, such as mount_right')]
+Priority = Annotated[
+    int, option('real-time priority of the 1 kHz loop where permitted; 0: none', least=0, most=90)
+]
+Domain = Annotated[int | None, option('ROS domain; default: ROS_DOMAIN_ID or 0')]
+Namespace = Annotated[str, option('namespace of the mount, such as mount_right')]
 Columns = Annotated[
     list[str] | None,
-    typer.Option(
+    option(
+        'foreign file: a column by name or number, and its unit, as in acceleration=az:g; road: the height',
+        '[QUANTITY=]COLUMN[:UNIT]',
+        None,
         '--column',
-        metavar='[QUANTITY=]COLUMN[:UNIT]',
-        help='recording of others: a column by name or number, and its unit, as in acceleration=az:g; '
-        'road: that of the height',
     ),
 ]
 TimeColumn = Annotated[
     str,
-    typer.Option(
+    option(
+        'foreign file: column of its times, and their unit, as in t:ms; default: by title, in s',
+        'COLUMN[:UNIT]',
+        None,
         '--time',
         '--time-column',
-        metavar='COLUMN[:UNIT]',
-        help='recording of others: column of its times, and their unit, as in t:ms; default: by title, in s',
     ),
 ]
-RATE = 'recording of others without times: samples per second'
-Rate = Annotated[float | None, typer.Option('--rate', metavar='HZ', help=RATE)]
+Rate = Annotated[float | None, option('foreign file without times: samples per second', 'HZ')]
 MapFile = Annotated[
     Path | None,
-    typer.Option(
-        '--map-file',
-        metavar='FILE',
-        help='recording of others: YAML file that says columns, units and times of a measuring system',
-    ),
+    option('foreign file: YAML file that says columns, units and times of a measuring system', 'FILE'),
 ]
-Dbc = Annotated[
-    Path | None,
-    typer.Option('--dbc', metavar='FILE', help='CAN log, or MDF with raw frames: database that decodes them'),
-]
-Decimal = Annotated[
-    str,
-    typer.Option('--decimal', metavar='SIGN', help='text table that can be read in two ways: "." or ","'),
-]
+Dbc = Annotated[Path | None, option('CAN log, or MDF with raw frames: database that decodes them', 'FILE')]
+Decimal = Annotated[str, option('text table that can be read in two ways: "." or ","', 'SIGN')]
 Delimiter = Annotated[
     str,
-    typer.Option(
-        '--delimiter',
-        metavar='SIGN',
-        help='text table that can be read in two ways: what separates its cells, as ";", tab or blank',
-    ),
+    option('text table that can be read in two ways: what separates its cells, as ";", tab or blank', 'SIGN'),
 ]
+Scale = Annotated[
+    float | None,
+    option('foreign file: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
+]
+Distance = Annotated[
+    str, option('road: column of the distance, or the distance between two heights', 'NAME[:UNIT]|M')
+]
+SpeedText = Annotated[str, option('road: 60/3.6 or 60km/h', 'M/S')]
+Scheduler = Annotated[str, option('local, or tcp://HOST:PORT of a Dask cluster', 'local|ADDRESS')]
+Workers = Annotated[int, option('local: processes; 0: one on each core', least=0)]
 
 
 def mapping_of(map_file: Path | None) -> 'Mapping':
@@ -114,13 +147,7 @@ def mapping_of(map_file: Path | None) -> 'Mapping':
 
 
 def stated(dbc: Path | None, decimal: str, delimiter: str) -> 'Stated':
-    """Return what the options say of a file of others beside its columns and times."""
+    """Return what the options say of a foreign file beside its columns and times."""
     from engine_mount.signals.formats.content import Stated
 
     return Stated(dbc=dbc, decimal=decimal, delimiter=delimiter)
-
-
-Scheduler = Annotated[
-    str, typer.Option(metavar='local|ADDRESS', help='local, or tcp://HOST:PORT of a Dask cluster')
-]
-Workers = Annotated[int, typer.Option(min=0, metavar='NUMBER', help='local: processes; 0: one on each core')]

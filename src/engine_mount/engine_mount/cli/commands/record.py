@@ -1,14 +1,23 @@
 """`engine-mount record`: the recorder alone, beside a graph or without one."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from engine_mount.cli.commands.options import Domain, Namespace, NewFolder, Snapshot, Split, option
+from engine_mount.cli.commands.options import (
+    Domain,
+    Namespace,
+    NewFolder,
+    Snapshot,
+    Split,
+    argument,
+    option,
+)
 from engine_mount.cli.completion import named
-from engine_mount.cli.terminal import terminal
+
+if TYPE_CHECKING:
+    from engine_mount.cli.screen import TerminalScreen
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, also after Ctrl-C, which is the normal end; 1 on
 loss, when the disk was full, or when nothing could be recorded; 2 for a wrong use of the command.
@@ -28,10 +37,7 @@ holds the marks, is always recorded. Times are those of the wall clock.
 
 def record(
     topics: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar='[TOPIC]...', help='names of the registry; default: all', autocompletion=named('topic')
-        ),
+        list[str] | None, argument('names of the registry; default: all', '[TOPIC]...', named('topic'))
     ] = None,
     out: NewFolder = None,
     split: Split = None,
@@ -59,26 +65,21 @@ def record(
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
     options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
-    console = terminal()
+    screen = TerminalScreen()
     outcome = run_record(
-        out if out is not None else new_place('record'),
-        checked_recorder(options),
-        TerminalScreen(console),
-        topics=topics or (),
-        duration=duration,
-        domain=chosen_domain(domain),
-        namespace=namespace,
-    )
+        out or new_place('record'), checked_recorder(options), screen, topics=topics or (),
+        duration=duration, domain=chosen_domain(domain), namespace=namespace,
+    )  # fmt: skip
     if outcome.failure:
-        _print('note', outcome.failure, console)
-    sound = [_told(folder, console) for folder in outcome.folders]
+        screen.note(outcome.failure)
+    sound = [_print_losses(folder, screen) for folder in outcome.folders]
     if not sound and not outcome.failure:
-        console.print('no event came, so no snapshot was saved', soft_wrap=True)
+        screen.say('no event came, so no snapshot was saved')
     if outcome.failure or outcome.lost or not all(sound):
         raise typer.Exit(1)
 
 
-def _told(folder: Path, console: Console) -> bool:
+def _print_losses(folder: Path, screen: 'TerminalScreen') -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
     from engine_mount.recordings.audit import audit
     from engine_mount.recordings.losses import losses, sentences
@@ -88,16 +89,13 @@ def _told(folder: Path, console: Console) -> bool:
     audits = audit(recording)
     found = losses(recording, audits)
     for warning in recording.warnings:
-        _print('note', warning, console)
+        screen.note(warning)
     came = any(entry.present for name, entry in audits.items() if name != '/diagnostics')
     if came:
-        _print('audit', sentences(audits, found)[-1], console)
+        screen.say(f'audit      {sentences(audits, found)[-1]}')
     else:
-        nothing = 'nothing was recorded, save perhaps /diagnostics'
-        _print('note', f'{nothing}; does a graph run in this domain, namespace?', console)
-    _print('recording', folder, console)
+        screen.note(
+            'nothing was recorded, save perhaps /diagnostics; does a graph run in this domain, namespace?'
+        )
+    screen.say(f'recording  {folder}')
     return came and found.lossless
-
-
-def _print(word: str, what: Any, console: Console) -> None:
-    console.print(f'{word:<10} {what}', soft_wrap=True)

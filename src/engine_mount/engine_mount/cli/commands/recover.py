@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import RecordingPlace
+from engine_mount.cli.commands.options import RecordingPlace, option
 from engine_mount.cli.fetching import beside, local
-from engine_mount.cli.terminal import note, terminal
 
 INCOMPLETE = 3
 
@@ -30,27 +29,21 @@ def recover(
     recording: RecordingPlace,
     out: Annotated[
         Path | None,
-        typer.Option(help='folder of the new recording; default: beside it, of a URI here, `..._recovered`'),
+        option('folder of the new recording; default: beside it, of a URI here, `..._recovered`'),
     ] = None,
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
-    from engine_mount.cli.screen import progress_bar
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.place import recording_place
     from engine_mount.recordings.recover import recover as recovered
 
-    console = terminal()
-    source = recording_place(local(recording, console))
-    target = out if out is not None else _beside(source)
-    with progress_bar(console, transient=True) as bar:
-        task = bar.add_task('recovering', total=None)
-        result = recovered(source, target, lambda done, of: bar.update(task, completed=done, total=of))
+    screen = TerminalScreen()
+    source = recording_place(local(recording, screen))
+    target = out or beside(source, '_recovered')
+    with screen.bar('recovering', transient=True) as show:
+        result = recovered(source, target, lambda done, of: show(done / max(of, 1)))
     for sentence in result.notes:
-        note(console, sentence)
-    console.print(f'{result}; it stands in {result.folder}', soft_wrap=True)
+        screen.note(sentence)
+    screen.say(f'{result}; it stands in {result.folder}')
     if not result.complete:
         raise typer.Exit(INCOMPLETE)
-
-
-def _beside(recording: Path) -> Path:
-    whole = recording.absolute()
-    return beside(recording) / f'{whole.name if whole.is_dir() else whole.stem}_recovered'

@@ -3,12 +3,9 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from engine_mount.cli.commands.options import RecordingPlaces
+from engine_mount.cli.commands.options import RecordingPlaces, option
 from engine_mount.cli.completion import recordings as offered
 from engine_mount.cli.fetching import beside, is_fetched, local, named
-from engine_mount.cli.terminal import note, terminal
 
 EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
 or written.
@@ -27,25 +24,14 @@ def report(
     recordings: RecordingPlaces,
     other: Annotated[
         str | None,
-        typer.Option(
-            '--compare',
-            metavar='OTHER',
-            autocompletion=offered,
-            help='draw this one too and tell how it differs from the first',
-        ),
+        option('draw this one too and tell how it differs from the first', 'OTHER', offered, '--compare'),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar='FILE',
-            help='the page; default: report.html in or beside the run, of a URI here',
-        ),
+        Path | None, option('the page; default: report.html in or beside the run, of a URI here', 'FILE')
     ] = None,
     pictures: Annotated[
         Path | None,
-        typer.Option(
-            '--png', metavar='FOLDER', help='folder of the PNGs; default: beside the page, by its name'
-        ),
+        option('folder of the PNGs; default: beside the page, by its name', 'FOLDER', None, '--png'),
     ] = None,
 ) -> None:
     """Write one HTML page that works without network, and its charts as PNG.
@@ -56,20 +42,19 @@ def report(
     from engine_mount.reports.report import default_page, default_pictures
     from engine_mount.reports.report import report as make_report
 
-    console = terminal()
-    places = [local(recording, console) for recording in recordings]
-    compared = None if other is None else local(other, console)
+    screen = TerminalScreen()
+    places = [local(recording, screen) for recording in recordings]
+    compared = None if other is None else local(other, screen)
     first = places[0]
-    fetched = beside(first) / f'{first.name if first.is_dir() else first.stem}_report.html'
-    file = out or (fetched if is_fetched(first) else default_page(first))
+    file = out or (beside(first, '_report.html') if is_fetched(first) else default_page(first))
     folder = pictures or default_pictures(file)
-    with TerminalScreen(console).bar('reading', transient=True) as show:
+    with screen.bar('reading', transient=True) as show:
         made = make_report(places, compare_with=compared, out=file, pictures=folder, on_step=show)
     for failure in made.failures:
-        note(console, failure)
+        screen.note(failure)
     for subject in made.subjects:
         for warning in subject.recording.warnings:
-            note(console, f'{named(subject.recording.path)}: {warning}')
-    console.print(f'report     {file}', soft_wrap=True)
+            screen.note(f'{named(subject.recording.path)}: {warning}')
+    screen.say(f'report     {file}')
     drawn = f'{len(made.pictures)} in {folder}' if made.pictures else 'none, there is nothing to draw'
-    console.print(f'pictures   {drawn}', soft_wrap=True)
+    screen.say(f'pictures   {drawn}')

@@ -1,13 +1,19 @@
 """`engine-mount view` and `status`: what the graph does now, or a recording by the clock."""
 
-import functools
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import Domain, JsonFile, Namespace, recording_argument
+from engine_mount.cli.commands.options import (
+    Domain,
+    JsonFile,
+    Namespace,
+    flag,
+    option,
+    recording_argument,
+    write_figures,
+)
 from engine_mount.cli.fetching import local
-from engine_mount.cli.terminal import terminal
 
 EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to look at or a port is taken, with the reason.
 
@@ -43,31 +49,29 @@ def view(
             instead='folder of a run or of a recording, or its URI; without: the running graph'
         ),
     ] = None,
-    rate: Annotated[float, typer.Option(help='recording: speed against the clock')] = 1.0,
-    begin: Annotated[float, typer.Option('--from', metavar='S', help='recording: where to begin')] = 0.0,
-    host: Annotated[
-        str, typer.Option(help='address to listen at; other than this machine: by a token')
-    ] = '127.0.0.1',
-    port: Annotated[int, typer.Option(help='of the page')] = 8137,
-    foxglove_port: Annotated[int, typer.Option(help='of the Foxglove server, 0: none')] = 8765,
+    rate: Annotated[float, option('recording: speed against the clock')] = 1.0,
+    begin: Annotated[float, option('recording: where to begin', 'S', None, '--from')] = 0.0,
+    host: Annotated[str, option('address to listen at; other than this machine: by a token')] = '127.0.0.1',
+    port: Annotated[int, option('of the page')] = 8137,
+    foxglove_port: Annotated[int, option('of the Foxglove server, 0: none')] = 8765,
     beside: Annotated[bool, typer.Option('--beside/--no-beside', help='simulate other mounts beside')] = True,
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
     """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.view.view import open_feed, serve_view
     from mount_bringup.graph.domain import chosen_domain
 
-    console = terminal()
-    place = None if recording is None else local(recording, console)
+    screen = TerminalScreen()
+    place = None if recording is None else local(recording, screen)
     number = chosen_domain(domain)
     with open_feed(place, rate=rate, begin=begin, domain=number, namespace=namespace) as feed:
-        say = functools.partial(console.print, soft_wrap=True)
-        serve_view(feed, say, host=host, port=port, foxglove_port=foxglove_port, beside=beside)
+        serve_view(feed, screen.say, host=host, port=port, foxglove_port=foxglove_port, beside=beside)
 
 
 def status(
-    once: Annotated[bool, typer.Option('--once', help='print the state once and end')] = False,
+    once: Annotated[bool, flag('--once', 'print the state once and end')] = False,
     json_file: JsonFile = None,
     domain: Domain = None,
     namespace: Namespace = '',
@@ -77,25 +81,24 @@ def status(
 
     from rich.live import Live
 
-    from engine_mount.reports.json_file import write_json
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.view.feed import FeedError
     from engine_mount.view.screen import status_screen
     from engine_mount.view.view import open_feed, running_model, wait_for_state
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
 
-    console = terminal()
+    console = TerminalScreen().console
     ending = threading.Event()
     with (
         ending_signals(ending.set),
         open_feed(domain=chosen_domain(domain), namespace=namespace) as feed,
-        running_model(feed, beside=not once) as model,
+        running_model(feed, beside=False) as model,
     ):
         if once or json_file is not None:
             wait_for_state(model, _ONCE_LIMIT)
             console.print(status_screen(model, feed.title))
-            if json_file is not None:
-                write_json(model.state_json(), json_file)
+            write_figures(model.state_json(), json_file)
             if not model.state.nodes:
                 raise typer.Exit(1)
             return

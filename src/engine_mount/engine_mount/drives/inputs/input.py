@@ -20,7 +20,7 @@ from engine_mount.drives.inputs.consumed_samples import (
     quiet_at_first,
 )
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.series import Payloads
+from engine_mount.recordings.series import Series
 from engine_mount.recordings.session import (
     SessionError,
     recorded_session,
@@ -56,29 +56,20 @@ _CONTROL = 'mount_control'
 _KNOWN_OF_OLDER = ('policy', 'sample_rate')  # what sessions without them were made with is known
 
 
-@dataclass(frozen=True)
-class Messages:
-    """The recorded messages of one topic as a replay writes them again, with their log times in ns."""
-
-    name: str  # with its namespace
-    payloads: Sequence[bytes] | Payloads
-    log_times: Times
-
-
 @dataclass
 class ReplayInput:
     """Everything that goes into a replay; `notes` are sentences on what is not as one would expect.
 
     `zero` is the stamp (ns) from which times are told, the zero of the recording's time axis; `log_shift`
-    (ns) leads from stamps to log times. `messages` are those of displacement, coil ripple and coil
-    temperature by their relative names.
+    (ns) leads from stamps to log times. `messages` are displacement, coil ripple and coil temperature by
+    their relative names.
     """
 
     source: str
     parts: list[Ramp | ControlRun]
     parameters: dict[str, dict[str, Any]]
     answers: RecordedAnswers | None
-    messages: dict[str, Messages]
+    messages: dict[str, Series]
     zero: int = 0
     log_shift: int = 0
     session: dict[str, Any] = field(default_factory=dict)
@@ -130,9 +121,7 @@ def replay_input(recording: Recording, gap: MeasuredGap | None = None) -> Replay
         parts=sorted([*ramps, *runs], key=lambda part: int(part.stamps[0])),
         parameters=parameters,
         answers=answers,
-        messages={
-            name: Messages(each.topic, each.payloads, each.receive_times) for name, each in series.items()
-        },
+        messages=series,
         zero=notes.zero,
         log_shift=int(shaking.receive_times[0] - shaking.stamps[0]),
         session=session,
@@ -239,7 +228,7 @@ def displacement_of(recording: Recording) -> tuple[Times, Column]:
     if not has(recording, topics.DISPLACEMENT):
         raise ReplayError(
             f'{recording.path} holds no displacement; it has {", ".join(recording.topics) or "no topic"}. '
-            'Name a topic and its field with --map displacement=/topic.field'
+            'engine-mount import makes a recording with one of a foreign file'
         )
     series = recording[topics.DISPLACEMENT.name]
     back = np.flatnonzero(np.diff(series.stamps) < -BREAK)

@@ -15,7 +15,7 @@ from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_ros.messages.cdr import string_message
 from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.plant.places import ALONE
+from mount_sim.plant.mounts import ALONE
 
 
 def record_core(

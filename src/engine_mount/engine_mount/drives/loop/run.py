@@ -21,9 +21,9 @@ from mount_control.control_loop import OFF, ControlLoop
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import InitialisationResult
 from mount_sim.electronics.electronics import Reading, status_every
-from mount_sim.electronics.faults.schedule import check_without_bus
+from mount_sim.electronics.faults import check_without_bus
 from mount_sim.excitation.excitation import Excitation
-from mount_sim.plant.places import ALONE
+from mount_sim.plant.mounts import ALONE
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount, mount_parameters
 from mount_sim.quantisation import quantised_setpoint_current
 

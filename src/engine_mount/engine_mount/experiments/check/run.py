@@ -1,10 +1,9 @@
-"""The suite driven: orders checked before the first manoeuvre, in core several at a time."""
+"""The suite driven: orders checked before the first manoeuvre, then several at a time."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,58 +22,36 @@ from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
 from engine_mount.settings.chosen import policy_of
 from engine_mount.settings.mounts import mounts_of
-from mount_bringup.graph.nodes import GraphError
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_RATE, SAMPLE_TIME
-from mount_sim.mount_choice import seat_of, with_control_of_mount
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, with_control_of_mount, without_friction
 
-CORE, LOCKSTEP, GRAPH = 'core', 'lockstep', 'graph'
-MODES = {CORE: 'core', LOCKSTEP: 'lock-step', GRAPH: 'real time'}
-"""{what `--through` says: what a drive calls it}."""
 DRIVEN, HYDRO, UNDAMPED = 'driven', 'hydromount', 'undamped'
 _BESIDE = {HYDRO: 'hydro', UNDAMPED: 'friction_off'}
 _RUNG_OUT = 0.2  # chosen: of the undamped peak, below which the engine counts as at rest
 _MOST_PERIODS = 16
-_AROUND = 8.0  # s, chosen: through nodes, their start and end
 
 
 class CheckError(ValueError):
     """The suite cannot be driven as ordered; the text says why and the remedy."""
 
 
-@dataclass(frozen=True)
-class Trial:
-    """A manoeuvre with the parameters of all nodes, driven `through` what, how long (s), into which folder.
-
-    `graph` are domain and priority where there are nodes.
-    """
+class Trial(NamedTuple):
+    """A manoeuvre with the parameters of all nodes, how long it takes (s), and its folder."""
 
     manoeuvre: Manoeuvre
     parameters: dict[str, Values]
-    through: str
     seconds: float
     out: Path
-    graph: Mapping[str, Any]
 
 
-def trials_of(
-    suite: Sequence[Manoeuvre],
-    settings: Settings,
-    out: Path,
-    through: str = CORE,
-    *,
-    jobs: int = 0,
-    **graph: Any,
-) -> list[Trial]:
+def trials_of(suite: Sequence[Manoeuvre], settings: Settings, out: Path) -> list[Trial]:
     """Return the drives of a suite, each refused with its manoeuvre before any begins; a `ValueError`.
 
-    `settings` are the user's {node: {parameter: value}}; `graph` are domain and priority of a graph.
+    `settings` are the user's {node: {parameter: value}}.
     """
-    if through != CORE and jobs > 1:
-        raise CheckError(f'through {through} one manoeuvre is driven at a time; leave out --jobs')
     checked = checked_settings(settings)
     if mounts_of(checked):
         raise CheckError('a suite checks one mount; leave out mount_sim.mounts')
@@ -85,15 +62,16 @@ def trials_of(
     for each in suite:
         merged = {node: dict(values) for node, values in each.settings.items()}
         for node, values in checked.items():
-            for name in sorted(values.keys() & merged.get(node, {}).keys()):
+            own = merged.setdefault(node, {})
+            for name in sorted(values.keys() & own.keys()):
                 raise CheckError(
                     f'{node}.{name} is set by the manoeuvre {each.name} itself; leave it out, or give a '
                     'suite of your own with --suite'
                 )
-            merged[node] = merged.get(node, {}) | values
+            own |= values
         parameters = with_control_of_mount(merged)
         try:
-            excitation = check_drive(parameters, core=through == CORE)
+            excitation = check_drive(parameters, core=True)
         except ParameterError as error:
             raise CheckError(f'{each.name}: {error}') from None
         if each.evaluated_from >= excitation.duration:
@@ -101,22 +79,21 @@ def trials_of(
                 f'{each.name}: evaluated_from_s ({each.evaluated_from:g} s) must lie before the end of the '
                 f'excitation ({excitation.duration:g} s)'
             )
-        seconds = excitation.start + excitation.duration + (0.0 if through == CORE else _AROUND)
-        trials.append(Trial(each, parameters, through, seconds, out / each.name, graph))
+        trials.append(Trial(each, parameters, excitation.start + excitation.duration, out / each.name))
     return trials
 
 
 def run_trials(
     trials: Sequence[Trial], jobs: int, screen: Screen, done: Callable[[Trial, Result], None]
 ) -> dict[str, Result]:
-    """Drive all, call `done` with each, and return {manoeuvre: what came of it} in their order.
-
-    Raises `Interrupted`.
-    """
+    """Drive all, call `done` with each, and return {manoeuvre: what came of it} in their order."""
     results: dict[str, Result] = {}
     whole, driven = sum(trial.seconds for trial in trials), 0.0
     with screen.bar('checking', transient=True) as bar:
-        for trial, result in _results(trials, jobs):
+        for task in run_tasks(run_trial, trials, workers=jobs):
+            if task.error is not None:
+                raise task.error
+            trial, result = trials[task.place], task.result or Result({}, broke_down=task.reason)
             driven += trial.seconds
             bar(driven / whole, trial.manoeuvre.name)
             results[trial.manoeuvre.name] = result
@@ -124,32 +101,20 @@ def run_trials(
     return {trial.manoeuvre.name: results[trial.manoeuvre.name] for trial in trials}
 
 
-def _results(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, Result]]:
-    """Yield the trials as they are done, with what came of them."""
-    if trials[0].through != CORE:
-        yield from ((trial, run_trial(trial)) for trial in trials)
-        return
-    for done in run_tasks(run_trial, trials, workers=jobs):
-        if done.error is not None:
-            raise done.error
-        yield trials[done.place], done.result or Result({}, broke_down=done.reason)
-
-
 def run_trial(trial: Trial) -> Result:
-    """Drive one manoeuvre and return what came of it; raises `Interrupted`.
+    """Drive one manoeuvre and return what came of it.
 
     One that breaks down, or whose recording cannot be judged, says so in its result: the others go on.
     """
     try:
-        core, lockstep = trial.through == CORE, trial.through == LOCKSTEP
-        run = drive(core=core, lockstep=lockstep, parameters=trial.parameters, out=trial.out, **trial.graph)
+        run = drive(core=True, parameters=trial.parameters, out=trial.out)
         return result_of(trial, open_recording(run.recording), run)
-    except (GraphError, ValueError) as error:
+    except ValueError as error:
         return Result({}, broke_down=str(error))
 
 
 def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
-    """Return figures and remarks of a recorded manoeuvre, and the truths of the mounts beside it."""
+    """Return figures and remarks of a recorded manoeuvre."""
     parameters, audits = trial.parameters, audit(recording)
     lost = losses(recording, audits)
     signals = load_drive(recording, run.excitation_start)
@@ -163,9 +128,7 @@ def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
         name: truth_of_run({**parameters, 'mount_sim': {**parameters['mount_sim'], 'mount': mount}})
         for name, mount in _BESIDE.items()
     }
-    truths = {DRIVEN: at_samples(signals.truth, beside[UNDAMPED].time.size), **beside}
-    changes = switching(signals.seen)
-    ends = (*changes.off, float(signals.seen.time[-1]))
+    truths = {DRIVEN: signals.truth.since(0.0), **beside}
     gap, truth = recording['air_gap'], recording['sim/truth']
     figures = {
         **figures_of(truths, trial.manoeuvre, parameters),
@@ -178,28 +141,12 @@ def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
         'unanswered_samples': _known(lost.unanswered),
         'faults': float(len(lost.faults)),
         'remarks': float(len(remarks)),
-        'latency_p99_us': 1e6 * run.latency_p99 if trial.through == GRAPH else math.nan,
     }
-    damping = [(on, min(end for end in ends if end >= on)) for on in changes.on]
-    return Result(figures, [*remarks, *lost.complaints()], truths, damping)
+    return Result(figures, [*remarks, *lost.complaints()])
 
 
 def _known(count: int | None) -> float:
     return math.nan if count is None else float(count)
-
-
-def at_samples(truth: Truth, count: int) -> Truth:
-    """Return the truth at the `count` samples of the excitation, those that are missing on a straight line.
-
-    In real time the electronics go on behind the end of the excitation, and a recording may lack samples.
-    """
-    places = np.round(truth.time / SAMPLE_TIME)
-    inside = (places >= 0) & (places < count)
-    values = {field.name: getattr(truth, field.name)[inside] for field in fields(Truth)}
-    if int(inside.sum()) < count:
-        samples = np.arange(count)
-        values = {name: np.interp(samples, places[inside], each) for name, each in values.items()}
-    return Truth(**values)
 
 
 def figures_of(truths: Mapping[str, Truth], manoeuvre: Manoeuvre, parameters: Settings) -> dict[str, float]:

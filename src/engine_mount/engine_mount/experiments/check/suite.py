@@ -3,7 +3,6 @@
 import importlib.resources
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,15 +13,15 @@ from mount_models.quantity import ParameterError, check_name
 
 BANDS = ((3.0, 14.0), (14.0, 20.0), (20.0, 30.0), (30.0, 50.0), (20.0, 200.0))
 """Hz: resonance of the engine; the isolation bands of the sweep; what the chassis passes on as sound."""
-ROAD, RACK, CLOCK = 'road', 'rack', 'clock'
+ROAD, RACK = 'road', 'rack'
 SOURCES = ('contract', 'derived', 'paper', 'chosen')
 """Where the number of a limit comes from; `chosen` ones are a decision of whoever wrote the suite."""
 _BOUNDS = ('at_most', 'at_least')
 _NODES = ('mount_sim', 'mount_control', 'mount_init', 'mount_driver')
 _LONGEST_NAME = 10  # characters: the table of verdicts fits 80 columns
-NOT_JUDGED, FAILED, PASSED, LEFT_OUT = 'not judged', 'fail', 'ok', 'none'
-"""Of a limit, the worst first: its manoeuvre broke down; exceeded; held; of real time alone."""
-_ORDER = (NOT_JUDGED, FAILED, PASSED, LEFT_OUT)
+NOT_JUDGED, FAILED, PASSED = 'not judged', 'fail', 'ok'
+"""Of a limit, the worst first: its manoeuvre broke down; exceeded; held."""
+_ORDER = (NOT_JUDGED, FAILED, PASSED)
 
 
 class SuiteError(ValueError):
@@ -30,10 +29,7 @@ class SuiteError(ValueError):
 
 
 class Measure(NamedTuple):
-    """The unit of a number ('' for counts and ratios), its meaning, and on which seats it is known.
-
-    One with the seat `CLOCK` is of real time and not judged in core and lock-step.
-    """
+    """The unit of a number ('' for counts and ratios), its meaning, and on which seats it is known."""
 
     unit: str
     meaning: str
@@ -49,8 +45,7 @@ MEASURES = {name: Measure(*entry) for name, entry in _shipped('measures.yaml').i
 """{name: what it means}. A number that is not known is exceeded, whatever its limit."""
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(NamedTuple):
     """A bound of a measure: `at_most` or `at_least` so much, and where that comes from.
 
     A `common` one is shared with all manoeuvres of the suite.
@@ -64,8 +59,7 @@ class Limit:
     common: bool
 
 
-@dataclass(frozen=True)
-class Manoeuvre:
+class Manoeuvre(NamedTuple):
     """A drive with limits: {node: {parameter: value}}, looked at from so many s of excitation on."""
 
     name: str
@@ -80,24 +74,18 @@ class Manoeuvre:
         return RACK if self.settings['mount_sim']['scenario'] == 'bench' else ROAD
 
 
-@dataclass(frozen=True)
-class Result:
+class Result(NamedTuple):
     """The figures of a manoeuvre by the names of their measures, and what was not as it should be.
 
-    `truths` are those of the driven mount and of the others beside it, from the begin of the excitation on;
-    `damping` are the stretches (s) with damping on. `broke_down`: why there are no figures, empty where
-    there are.
+    `broke_down`: why there are no figures, empty where there are.
     """
 
     figures: Mapping[str, float]
     remarks: Sequence[str] = ()
-    truths: Mapping[str, Any] = field(default_factory=dict)
-    damping: Sequence[tuple[float, float]] = ()
     broke_down: str = ''
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """One figure against one limit; `margin` is the share that is left of it, NaN of a limit of 0."""
 
     manoeuvre: str
@@ -106,28 +94,18 @@ class Verdict:
     judged: str
     margin: float
 
-    @property
-    def has_failed(self) -> bool:
-        """Whether the manoeuvre does not pass for it."""
-        return self.judged in (FAILED, NOT_JUDGED)
 
-
-def verdicts_of(manoeuvre: Manoeuvre, result: Result, *, real_time: bool) -> list[Verdict]:
+def verdicts_of(manoeuvre: Manoeuvre, result: Result) -> list[Verdict]:
     """Return the verdicts on one manoeuvre in the order of its limits."""
-
-    def verdict(limit: Limit) -> Verdict:
-        if CLOCK in MEASURES[limit.measure].seats and not real_time:
-            return Verdict(manoeuvre.name, limit, math.nan, LEFT_OUT, math.nan)
-        if result.broke_down:
-            return Verdict(manoeuvre.name, limit, math.nan, NOT_JUDGED, math.nan)
+    verdicts = []
+    for limit in manoeuvre.limits:
         value = result.figures.get(limit.measure, math.nan)
         left = limit.value - value if limit.bound == 'at_most' else value - limit.value
-        judged = PASSED if left >= 0.0 else FAILED  # a value that is not known fails
-        return Verdict(
-            manoeuvre.name, limit, value, judged, left / abs(limit.value) if limit.value else math.nan
-        )
-
-    return [verdict(limit) for limit in manoeuvre.limits]
+        # a value that is not known fails
+        judged = NOT_JUDGED if result.broke_down else PASSED if left >= 0.0 else FAILED
+        margin = left / abs(limit.value) if limit.value else math.nan
+        verdicts.append(Verdict(manoeuvre.name, limit, value, judged, margin))
+    return verdicts
 
 
 def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
@@ -141,8 +119,8 @@ def worst_first(verdicts: Sequence[Verdict]) -> list[Verdict]:
 
 
 def passed(verdicts: Sequence[Verdict]) -> bool:
-    """Return whether no limit is exceeded, and none could not be judged."""
-    return not any(verdict.has_failed for verdict in verdicts)
+    """Return whether every limit was judged and held."""
+    return all(verdict.judged == PASSED for verdict in verdicts)
 
 
 def shipped_suite() -> list[Manoeuvre]:
@@ -211,12 +189,11 @@ def _limits(name: str, entry: Any, *, common: bool = False) -> Iterator[Limit]:
         source, reason = (_text(f'{place}.{key}', limit.get(key)) for key in ('source', 'reason'))
         if source not in SOURCES:
             raise SuiteError(f'{place}.source must be {", ".join(SOURCES)}; instead received {source!r}')
-        if not limit.keys() & {*_BOUNDS}:
+        bounds = [bound for bound in _BOUNDS if bound in limit]
+        if not bounds:
             raise SuiteError(f'{place} must have {" or ".join(_BOUNDS)}')
-        for bound in _BOUNDS:
-            if bound in limit:
-                value = _number(f'{place}.{bound}', limit[bound])
-                yield Limit(measure, bound, value, source, reason, common)
+        for bound in bounds:
+            yield Limit(measure, bound, _number(f'{place}.{bound}', limit[bound]), source, reason, common)
 
 
 def _mapping(place: str, entry: Any, known: Collection[str] = ()) -> Mapping[str, Any]:

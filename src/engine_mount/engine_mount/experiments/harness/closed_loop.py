@@ -1,8 +1,8 @@
 """Controller and plant together: drives that are recorded and read back, many runs that are not."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from dataclasses import fields, replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,9 +18,8 @@ from mount_control.policy import switched_viscous
 from mount_init.initialisation import InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.excitation import Excitation
-from mount_sim.mount_choice import with_control_of_mount
 from mount_sim.parameters import SimParameters
+from mount_sim.plant.mounts import with_control_of_mount
 from mount_sim.plant.plant import TRUTH
 
 K = TypeVar('K')
@@ -43,7 +42,7 @@ def settings_of_run(order: Order, sim: Values, control: Values) -> dict[str, Val
 
 
 def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSignals]:
-    """Drive {name: parameters of the simulator} with the paper's policy, by plain calls or through the nodes.
+    """Drive {name: parameters of the simulator} with the paper's policy.
 
     Each is recorded in a folder of its name and read back. The damper is `damper` of the case, else that of
     the order. Time and truth begin with the excitation; what rack and chassis measure is from the truth.
@@ -54,7 +53,6 @@ def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSig
         sim = {'damper': order.parameters.damper, **case}
         control = {'policy': PAPER, 'damper': sim.pop('damper')}
         drives[name] = _drive(order, name, settings_of_run(order, sim, control))
-    order.progress(0.95, 'pictures')
     return drives
 
 
@@ -65,7 +63,7 @@ def paper_policy(order: Order) -> switched_viscous.Parameters:
 
 def _drive(order: Order, name: str, parameters: dict[str, Values]) -> DriveSignals:
     out = order.out / name.replace('0 A', '0A').replace(', ', '_').replace(' ', '_')
-    run = drive(core=not order.graph, lockstep=order.graph, parameters=parameters, out=out)
+    run = drive(core=True, parameters=parameters, out=out)
     recording = open_recording(run.recording)
     if complaints := [*run.complaints, *recording.warnings]:
         raise ExperimentError(f'run {name} in {out} was not as it should be: {"; ".join(complaints)}')
@@ -73,16 +71,11 @@ def _drive(order: Order, name: str, parameters: dict[str, Values]) -> DriveSigna
     return replace(signals, recording=run.recording, truth=signals.truth.since(0.0))
 
 
-@dataclass(frozen=True)
-class Case:
-    """One run that is not recorded: the parameters of all nodes, and what makes figures of the truth.
-
-    `excitation` makes one that no scenario holds.
-    """
+class Case(NamedTuple):
+    """One run that is not recorded: the parameters of all nodes, and what makes figures of the truth."""
 
     parameters: Settings
     figures: Callable[[Truth, SimParameters], Values]
-    excitation: Callable[[SimParameters], Excitation] | None = None
 
 
 def run_cases(order: Order, cases: Mapping[K, Case]) -> dict[K, Values]:
@@ -100,14 +93,13 @@ def run_cases(order: Order, cases: Mapping[K, Case]) -> dict[K, Values]:
 def run_case(case: Case) -> Values:
     """Run one case through the same closed loop as every drive in core and return its figures."""
     sim = with_flattened(SimParameters(), case.parameters['mount_sim'])
-    excitation = None if case.excitation is None else case.excitation(sim)
-    return case.figures(truth_of_run(case.parameters, excitation), sim)
+    return case.figures(truth_of_run(case.parameters), sim)
 
 
-def truth_of_run(parameters: Settings, excitation: Excitation | None = None) -> Truth:
+def truth_of_run(parameters: Settings) -> Truth:
     """Return the truth of a run in core from the begin of the excitation on; nothing is recorded."""
     sink = _TruthSink()
-    outcome = run_core_into(sink, parameters, excitation=excitation)
+    outcome = run_core_into(sink, parameters)
     records = np.concatenate(sink.blocks).view(TRUTH)[round(outcome.excitation_start / SAMPLE_TIME) :, 0]
     columns = {each.name: records[each.name].copy() for each in fields(Truth) if each.name != 'time'}
     return Truth(time=SAMPLE_TIME * np.arange(len(records)), **columns)

@@ -10,9 +10,7 @@ matplotlib.use('Agg')
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from PIL import Image
 
 from engine_mount.reports.drawing.style import (
     COLOURS,
@@ -31,7 +29,6 @@ OFF_LINE = {'color': UNDAMPED_COLOUR, 'linestyle': ':'}
 _WIDTH = 10.0  # inches
 _DPI = 100
 _LAYOUT: Literal['constrained'] | None = 'constrained'
-_COLOURS = 256  # the most that a palette holds
 
 
 def new_panels(title: str, rows: int = 1, columns: int = 1, height: float = 5.0, **more: Any) -> Any:
@@ -54,7 +51,7 @@ def _empty(title: str, height: float) -> Figure:
 
 def family(count: int) -> Sequence[Any]:
     """Return `count` colours in an order that is seen as one, also in grey print."""
-    return [colormaps['viridis'](0.9 * k / max(count - 1, 1)) for k in range(count)]
+    return list(colormaps['viridis'](np.linspace(0.0, 0.9, count)))
 
 
 def legend_below(figure: Any, axes: Any, columns: int, **more: Any) -> None:
@@ -80,8 +77,8 @@ def shade_damping(axes: Any, seen: Seen, within: Any, alpha: float) -> None:
 
 def draw_level(axes: Any, level: float, label: str, dash: str, width: float) -> None:
     """Draw a level of the displacement (m) on both sides, in mm."""
-    axes.axhline(1e3 * level, color=RED, linestyle=dash, linewidth=width, label=label)
-    axes.axhline(-1e3 * level, color=RED, linestyle=dash, linewidth=width)
+    for name, value in ((label, level), (None, -level)):
+        axes.axhline(1e3 * value, color=RED, linestyle=dash, linewidth=width, label=name)
 
 
 def finish(figure: Any, file: Path) -> Path:
@@ -90,10 +87,6 @@ def finish(figure: Any, file: Path) -> Path:
         if not axes.images:
             axes.grid(alpha=0.25)
     file.parent.mkdir(parents=True, exist_ok=True)
-    figure.set_dpi(_DPI)
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()  # once; savefig draws twice
-    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert('RGB')
-    # a palette halves the file; nothing of date or program in it: the same figures give the same bytes
-    picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    # nothing of date or program in it: the same figures give the same bytes
+    figure.savefig(file, dpi=_DPI, metadata={'Software': None})
     return file

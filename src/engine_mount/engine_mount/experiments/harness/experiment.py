@@ -5,10 +5,11 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
 
 from mount_models.damper import damper_curve
-from mount_models.quantity import ParameterError, Quantity, flattened, with_flattened
+from mount_models.quantity import ParameterError, Quantity, with_flattened
 
 Seed = Annotated[int, Quantity('1', 'seed of the noise', 0, 2**31 - 1)]
 Workers = Annotated[int, Quantity('1', 'processes; 0: one for each core', 0, 256)]
@@ -17,6 +18,21 @@ Values = dict[str, Any]
 """Plain numbers, texts, lists and mappings by name."""
 Settings = Mapping[str, Mapping[str, Any]]
 """{owner: {parameter: value}}; an owner is a node or an experiment."""
+
+NAMES = {
+    'force_characteristic': ('Force of the actuator over current and gap', 'Fig. 2'),
+    'field_penetration': ("How far the ripple's field enters the iron", 'Fig. 3'),
+    'inductance_map': ('Incremental inductance over current and gap', 'Fig. 4'),
+    'ramp_and_hold': ('Ramp and hold of the sticking contact', 'Fig. 7'),
+    'sawtooth': ('Friction contact alone on a saw tooth', 'Figs. 8 to 11'),
+    'bench': ('Friction mount and hydromount on a test rack', 'Fig. 13'),
+    'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
+    'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
+    'sensitivity': ('What the comparison with the hydromount depends on', 'Figs. 13, 14'),
+    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 6, 7'),
+    'recorded_drive': ('A recorded drive', 'Sec. 7'),
+}
+"""{name of the experiment and its file: (title, section or figure of the paper)}."""
 
 
 class ExperimentError(ValueError):
@@ -37,8 +53,7 @@ Verdict = tuple[Any, str]
 """`Holds`, or what is true or false, and a text on what came out, with numbers."""
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(NamedTuple):
     """What the paper says at `reference`, in our words, what was `found`, and whether it holds."""
 
     reference: str
@@ -73,7 +88,7 @@ def in_one_line(text: str) -> str:
 
 @dataclass(frozen=True)
 class Order:
-    """What is wanted: a folder, the experiment's parameters, those of the nodes, and the real nodes or not.
+    """What is wanted: a folder, the experiment's parameters and those of the nodes.
 
     `progress` takes the share that is done, 0 .. 1, and what is being done.
     """
@@ -82,21 +97,14 @@ class Order:
     out: Path
     parameters: Any
     settings: Settings = field(default_factory=dict)
-    graph: bool = False
     progress: Callable[[float, str], None] = lambda share, what: None
-
-    @property
-    def mode(self) -> str:
-        """How drives of this order are driven."""
-        return 'lock-step' if self.graph else 'core'
 
     def shown_on(self, bar: Callable[[float, str], None]) -> 'Order':
         """Return the order with its progress on a bar."""
         return replace(self, progress=lambda share, what: bar(share, f'{self.experiment}: {what}'))
 
 
-@dataclass(frozen=True)
-class Findings:
+class Findings(NamedTuple):
     """What a procedure returns; `figures` is what `--json` writes: plain numbers, texts, lists, mappings.
 
     `pictures` are {name: figure of matplotlib, or the file where one is written}; `pages` are {file name:
@@ -106,7 +114,7 @@ class Findings:
     figures: Values
     pictures: Mapping[str, Any]
     recordings: Sequence[Path] = ()
-    pages: Mapping[str, str] = field(default_factory=dict)
+    pages: Mapping[str, str] = MappingProxyType({})
     judged: Any = None
 
 
@@ -114,31 +122,35 @@ class Findings:
 class Experiment:
     """One experiment; `defaults` is the parameter set that `--set NAME.PARAMETER=VALUE` changes.
 
-    `reference` is what it repeats of the paper, `summary` one paragraph on how. `closed_loop`: it drives
-    through controller and plant, so parameters of the nodes can be set too and `--graph` makes sense.
-    `needs`: the parameter that only the user can give; such an experiment is not among `all`.
+    `summary` is one paragraph on how it repeats what `NAMES` says. `closed_loop`: it drives through
+    controller and plant, so parameters of the nodes can be set too. `needs`: the parameter that only the user
+    can give; such an experiment is not among `all`.
     """
 
     name: str
-    title: str
-    reference: str
     summary: str
     defaults: NamedTuple
     procedure: Callable[[Order], Findings]
     closed_loop: bool = False
     needs: str = ''
 
-    def known_settings(self) -> dict[str, Values]:
-        """Return {name: {parameter: default}} of the experiment's own parameters."""
-        return {self.name: flattened(self.defaults)}
+    @property
+    def title(self) -> str:
+        """What it is about."""
+        return NAMES[self.name][0]
 
-    def order(self, out: Path, settings: Settings, **more: Any) -> Order:
+    @property
+    def reference(self) -> str:
+        """What it repeats of the paper."""
+        return NAMES[self.name][1]
+
+    def order(self, out: Path, settings: Settings) -> Order:
         """Return the order with checked parameters; raises `ParameterError` for what is out of range."""
         parameters = with_flattened(self.defaults, settings.get(self.name, {}))
         if hasattr(parameters, 'damper'):
             damper_curve(parameters.damper)  # refuses an unknown one
         nodes = {node: values for node, values in settings.items() if node != self.name}
-        return Order(self.name, out, parameters, nodes, **more)
+        return Order(self.name, out, parameters, nodes)
 
     def run(self, order: Order) -> 'Outcome':
         """Run the procedure, judge the claims, write pictures and pages."""
@@ -159,16 +171,15 @@ class Experiment:
         return Outcome(self, found.figures, claims, pictures, list(found.recordings), pages)
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What came of an experiment: figures in SI units, claims with their verdicts, and the files it made."""
 
     experiment: Experiment
     figures: Values
     claims: list[Claim]
-    pictures: list[Path] = field(default_factory=list)
-    recordings: list[Path] = field(default_factory=list)
-    pages: list[Path] = field(default_factory=list)
+    pictures: list[Path]
+    recordings: list[Path]
+    pages: list[Path]
 
     def page(self) -> str:
         """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`.

@@ -19,7 +19,7 @@ from mount_ros.topics import (
     SIM_MOUNT_FORCE,
     Delivery,
 )
-from mount_sim.rack.friction import RackRecording
+from mount_sim.rack import RackRecording
 
 ForceNoise = Annotated[float, Quantity('N', 'standard deviation of the load cell', 0.0, 20.0)]
 DisplacementNoise = Annotated[

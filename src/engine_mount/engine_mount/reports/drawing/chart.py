@@ -17,7 +17,7 @@ SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
 
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it. Raises `ValueError` where x and y differ in number."""
+    """A line through points; NaN interrupts it."""
 
     name: str
     x: Array
@@ -26,10 +26,7 @@ class Curve:
     dash: str = SOLID
     steps: bool = False  # holds each value until the next point
     width: float = 1.2  # pixels
-
-    def __post_init__(self) -> None:
-        if len(self.x) != len(self.y):
-            raise ValueError(f'{self.name!r} cannot be drawn: {len(self.x)} x but {len(self.y)} y')
+    key: str = ''  # of the signal that the live view adds
 
 
 class Dots(Curve):

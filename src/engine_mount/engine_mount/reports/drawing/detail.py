@@ -17,10 +17,10 @@ _STEPS = 65_534  # of int16 from the lowest to the highest value of a curve
 _UNEVEN = 0.1  # chosen: of the sample time, that a stamp may be off an even grid
 
 
-def budget_of(charts: Sequence[Chart], numbers: int = NUMBERS) -> int:
-    """Return how many numbers each long curve may have, so that all together have at most `numbers`."""
+def budget_of(charts: Sequence[Chart]) -> int:
+    """Return how many numbers each long curve may have, so that all together have at most `NUMBERS`."""
     curves = [curve for chart in charts for panel in chart.panels for curve in panel.curves]
-    return max(_LONG, numbers // max(1, sum(len(curve.x) > _LONG for curve in curves)))
+    return max(_LONG, NUMBERS // max(1, sum(len(curve.x) > _LONG for curve in curves)))
 
 
 def browser_chart(chart: Chart, budget: int = NUMBERS) -> dict[str, Any]:

@@ -7,16 +7,16 @@ from importlib.resources import files
 from itertools import groupby
 from string import Template
 
-from engine_mount.reports.drawing.detail import NUMBERS, browser_chart, budget_of
+from engine_mount.reports.drawing.detail import browser_chart, budget_of
 from engine_mount.reports.sections.section import Cell, Finding, Link, Section, Table
 
 _ASSETS = files('engine_mount.reports.drawing') / 'browser'
 
 
-def page(title: str, sections: Sequence[Section], numbers: int = NUMBERS) -> str:
-    """Return the HTML of a report; its long curves have at most `numbers` numbers together."""
+def page(title: str, sections: Sequence[Section]) -> str:
+    """Return the HTML of a report."""
     charts = [section.chart for section in sections if section.chart]
-    budget = budget_of(charts, numbers)
+    budget = budget_of(charts)
     body = ''
     for half, group in groupby(sections, key=lambda section: section.half):
         inside = ''.join(_section(section, budget) for section in group)

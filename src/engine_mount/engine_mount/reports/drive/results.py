@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import as_table, losses, sentences
@@ -12,6 +11,7 @@ from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.reports.drive.summary import (
+    Figures,
     late_control,
     snapshots_sentence,
     summarise,
@@ -32,14 +32,14 @@ _COMMON = ('scenario', 'mode', 'samples', 'recordings', 'real_time_factor')  # t
 class DriveResult:
     """Figures, recordings, pictures, and a sentence for each thing that is not as it should be."""
 
-    figures: dict[str, Any]
+    figures: Figures
     recordings: list[Path]
     complaints: list[str]
     pictures: list[Path] = field(default_factory=list)
 
 
 def evaluate_drive(
-    folder: RunFolder, parameters: Parameters, run: dict[str, Any], screen: Screen, *, report: bool
+    folder: RunFolder, parameters: Parameters, run: Figures, screen: Screen, *, report: bool
 ) -> DriveResult:
     """Print and write the figures of a drive, with `report` also its picture and its page.
 
@@ -69,7 +69,7 @@ def evaluate_drive(
 
 
 def evaluate_snapshots(
-    folder: RunFolder, recorder: RecorderParameters, run: dict[str, Any], screen: Screen
+    folder: RunFolder, recorder: RecorderParameters, run: Figures, screen: Screen
 ) -> DriveResult:
     """Say what a run has that recorded only events: its figures would need all of the drive."""
     saved = saved_snapshots(folder.recording)
@@ -81,8 +81,8 @@ def evaluate_snapshots(
 
 
 def _evaluate_mount(
-    recording: Recording, parameters: Parameters, run: dict[str, Any], screen: Screen, result: DriveResult
-) -> dict[str, Any]:
+    recording: Recording, parameters: Parameters, run: Figures, screen: Screen, result: DriveResult
+) -> Figures:
     """Print the figures of one mount; return them, add to `result` what is wrong."""
     with screen.line('evaluating the recording'):
         audits = audit(recording)
@@ -118,7 +118,7 @@ def _audited(recording: Recording, screen: Screen) -> list[str]:
 
 
 def _draw(
-    folder: RunFolder, recording: Recording, figures: dict[str, Any], screen: Screen, result: DriveResult
+    folder: RunFolder, recording: Recording, figures: Figures, screen: Screen, result: DriveResult
 ) -> None:
     file = folder.figure
     if recording.mount:

@@ -18,8 +18,9 @@ from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
 from mount_recorder.parameters import RecorderParameters
-from mount_sim.mount_choice import seat_of
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, without_friction
+
+Figures = dict[str, Any]
 
 _LATE_CONTROL = 0.5  # s, chosen: so much of the excitation may pass before control answers
 _SWITCHINGS = 6  # printed
@@ -32,8 +33,8 @@ def summarise(
     found: Losses,
     drive: DriveSignals,
     parameters: Parameters,
-    run: dict[str, Any],
-) -> dict[str, Any]:
+    run: Figures,
+) -> Figures:
     """Return the figures of a drive from its recording, its audit and its losses; `run` brings the others.
 
     `run`: `scenario`, `mode`, `excitation_start`, `real_time_factor`, `latency_median_s`, `latency_p99_s`,
@@ -77,7 +78,7 @@ def summarise(
     }
 
 
-def summarise_snapshots(snapshots: list[Path], run: dict[str, Any]) -> dict[str, Any]:
+def summarise_snapshots(snapshots: list[Path], run: Figures) -> Figures:
     """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
     figures = {name: run[name] for name in ('scenario', 'mode', 'samples', 'real_time_factor')}
     return {'snapshots': [str(place) for place in snapshots], **figures, **_latencies(run)}
@@ -111,7 +112,7 @@ def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
     )
 
 
-def summary_table(figures: dict[str, Any], found: Losses, mount: str = '') -> Table:
+def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     """Return the figures for people, `mount` before their title; times in s from the first displacement."""
     rows = []
     for name in ('rest', 'contact'):
@@ -136,7 +137,7 @@ def summary_table(figures: dict[str, Any], found: Losses, mount: str = '') -> Ta
         rows += [
             ('damping switched', _switching_text(figures)),
             ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
-            ('friction force error', percent or 'damping was never on'),
+            ('friction force error', percent),
         ]
     rows += found.rows()
     for entry in figures['restarts']:
@@ -151,7 +152,7 @@ def summary_table(figures: dict[str, Any], found: Losses, mount: str = '') -> Ta
     return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
 
-def _restart(restart: Restart, zero: int) -> dict[str, Any]:
+def _restart(restart: Restart, zero: int) -> Figures:
     return {
         'time_s': (restart.time - zero) / 1e9,
         'nodes': [node.name for node in restart.nodes],
@@ -161,7 +162,7 @@ def _restart(restart: Restart, zero: int) -> dict[str, Any]:
     }
 
 
-def _switching_text(figures: dict[str, Any]) -> str:
+def _switching_text(figures: Figures) -> str:
     ons, offs = figures['switch_on_s'], figures['switch_off_s']
     if not ons:
         return 'never on'
@@ -171,7 +172,7 @@ def _switching_text(figures: dict[str, Any]) -> str:
     return f'on from {", ".join(shown[:_SWITCHINGS])}{more}'
 
 
-def _latencies(run: dict[str, Any]) -> dict[str, float | None]:
+def _latencies(run: Figures) -> dict[str, float | None]:
     return {name: _known(run[name]) for name in ('latency_median_s', 'latency_p99_s')}
 
 

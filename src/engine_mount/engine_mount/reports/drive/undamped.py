@@ -7,8 +7,7 @@ electronics, bus and control, which have no say in it.
 import functools
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +40,7 @@ class UndampedError(ValueError):
     """The undamped run cannot be told; the text says why."""
 
 
-@dataclass(frozen=True)
-class Undamped:
+class Undamped(NamedTuple):
     """The undamped mount at the recorded stamps (ns) within the run: m, and m/s^2 of the chassis.
 
     `begin` (ns) is the stamp at which the excitation begins.
@@ -79,8 +77,10 @@ def undamped_of(recording: Recording, parameters: Parameters) -> Undamped:
     name = str(values.get('mount', SimParameters().mount))
     if reason := _UNDAMPED.get(name):
         raise UndampedError(f'this is the undamped run itself: {reason}')
+    # faults and the mount in the seat have no part in what shakes and carries the mount
+    own = {name: value for name, value in values.items() if name not in ('faults', 'mount')}
     try:
-        simulated = _simulated(json.dumps(_of_the_run(values), sort_keys=True, default=str))
+        simulated = _simulated(json.dumps(own, sort_keys=True, default=str))
     except UndampedError:
         raise
     except (ValueError, TypeError, OSError) as error:
@@ -101,17 +101,11 @@ def _recorded(recording: Recording) -> tuple[NDArray[np.int64], dict[str, Array]
     try:
         truth = recording[SIM_TRUTH.name]
         stamps, order = np.unique(truth.stamps, return_index=True)
-        excited = {name: np.asarray(truth[name], np.float64)[order] for name in EXCITED}
+        if len(stamps):
+            return stamps, {name: np.asarray(truth[name], np.float64)[order] for name in EXCITED}
     except (ReadingError, SeriesError):
-        raise UndampedError('no simulator recorded the excitation') from None
-    if not len(stamps):
-        raise UndampedError('no simulator recorded the excitation')
-    return stamps, excited
-
-
-def _of_the_run(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what shakes and carries the mount: faults and the mount in the seat have no part in it."""
-    return {name: value for name, value in values.items() if name not in ('faults', 'mount')}
+        pass
+    raise UndampedError('no simulator recorded the excitation')
 
 
 @functools.lru_cache(maxsize=2)

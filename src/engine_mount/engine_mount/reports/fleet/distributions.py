@@ -1,7 +1,6 @@
 """How a figure is spread over a fleet, before and after the change."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -65,13 +64,12 @@ def spread(pair: Pair) -> Section:
     title = (stem if suffix == pair.unit.lower() else pair.name).replace('_', ' ')
     behind = f' ({unit})' if unit else ''
     edges = _edges(np.concatenate(both), len(pair.before), pair.whole)
-    panels = [
-        Panel('number of rows', list(_curves(_bars(values, edges) for values in both))),
-        Panel(
-            'share of rows at or below', list(_curves(_shares(values, edges) for values in both)), share=0.8
-        ),
-    ]
-    limits = float(edges[0]), float(edges[-1])
+    looks = (('as recorded', COLOURS[0], 'solid'), ('changed', COLOURS[1], DASHED))
+    curves = []
+    for (name, colour, dash), values in zip(looks, both, strict=True):
+        counts = np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
+        curves.append(Curve(name, edges, counts, colour, dash, steps=True, width=1.6))
+    panels, limits = [Panel('number of rows', curves)], (float(edges[0]), float(edges[-1]))
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
     form = '{:g}'.format if pair.whole else number
     rows = [
@@ -88,21 +86,6 @@ def spread(pair: Pair) -> Section:
 
 def _capital(text: str) -> str:
     return f'{text[:1].upper()}{text[1:]}'
-
-
-def _curves(both: Iterator[tuple[Array, Array]]) -> Iterator[Curve]:
-    looks = (('as recorded', COLOURS[0], 'solid'), ('changed', COLOURS[1], DASHED))
-    for (name, colour, dash), (x, y) in zip(looks, both, strict=True):
-        yield Curve(name, x, y, colour, dash, steps=True, width=1.6)
-
-
-def _bars(values: Array, edges: Array) -> tuple[Array, Array]:
-    return edges, np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
-
-
-def _shares(values: Array, edges: Array) -> tuple[Array, Array]:
-    shares = np.arange(len(values) + 1) / len(values)
-    return np.concatenate([edges[:1], np.sort(values), edges[-1:]]), np.append(shares, 1.0)
 
 
 def _edges(values: Array, count: int, whole: bool) -> Array:

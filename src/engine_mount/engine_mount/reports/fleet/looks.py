@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ AT_FIRST = 0.4
 _MM = 1e3
 
 
-@dataclass(frozen=True)
-class Signals:
+class Signals(NamedTuple):
     """Signals (n,) over `time` (s); pairs are as recorded and with the change.
 
     `given`: the recorded displacement (m), to which the controllers answered the `setpoints` (A); where there

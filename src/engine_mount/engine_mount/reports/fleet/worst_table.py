@@ -40,14 +40,14 @@ def worst_section(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> S
     """Return the section about the worst rows by the column `by` of a result with `schema`."""
     if not looks:
         return Section('worst', 'Worst', [f'No row has a number in the column {by}.'])
-    columns = list(_columns(looks, by, schema))
+    found = list(_columns(looks, by, schema))
+    heads, columns = [head for head, _ in found], [cells for _, cells in found]
     rows: list[Sequence[Cell]] = [
-        (str(place), Link(look.name, f'look_{place}'), *(cells[place - 1] for _, cells in columns))
-        for place, look in enumerate(looks, 1)
+        (str(place), Link(look.name, f'look_{place}'), *cells)
+        for place, (look, *cells) in enumerate(zip(looks, *columns, strict=True), 1)
     ]
     words = [f'The largest absolute values of {by}; a → b: as recorded and with the change.']
-    head = ('', 'recording', *(title for title, _ in columns))
-    return Section('worst', 'Worst', words, tables=[Table(head, rows)])
+    return Section('worst', 'Worst', words, tables=[Table(('', 'recording', *heads), rows)])
 
 
 def _columns(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> Iterator[tuple[str, list[str]]]:

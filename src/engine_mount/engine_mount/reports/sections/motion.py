@@ -134,13 +134,10 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         if force is None or subject['true displacement'] is None:
             said.append((subject, 'no mount force was recorded'))
             continue
-        if steady is None:
-            said.append((subject, 'the displacement is not one sine for long enough: no harmonics'))
-            continue
-        stretch, sine = steady
+        stretch, sine = steady or (None, None)
         x, y, time = _together(subject['true displacement'], force, stretch)
-        if len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
-            said.append((subject, 'the mount force was not recorded for long enough there: no harmonics'))
+        if sine is None or len(time) < 2 or (time[-1] - time[0]) * sine.frequency < 3.0:
+            said.append((subject, 'the displacement is not one sine for long enough: no harmonics'))
             continue
         inside, periods = whole_periods(time, sine.frequency, _PERIODS)
         amplitudes = harmonics_of(time[inside], y[inside], sine.frequency)
@@ -230,9 +227,6 @@ def _loop_stretch(subject: Subject) -> tuple[tuple[float, float] | None, str]:
     middle = math.nan if moved is None else moved.peak()[1]
     if math.isnan(middle):
         return None, ''
-    if spans := subject.damping:
-        begin, end = spans[0][0], min(spans[0][1], spans[0][0] + _WITHOUT_PERIOD)
-        return (begin, end), f'the first time with damping on, {begin:.2f} to {end:.2f} s'
     begin, end = middle - 0.5 * _WITHOUT_PERIOD, middle + 0.5 * _WITHOUT_PERIOD
     return (begin, end), f'around the largest displacement, {begin:.2f} to {end:.2f} s'
 

@@ -1,19 +1,16 @@
 """Signals by frequency: sines and their harmonics, the work of a closed loop, spectra, sweeps."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from engine_mount.reports.drawing.chart import Array
 
-_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-_STEPS = 40  # of the search: the bracket shrinks to 5e-9 of itself
 _SEGMENT = 2.048  # s, chosen: lines 0.5 Hz apart tell the modes of the car apart
 
 
-@dataclass(frozen=True)
-class Sine:
+class Sine(NamedTuple):
     """The sine that a signal resembles most: Hz, amplitude in the signal's unit, share of its variance."""
 
     frequency: float
@@ -27,22 +24,21 @@ def dominant_sine(time: Array, values: Array) -> Sine:
     Found in the discrete spectrum, then refined between its lines by least squares; a stretch shorter than a
     period has one too. NaN where there is no variation or are fewer than 8 samples.
     """
+    from scipy.optimize import minimize_scalar  # loads long
+
     if len(values) < 8 or not np.isfinite(values).all() or np.ptp(values) == 0.0:
         return Sine(math.nan, math.nan, math.nan)
     centred = values - values.mean()
     spectrum = np.abs(np.fft.rfft(centred * np.hanning(len(centred))))
     line = 1 + int(np.argmax(spectrum[1:]))
     spacing = 1.0 / (len(values) * float(np.median(np.diff(time))))
-    low, high = max(line - 1.5, 0.25) * spacing, (line + 1.5) * spacing
-    for _ in range(_STEPS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        if _residual(time, values, left) < _residual(time, values, right):
-            high = right
-        else:
-            low = left
-    frequency = 0.5 * (low + high)
+    near = (max(line - 1.5, 0.25) * spacing, (line + 1.5) * spacing)
+    found = minimize_scalar(
+        lambda each: _residual(time, values, each), bounds=near, method='bounded', options={'xatol': 1e-9}
+    )
+    frequency = float(found.x)
     amplitude = float(_amplitudes(time, values, frequency, 1)[0])
-    share = 1.0 - _residual(time, values, frequency) / float(centred @ centred)
+    share = 1.0 - float(found.fun) / float(centred @ centred)
     return Sine(frequency, amplitude, share)
 
 
@@ -99,15 +95,11 @@ def amplitude_density(values: Array, rate: float, segment: float = _SEGMENT) -> 
     """
     if len(values) < 8:
         raise ValueError(f'a spectrum needs at least 8 samples, these are {len(values)}')
+    from scipy.signal import welch  # loads long
+
     length = min(len(values), round(segment * rate))
-    window = np.hanning(length + 1)[:-1]
-    begins = range(0, len(values) - length + 1, max(1, length // 2))
-    power = np.zeros(length // 2 + 1)
-    for begin in begins:
-        piece = values[begin : begin + length]
-        power += np.abs(np.fft.rfft((piece - piece.mean()) * window)) ** 2
-    power *= 2.0 / (len(begins) * rate * float(np.sum(window**2)))
-    return np.fft.rfftfreq(length, 1.0 / rate), np.sqrt(power)
+    frequency, power = welch(values, rate, 'hann', length)
+    return frequency, np.sqrt(power)
 
 
 def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
@@ -122,22 +114,6 @@ def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
     count = math.floor((time[-1] - time[0]) * rate + 0.5) + 1
     grid = time[0] + np.arange(count) / rate
     return grid, np.interp(grid, time, values), max(0, count - len(time))
-
-
-def peak_per_band(frequency: Array, values: Array, width: float = 1.0) -> tuple[Array, Array]:
-    """Return the lower edges of the bands of `width` (Hz) and the highest absolute value in each.
-
-    `frequency` is that of the excitation at each sample; samples where it is unknown do not count, nor do
-    unknown values. Bands without a sample are left out.
-    """
-    edges, groups = _bands(frequency, values, width)
-    return edges, np.array([np.max(np.abs(group)) for group in groups])
-
-
-def rms_per_band(frequency: Array, values: Array, width: float = 1.0) -> tuple[Array, Array]:
-    """Return the same with the rms of the values, their mean over the band included."""
-    edges, groups = _bands(frequency, values, width)
-    return edges, np.array([np.sqrt(np.mean(group**2)) for group in groups])
 
 
 def _amplitudes(time: Array, values: Array, frequency: float, count: int) -> Array:
@@ -157,11 +133,3 @@ def _base(time: Array, frequency: float, count: int) -> Array:
     for number in range(1, count + 1):
         columns += [np.cos(number * angle), np.sin(number * angle)]
     return np.column_stack(columns)
-
-
-def _bands(frequency: Array, values: Array, width: float) -> tuple[Array, list[Array]]:
-    known = np.isfinite(frequency) & np.isfinite(values)
-    numbers = np.floor(frequency[known] / width + 1e-9).astype(int)
-    inside = values[known]
-    bands = np.unique(numbers)
-    return bands * width, [inside[numbers == band] for band in bands]

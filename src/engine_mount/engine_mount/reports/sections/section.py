@@ -1,7 +1,7 @@
 """What a page is made of: sections with words, tables and a chart."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from engine_mount.recordings.difference import time_text
 from engine_mount.reports.drawing.chart import Chart
@@ -9,8 +9,7 @@ from engine_mount.reports.drawing.chart import Chart
 GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(NamedTuple):
     """A text that leads to a section; where it has a chart, to the time `at` (s) in it."""
 
     text: str
@@ -21,8 +20,7 @@ class Link:
 Cell = str | Link
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """One part of the verdict: what it is about, how it is judged, and the text in parts."""
 
     what: str
@@ -30,8 +28,7 @@ class Finding:
     text: Sequence[Cell]
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of text under a head; the first column names the row. `marked` are rows to be seen first."""
 
     head: Sequence[str]
@@ -41,8 +38,7 @@ class Table:
     folded: bool = False  # shown on demand; printed in full
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A part of the page: findings, sentences, commands, a chart, tables, in this order.
 
     `name` is that of its anchor. Neighbours that are `half` stand side by side where the page is wide.

@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ from mount_ros.topics import (
     SIM_MOUNT_FORCE,
     SIM_TRUTH,
 )
-from mount_sim.mount_choice import seat_of
-from mount_sim.plant.mounts import without_friction
+from mount_sim.plant.mounts import seat_of, without_friction
 from mount_sim.plant.ripple import RippleCoil
 
 _TRUTH = SIM_TRUTH.name
@@ -101,8 +100,7 @@ class Run:
     without_friction: str = ''  # why figures of friction are not applicable
 
 
-@dataclass(frozen=True)
-class Tracking:
+class Tracking(NamedTuple):
     """Wanted and true friction force (N) over time (s), the rms error over the peak wanted force."""
 
     time: Array
@@ -321,9 +319,7 @@ class Subject:
                 return Signal(self.seconds(stamps), np.asarray(series[column], np.float64)[places])
             lack = f'{topic} has no message'
         except ReadingError:
-            alike = [name for name in self.recording if name.endswith(f'/{topic}')]
-            more = f'{topic} is there more than once ({", ".join(alike)}); cut out one mount first'
-            lack = more if len(alike) > 1 else f'there is no topic {topic}'
+            lack = f'there is no topic {topic}'
         except SeriesError as error:
             lack = f'not as this project records it: {error}'
         if lack not in self.missing:

@@ -1,6 +1,5 @@
 """Arrays as columns; NPY and NPZ files, and folders of pairs of times and values (as comma2k19 has them)."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, partial
@@ -15,10 +14,9 @@ from engine_mount.signals.formats.measured import TimeBase
 from engine_mount.signals.signal import SignalError
 
 _WIDEST = 256  # columns, chosen: a wider array is an image or a matrix, not signals over time
-_KINDS = {'c': 'complex numbers', 'O': 'objects', 'U': 'text', 'S': 'text'}
 _PAIRS = {'value': 't', 'values': 'times', 'value.npy': 't.npy'}
 """Files of values and of times that belong together in a folder, whose name is that of the signal."""
-_VALUES, _TIMES = '_value.npy', '_t.npy'
+_VALUES = '_value.npy'
 
 
 def leaves_of(name: str, array: Any, notes: list[str], unit: str = '', *, turned: bool = False) -> list[Leaf]:
@@ -31,30 +29,28 @@ def leaves_of(name: str, array: Any, notes: list[str], unit: str = '', *, turned
     if dtype.names:
         parts = {f'{name}.{field}'.lstrip('.'): array[field] for field in dtype.names}
         return [leaf for path, part in parts.items() for leaf in leaves_of(path, part, notes)]
-    what, sides = name or 'the array', [side for side in shape if side > 1]
-    if math.prod(shape) <= 1:
+    what, sides, date = name or 'the array', [side for side in shape if side > 1], dtype.kind == 'M'
+    if 0 in shape or not sides:
         return []
     if dtype.kind not in 'fiubmM':
-        notes.append(f'{what}: {_KINDS.get(dtype.kind, str(dtype))}, left out')
-    elif len(sides) > 2 or (len(sides) == 2 and (len(shape) > 2 or min(shape) > _WIDEST)):
+        notes.append(f'{what}: {dtype} is no number, left out')
+        return []
+    if len(sides) == 1:
+        return [Leaf(name or 'value', lambda: np.asarray(array[...]).reshape(-1), unit, date=date)]
+    if len(shape) > 2 or min(shape) > _WIDEST:
         notes.append(f'{what}: an array of {" x ".join(map(str, shape))} is no signal, left out')
-    elif len(sides) < 2:
-        return [
-            Leaf(name or 'value', lambda: np.asarray(array[...]).reshape(-1), unit, date=dtype.kind == 'M')
-        ]
-    else:
-        rows, columns = shape[::-1] if turned else shape
-        if rows < columns:
-            notes.append(f'{what}: {rows} x {columns}, samples taken along the rows')
-        across = (rows < columns) != turned
-        return [
-            Leaf(
-                f'{name}.{place}'.lstrip('.'), partial(_column, array, place, across), unit,
-                date=dtype.kind == 'M',
-            )
-            for place in range(min(shape))
-        ]  # fmt: skip
-    return []
+        return []
+    rows, columns = shape[::-1] if turned else shape
+    if rows < columns:
+        notes.append(f'{what}: {rows} x {columns}, samples taken along the rows')
+
+    def column(place: int) -> NDArray[Any]:
+        return np.asarray(array[place, :] if (rows < columns) != turned else array[:, place])
+
+    return [
+        Leaf(f'{name}.{place}'.lstrip('.'), partial(column, place), unit, date=date)
+        for place in range(min(shape))
+    ]
 
 
 def open_npy(path: Path, stated: Stated) -> Content:
@@ -90,17 +86,13 @@ def is_array_folder(path: Path) -> bool:
 def open_array_folder(path: Path, stated: Stated) -> Content:
     """Return the columns of all pairs in a folder: `accelerometer.2`, or `IMU/accelerometer.2` from above."""
     notes: list[str] = []
-    found: list[Leaf] = []
+    leaves: list[Leaf] = []
     for name, values, times in _pairs_below(path):
         try:
-            found += _pair(name, values, times, notes)
+            leaves += _pair(name, values, times, notes)
         except SignalError as error:
             notes.append(f'left out: {error}')
-    return Content(path, 'folder of NPY files', 'numpy', found, notes)
-
-
-def _column(array: Any, place: int, across: bool) -> NDArray[Any]:
-    return np.asarray(array[place, :] if across else array[:, place])
+    return Content(path, 'folder of NPY files', 'numpy', leaves, notes)
 
 
 def _pairs_below(path: Path) -> Iterator[tuple[str, Path, Path]]:
@@ -120,7 +112,7 @@ def _times_of(file: Path) -> Path | None:
     """Return the file of times that belongs to a file of values."""
     name = _PAIRS.get(file.name, '')
     if file.name.endswith(_VALUES):
-        name = file.name.removesuffix(_VALUES) + _TIMES
+        name = file.name.removesuffix(_VALUES) + '_t.npy'
     return file.with_name(name) if name and file.with_name(name).is_file() else None
 
 
@@ -130,7 +122,7 @@ def _pair(name: str, values: Path, times: Path, notes: list[str]) -> list[Leaf]:
         raise SignalError(
             f'{times} holds {stamps.dtype} of shape {stamps.shape}; needed are times in s, (samples,)'
         )
-    if not array.shape or array.shape[0] != stamps.size:
+    if array.shape[:1] != (stamps.size,):
         raise SignalError(
             f'{values} holds {array.shape[0] if array.shape else 1} samples, {times.name} beside it '
             f'{stamps.size} times; both must be of equal length'

@@ -1,7 +1,7 @@
 """CAN frames, of logs and within MDF 4 files, decoded by a user's database: a column for each signal."""
 
 from array import array
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable
-from engine_mount.signals.formats.measured import FloatArray, TimeBase
-from engine_mount.signals.signal import SECOND, SignalError
+from engine_mount.signals.formats.measured import TimeBase
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError
 
 Key = tuple[str, int]
 """Bus, and identifier of a message, with `_EXTENDED` in it where that is an extended one."""
@@ -19,6 +19,7 @@ _DATED = 1e8  # s, chosen: no recording is three years long, so that later times
 _NAMED = 5  # unknown identifiers in a note, chosen
 FRAME = 'CAN_DataFrame'
 """The channel of an MDF file that holds frames, a record of what `_MEMBERS` name and others."""
+NO_DATABASE = 'name the database that decodes them with --dbc, as .dbc or .kcd'
 _MEMBERS = ('ID', 'DataLength', 'DataBytes')
 _AT_ONCE = 1 << 17  # frames, chosen: 10 MB of classic frames
 
@@ -31,14 +32,11 @@ class Frames:
 
         with readable(dbc, 'database of CAN messages', 'give a .dbc, .arxml, .kcd or .sym file'):
             messages = cantools.database.load_file(str(dbc), strict=False).messages
-        self._messages: dict[int, Any] = {
-            one.frame_id | _EXTENDED * one.is_extended_frame: one for one in messages
-        }
-        self._path, self._dbc = path, dbc
-        self._times: dict[Key, array[float]] = {}
-        self._payloads: dict[Key, list[bytes]] = {}
+        self._messages = {one.frame_id | _EXTENDED * one.is_extended_frame: one for one in messages}
+        self._path, self._dbc, self._notes = path, dbc, notes
+        self._times: dict[Key, array[float]] = defaultdict(lambda: array('d'))
+        self._payloads: dict[Key, list[bytes]] = defaultdict(list)
         self._unknown: Counter[int] = Counter()
-        self._notes = notes
 
     def add(self, bus: str, identifier: int, extended: bool, time: float, data: bytes) -> None:
         """Add a frame; `time` in s."""
@@ -46,8 +44,8 @@ class Frames:
         if key[1] not in self._messages:
             self._unknown[key[1]] += 1
             return
-        self._times.setdefault(key, array('d')).append(time)
-        self._payloads.setdefault(key, []).append(data)
+        self._times[key].append(time)
+        self._payloads[key].append(data)
 
     def leaves(self, begin: int = 0) -> tuple[list[Leaf], Callable[[Sequence[int]], None]]:
         """Return the signals there are, and what decodes those of chosen numbers.
@@ -71,9 +69,9 @@ class Frames:
         columns: dict[int, tuple[FloatArray, TimeBase]] = {}
 
         def prepare(numbers: Sequence[int]) -> None:
-            for key in dict.fromkeys(places[number][0] for number in numbers):
+            for key in {places[number][0] for number in numbers}:
                 wanted = {number: places[number][1].name for number in numbers if places[number][0] == key}
-                columns.update(self._decoded(key, wanted, begin))
+                columns.update(self._decode(key, wanted, begin))
 
         leaves = []
         for number, (key, signal) in enumerate(places):
@@ -83,9 +81,7 @@ class Frames:
             leaves.append(Leaf(name, read, signal.unit or '', signal.name, clock=clock))
         return leaves, prepare
 
-    def _decoded(
-        self, key: Key, wanted: dict[int, str], begin: int
-    ) -> dict[int, tuple[FloatArray, TimeBase]]:
+    def _decode(self, key: Key, wanted: dict[int, str], begin: int) -> dict[int, tuple[FloatArray, TimeBase]]:
         """Return the wanted signals (number: name) of a message at the times of frames that hold them.
 
         Frames that do not decode are counted.
@@ -106,15 +102,14 @@ class Frames:
                 f'{message.name}: {faulty} of {len(payloads)} frames do not decode ({reason}), left out'
             )
         times, bases = np.array(self._times[key]), dict[bytes, TimeBase]()
-        if all(one[0] > _DATED for one in self._times.values()):
-            first = min(one[0] for one in self._times.values())
+        first = min(one[0] for one in self._times.values())
+        if first > _DATED:
             times, begin = times - first, round(first * SECOND)
         found = {}
         for number, name in wanted.items():
             known = ~np.isnan(columns[name])
-            told = f'times of the frames of {message.name}'
-            base = bases.setdefault(known.tobytes(), TimeBase(times[known], begin, told))
-            found[number] = columns[name][known], base
+            base = TimeBase(times[known], begin, f'times of the frames of {message.name}')
+            found[number] = columns[name][known], bases.setdefault(known.tobytes(), base)
         return found
 
 
@@ -123,9 +118,7 @@ def open_can_log(path: Path, stated: Stated) -> Content:
     from mount_driver.can_library import can
 
     if stated.dbc is None:
-        raise SignalError(
-            f'{path} holds CAN frames; name the database that decodes them with --dbc, as .dbc or .kcd'
-        )
+        raise SignalError(f'{path} holds CAN frames; {NO_DATABASE}')
     notes: list[str] = []
     frames, other = Frames(path, stated.dbc, notes), 0
     suffix = path.suffix.lower()
@@ -146,13 +139,11 @@ def open_can_log(path: Path, stated: Stated) -> Content:
 def is_can_log(path: Path) -> bool:
     """Return whether a text file is a log of CAN frames: ASC and candump share their suffixes with tables."""
     suffix = path.suffix.lower()
-    if suffix in ('.blf', '.trc'):
-        return True
     with path.open('rb') as file:
         lines = file.read(4096).decode('latin-1').splitlines()
     if suffix == '.asc':
         return any(line.startswith(('date ', 'base hex', 'base dec')) for line in lines)
-    return suffix == '.log' and any(line.startswith('(') and '#' in line for line in lines[:5])
+    return suffix != '.log' or any(line.startswith('(') and '#' in line for line in lines[:5])
 
 
 def frames_in_mdf(file: Any, path: Path, dbc: Path, notes: list[str]) -> Frames:
@@ -175,8 +166,7 @@ def frames_in_mdf(file: Any, path: Path, dbc: Path, notes: list[str]) -> Frames:
 def _add_records(frames: Frames, path: Path, signal: Any) -> None:
     samples = signal.samples
     members = {str(name).rpartition('.')[2]: samples[name] for name in samples.dtype.names or ()}
-    missing = [name for name in _MEMBERS if name not in members]
-    if missing:
+    if missing := [name for name in _MEMBERS if name not in members]:
         raise SignalError(
             f'{path}: its {FRAME} has no {", ".join(missing)}; needed are {", ".join(_MEMBERS)} of ASAM MDF '
             'bus logging'

@@ -1,5 +1,6 @@
 """What the opener of a format returns: columns with their headings, read when they are chosen."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -10,25 +11,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.signals.formats.measured import FloatArray, Heading, MeasuredColumn, TimeBase, unique
-from engine_mount.signals.signal import SECOND, SignalError
+from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError
 
 _LONGEST = 200  # letters of a library's own words, chosen
+
+
+class NoNumbersError(SignalError):
+    """A column holds something else than a number for each sample."""
 
 
 @dataclass(frozen=True)
 class Stated:
     """What the caller says of a file that the file does not tell; empty or None: nothing.
 
-    `rate` (Hz) is that of columns without any times. `decimal` is the decimal sign of a text table (`.` or
-    `,`), `delimiter` what separates its cells (one sign, or `blank` for any number of blanks). `dbc` names
-    the database by which CAN frames are decoded.
+    `decimal` is the decimal sign of a text table (`.` or `,`), `delimiter` what separates its cells (one
+    sign, or `blank` for any number of blanks). `dbc` names the database by which CAN frames are decoded.
     """
 
-    rate: float | None = None
     decimal: str = ''
     delimiter: str = ''
     dbc: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Raise `SignalError` for a decimal sign that is none."""
+        if self.decimal not in ('', '.', ','):
+            raise SignalError(f'decimal sign {self.decimal!r} must be . or ,')
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,33 +72,43 @@ class Content:
 
     @cached_property
     def headings(self) -> tuple[Heading, ...]:
-        """The columns of numbers; raises `SignalError` where there are none."""
-        there = unique([
-            Heading(
-                leaf.name, leaf.header or leaf.name, 's' if leaf.date else leaf.unit, 0,
-                timed=leaf.clock is not None, date=leaf.date,
-            )
-            for leaf in self.leaves
-        ])  # fmt: skip
-        found = tuple(one for one in there if self.leaves[one.number].read is not None)
-        lost = [one.header for one in there if one not in found]
+        """The columns of numbers, `#2`, `#3`, ... behind a name that stood before; or `SignalError`."""
+        seen, there, lost = Counter[str](), [], []
+        for number, leaf in enumerate(self.leaves):
+            seen[leaf.name] += 1
+            name = leaf.name if seen[leaf.name] == 1 else f'{leaf.name}#{seen[leaf.name]}'
+            header, unit = leaf.header or leaf.name, 's' if leaf.date else leaf.unit
+            if leaf.read is None:
+                lost.append(header)
+            else:
+                there.append(Heading(name, header, unit, number, leaf.date))
         if lost:
             self.notes.append(f'{", ".join(lost)}: no numbers, left out')
-        if not found:
+        if not there:
             why = ''.join(f'; {note}' for note in dict.fromkeys(self.notes))
             raise SignalError(f'{self.path} holds no columns of numbers; needed are samples over time{why}')
-        return found
+        return tuple(there)
 
-    def load(self, chosen: Sequence[Heading]) -> list[MeasuredColumn]:
-        """Return the chosen columns in this order; raises `SignalError`."""
+    def load(self, chosen: Sequence[Heading], *, named: bool) -> list[MeasuredColumn]:
+        """Return the chosen columns in this order; raises `SignalError`.
+
+        A column that turns out to hold no numbers is refused where it was `named`, else left out and noted.
+        """
+        columns = []
         with readable(self.path, self.format):
             self.prepare([heading.number for heading in chosen])
-            leaves = [(one, self.leaves[one.number]) for one in chosen]
-            return [
-                one.measured(_as_numbers(leaf.read()), leaf.clock() if leaf.clock else None)
-                for one, leaf in leaves
-                if leaf.read is not None
-            ]
+            for heading in chosen:
+                leaf = self.leaves[heading.number]
+                try:
+                    values = leaf.read() if leaf.read else np.zeros(0)
+                except NoNumbersError as error:
+                    if named:
+                        raise
+                    self.notes.append(f'left out: {error}')
+                    continue
+                time = leaf.clock() if leaf.clock else None
+                columns.append(MeasuredColumn(**vars(heading), values=_as_numbers(values), time=time))
+        return columns
 
 
 def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
@@ -107,9 +125,8 @@ def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
             what = f'date number {missing[0]} is missing' if missing.size else 'there is no date'
             raise SignalError(f'{path}, column {header!r}: {what}; fill it in or remove the row')
         numbers = stamps.astype(np.int64)
-        begin = int(numbers[0])
         told = f'dates in column {header!r}, taken as UTC where they name no zone'
-        return TimeBase((numbers - begin) / SECOND, begin, told)
+        return TimeBase((numbers - numbers[0]) / SECOND, int(numbers[0]), told)
 
     return [replace(leaf, clock=clock) for leaf in leaves]
 
@@ -125,12 +142,10 @@ def readable(
     """
     try:
         yield
-    except (SignalError, ImportError):
+    except (SignalError, ImportError, PermissionError):
         raise
     except FileNotFoundError:
         raise SignalError(f'{path} does not exist; give an existing file') from None
-    except PermissionError:
-        raise SignalError(f'{path} may not be read by you; change its permissions') from None
     except Exception as error:
         words = ' '.join(f'{type(error).__name__}: {error}'.split())[:_LONGEST]
         raise SignalError(f'{path} is no readable {kind} ({words}); {remedy}') from error

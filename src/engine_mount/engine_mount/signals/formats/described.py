@@ -21,33 +21,34 @@ def described(measured: Measured) -> list[Facts]:
 
 def columns_table(facts: list[Facts]) -> Table:
     """Return the facts as a table for people."""
-    rows = [
-        (
-            one['name'],
-            one['unit'],
-            str(one['samples']),
-            '' if one['rate'] is None else f'{one["rate"]:.6g} Hz',
-            '' if one['span'] is None else f'{one["span"]:.6g} s',
-            'none' if one['mean'] is None else f'{one["least"]:.4g} .. {one["greatest"]:.4g}',
-            '' if one['mean'] is None else f'{one["mean"]:.4g}',
-        )
-        for one in facts
-    ]
-    return Table('Columns', 'llrrrrr', rows, ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean'))
+    titles = ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean')
+    return Table('Columns', 'llrrrrr', [_row(one) for one in facts], titles)
 
 
 def _facts(column: MeasuredColumn) -> Facts:
     known = column.values[~np.isnan(column.values)]
-    least, mean, greatest = (known.min(), known.mean(), known.max()) if known.size else (None,) * 3
+    sizes = (known.min, known.mean, known.max)
+    least, mean, greatest = (float(size()) if known.size else None for size in sizes)
     times = np.zeros(0) if column.time is None else column.time.times
-    span = float(times[-1] - times[0]) if times.size > 1 else None
-    counts = {'samples': column.values.size, 'missing': column.values.size - known.size}
-    sizes = {'least': least, 'mean': mean, 'greatest': greatest}
+    span = float(times[-1] - times[0]) if len(times) > 1 else None
+    missing = column.values.size - known.size
     return {
-        'name': column.name,
-        'unit': column.unit,
-        **counts,
-        **{name: None if size is None else float(size) for name, size in sizes.items()},
-        'rate': (times.size - 1) / span if span else None,
-        'span': span,
-    }
+        'name': column.name, 'unit': column.unit, 'samples': column.values.size, 'missing': missing,
+        'least': least, 'mean': mean, 'greatest': greatest,
+        'rate': (len(times) - 1) / span if span else None, 'span': span,
+    }  # fmt: skip
+
+
+def _row(one: Facts) -> tuple[str, ...]:
+    rate, span = ('' if one[key] is None else f'{one[key]:.6g}' for key in ('rate', 'span'))
+    sizes = ('none', '')
+    if one['mean'] is not None:
+        sizes = (f'{one["least"]:.4g} .. {one["greatest"]:.4g}', f'{one["mean"]:.4g}')
+    return (
+        one['name'],
+        one['unit'],
+        str(one['samples']),
+        rate and f'{rate} Hz',
+        span and f'{span} s',
+        *sizes,
+    )

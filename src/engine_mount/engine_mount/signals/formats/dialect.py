@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine_mount.signals.formats.cells import ALONE, BLANK, cells_of, kind_of, number_in
+from engine_mount.signals.formats.cells import ALONE, BLANK, cells_of, kind_of
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.signal import SignalError
 
@@ -49,28 +49,13 @@ class Dialect:
         """Share of columns that hold text."""
         return self.kinds.count('text') / len(self.kinds)
 
-    @property
-    def numbers(self) -> list[list[float]]:
-        """What the cells of numbers are under this dialect, -1 for those that are none (to compare two)."""
-        return [
-            [
-                number_in(cell, self.decimal) if kind_of(cell, self.decimal) == kind == 'number' else -1.0
-                for cell, kind in zip(row, self.kinds, strict=False)
-            ]
-            for row in self.rows
-        ]
-
 
 def find_dialect(path: Path, head: Lines, later: Sequence[str], stated: Stated) -> Dialect:
     """Return how to read the lines at the beginning, `head`, and those `later`; raises `SignalError`."""
     lines = [(number, text) for number, text in head if text.strip() and not is_comment(text)]
     later = [text for text in later if text.strip() and not is_comment(text)]
-    delimiters = [_STATED.get(stated.delimiter, stated.delimiter)] if stated.delimiter else list(_NAMES)
-    tried = [
-        _table(lines, later, delimiter, decimal)
-        for delimiter in delimiters
-        for decimal in stated.decimal or '.,'
-    ]
+    delimiters = [_STATED.get(stated.delimiter, stated.delimiter)] if stated.delimiter else _NAMES
+    tried = [_table(lines, later, sign, decimal) for sign in delimiters for decimal in stated.decimal or '.,']
     possible = [dialect for dialect in tried if dialect is not None]
     least = min((dialect.texts for dialect in possible), default=0.0)
     found: list[Dialect] = []
@@ -88,7 +73,8 @@ def find_dialect(path: Path, head: Lines, later: Sequence[str], stated: Stated) 
         raise SignalError(
             f'{path} can be read as {ways}; state --decimal or --delimiter, or export with semicolons'
         )
-    _refuse_thousands(path, found[0], stated)
+    if not stated.decimal:
+        _refuse_thousands(path, found[0])
     return found[0]
 
 
@@ -115,9 +101,15 @@ def _table(lines: Lines, later: Sequence[str], delimiter: str, decimal: str) -> 
     return Dialect(delimiter, decimal, kinds, lines[first][0], tuple(rows[first:]) + tuple(body))
 
 
+def _number_kind(cell: str, decimal: str) -> str:
+    """Return the kind of a cell, signs between thousands allowed, so that these are refused as such."""
+    kind = kind_of(cell, decimal)
+    return 'number' if kind == 'thousands' else kind
+
+
 def _kind(cells: Sequence[str], decimal: str) -> str:
     """Return what most cells of a column are, those without a value aside."""
-    kinds = Counter(kind_of(cell, decimal) for cell in cells)
+    kinds = Counter(_number_kind(cell, decimal) for cell in cells)
     kinds.pop('missing', None)
     return kinds.most_common(1)[0][0] if kinds else 'missing'
 
@@ -125,13 +117,17 @@ def _kind(cells: Sequence[str], decimal: str) -> str:
 def _fits(row: Sequence[str], kinds: Sequence[str], decimal: str) -> bool:
     if len(row) != len(kinds):
         return False
-    pairs = [(kind_of(cell, decimal), kind) for cell, kind in zip(row, kinds, strict=True) if kind != 'text']
-    return all(one in (kind, 'missing') for one, kind in pairs) and any(one == kind for one, kind in pairs)
+    pairs = [(_number_kind(cell, decimal), kind) for cell, kind in zip(row, kinds, strict=True)]
+    own = [(one, kind) for one, kind in pairs if kind != 'text']
+    return all(one in (kind, 'missing') for one, kind in own) and any(one == kind for one, kind in own)
 
 
 def _same(one: Dialect, other: Dialect) -> bool:
     """Return whether two ways give the same columns with the same numbers."""
-    return one.kinds == other.kinds and one.rows == other.rows and one.numbers == other.numbers
+    if one.kinds != other.kinds or one.rows != other.rows:
+        return False
+    cells = {cell for row in one.rows for cell, kind in zip(row, one.kinds, strict=False) if kind == 'number'}
+    return all(kind_of(cell, one.decimal) == kind_of(cell, other.decimal) for cell in cells)
 
 
 def _fits_titles(dialect: Dialect, lines: Lines) -> bool:
@@ -146,18 +142,19 @@ def _fits_titles(dialect: Dialect, lines: Lines) -> bool:
     return len(cells) == len(dialect.kinds) and 'number' not in kinds
 
 
-def _refuse_thousands(path: Path, dialect: Dialect, stated: Stated) -> None:
+def _refuse_thousands(path: Path, dialect: Dialect) -> None:
     """Raise `SignalError` where every decimal sign may group thousands: three digits follow each.
 
     A point is doubted only beside semicolons (chosen): where these stand, the decimal sign is a comma.
     """
-    if stated.decimal or (dialect.decimal == '.' and dialect.delimiter != ';'):
+    if dialect.decimal == '.' and dialect.delimiter != ';':
         return
+    sign, width = dialect.decimal, len(dialect.kinds)
     for place, kind in enumerate(dialect.kinds):
-        cells = [row[place] for row in dialect.rows if len(row) == len(dialect.kinds)]
-        signed = [cell for cell in cells if dialect.decimal in cell]
+        cells = [row[place] for row in dialect.rows if len(row) == width]
+        signed = [cell for cell in cells if sign in cell]
         if kind == 'number' and len(signed) != len(cells) and signed and all(map(_is_grouped, signed)):
-            cell, sign = signed[0], dialect.decimal
+            cell = signed[0]
             raise SignalError(
                 f'{path}: column {place} holds {cell!r} beside whole numbers, which may be '
                 f'{cell.replace(sign, ",."[sign == ","])} or {cell.replace(sign, "")}; state it with '

@@ -30,14 +30,13 @@ def open_excel(path: Path, stated: Stated) -> Content:
         readable(path, 'Excel workbook (.xlsx)'),
         closing(openpyxl.load_workbook(path, read_only=True, data_only=True)) as book,
     ):
-        sheets = {sheet.title: list(_rows(path, sheet)) for sheet in book.worksheets}
-    tables = {
-        title: leaves for title, rows in sheets.items() if (leaves := _leaves(path, title, rows, notes))
-    }
-    if len(tables) > 1:
-        notes.append(f'sheets {", ".join(tables)}: columns are sheet/name')
+        tables = {sheet.title: _leaves(path, sheet, notes) for sheet in book.worksheets}
+    tables = {title: leaves for title, leaves in tables.items() if leaves}
+    if len(tables) == 1:
+        return Content(path, 'Excel', 'openpyxl', with_dates(path, *tables.values()), notes)
+    notes.append(f'sheets {", ".join(tables)}: columns are sheet/name')
     found = [
-        replace(leaf, name=f'{title}/{leaf.name}' if len(tables) > 1 else leaf.name)
+        replace(leaf, name=f'{title}/{leaf.name}')
         for title, leaves in tables.items()
         for leaf in with_dates(path, leaves)
     ]
@@ -45,7 +44,7 @@ def open_excel(path: Path, stated: Stated) -> Content:
 
 
 def _rows(path: Path, sheet: Any) -> Iterator[Row]:
-    """Yield the rows of a sheet; one far cell makes a row as wide as the sheet."""
+    """Yield the rows of a sheet without spaces about texts; one far cell makes a row as wide as the sheet."""
     cells = 0
     for row in sheet.iter_rows(values_only=True):
         cells += len(row)
@@ -54,11 +53,12 @@ def _rows(path: Path, sheet: Any) -> Iterator[Row]:
                 f'{path}, sheet {sheet.title!r} has more than {MOST_CELLS} cells (limit), {len(row)} '
                 'in a row: remove the cells far right, or export the sheet as CSV and read that'
             )
-        yield row
+        yield tuple(cell.strip() if isinstance(cell, str) else cell for cell in row)
 
 
-def _leaves(path: Path, title: str, rows: Sequence[Row], notes: list[str]) -> list[Leaf]:
+def _leaves(path: Path, sheet: Any, notes: list[str]) -> list[Leaf]:
     """Return the columns of a sheet, none where it holds no numbers."""
+    rows, title = list(_rows(path, sheet)), sheet.title
     pairs = zip(rows[:_MOST_TITLES], [*rows[1:], *rows[-1:]], strict=False)
     first = next((number for number, (row, below) in enumerate(pairs) if _is_sample(row, below)), None)
     if first is None:
@@ -68,34 +68,37 @@ def _leaves(path: Path, title: str, rows: Sequence[Row], notes: list[str]) -> li
     titles = above[-1] if above else ()
     if not above:
         notes.append(f'{title}: no titles, the columns are numbered from 0 on')
-    names = [titles[place].strip() if place < len(titles) else '' for place in range(len(rows[first]))]
+    samples = rows[first:]
+    while samples and not any(cell is not None for cell in samples[-1]):
+        samples.pop()
+    width = max(map(len, samples))
+    names = [titles[place] if place < len(titles) else '' for place in range(width)]
     names = [name or str(place) for place, name in enumerate(names)]
-    end = max(number for number, row in enumerate(rows) if any(cell is not None for cell in row)) + 1
     found = []
     for place, (name, header, unit) in enumerate(titles_and_units(names, units)):
-        cell = rows[first][place]
-        if _is_value(cell):
-            read = partial(_values, path, title, rows, range(first, end), place)
-            found.append(Leaf(name, read, unit, header, date=not _is_number(cell)))
-        elif cell is not None:
-            notes.append(f'{title}: column {header!r} holds text, left out')
+        cells = [row[place] if place < len(row) else None for row in samples]
+        kinds = {_is_number(cell) for cell in cells if cell not in _MISSING}
+        known = next((cell for cell in cells if cell not in _MISSING), None)
+        if _is_value(known):
+            read = partial(_values, f'{path}, sheet {title!r}', cells, place, first, _is_number(known))
+            found.append(Leaf(name, read, unit, header, date=not _is_number(known)))
+        elif kinds or header != str(place):
+            why = 'text' if kinds else 'nothing (formulas that were never calculated?)'
+            notes.append(f'{title}: column {header!r} holds {why}, left out')
     return found
 
 
 def _is_sample(row: Row, below: Row) -> bool:
-    """Return whether a row holds numbers wherever the next one does."""
+    """Return whether a row holds numbers as the next one does, and no text above a number."""
     filled, needed = ({place for place, cell in enumerate(one) if _is_value(cell)} for one in (row, below))
-    return any(map(_is_number, row)) and filled >= needed > set()
+    texts = {place for place, cell in enumerate(row) if isinstance(cell, str) and cell not in _MISSING}
+    return any(map(_is_number, row)) and bool(filled & needed) and not texts & needed
 
 
-def _values(path: Path, title: str, rows: Sequence[Row], part: range, place: int) -> np.ndarray:
+def _values(where: str, cells: Sequence[Any], place: int, first: int, number: bool) -> np.ndarray:
     """Return a column of numbers or dates, NaN or NaT where a cell is empty; raises `SignalError`."""
-    number = _is_number(rows[part.start][place])
     found: list[Any] = []
-    for at in part:
-        cell = rows[at][place] if place < len(rows[at]) else None
-        if isinstance(cell, str):
-            cell = cell.strip()
+    for at, cell in enumerate(cells, first + 1):
         if cell in _MISSING:
             found.append(np.nan if number else None)
         elif _is_value(cell) and _is_number(cell) == number:
@@ -104,7 +107,7 @@ def _values(path: Path, title: str, rows: Sequence[Row], part: range, place: int
             from openpyxl.utils import get_column_letter
 
             raise SignalError(
-                f'{path}, sheet {title!r}, cell {get_column_letter(place + 1)}{at + 1}: {str(cell)[:40]!r} '
+                f'{where}, cell {get_column_letter(place + 1)}{at}: {str(cell)[:40]!r} '
                 f'is no {"number" if number else "date"}; enter it as one, or remove the row'
             )
     return np.array(found, np.float64 if number else 'datetime64[us]')

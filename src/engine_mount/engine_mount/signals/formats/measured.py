@@ -1,14 +1,9 @@
 """What any file of measured signals is read into: columns as the file holds them, none converted."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from engine_mount.signals.signal import SignalError
-
-FloatArray = NDArray[np.float64]
+from engine_mount.signals.signal import FloatArray, SignalError
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -45,21 +40,15 @@ class Heading:
     """A column before its values are read: `name` without the unit, `header` as the file writes it.
 
     `name` is the only one of its file: `group/name`, `topic.field` or `Message.Signal` where the format has
-    such. `unit` is as told there or ''. `number` is the place in the file from 0 on. `timed` says that the
-    format itself tells when the column was sampled, `date` that the values are s since 1970 made of a date.
+    such. `unit` is as told there or ''. `number` is the place in the file from 0 on. `date` says that the
+    values are s since 1970 made of a date.
     """
 
     name: str
     header: str
     unit: str
     number: int
-    timed: bool = False
     date: bool = False
-
-    def measured(self, values: FloatArray, time: 'TimeBase | None' = None) -> 'MeasuredColumn':
-        """Return the column with its `values` (n,)."""
-        own = {field.name: getattr(self, field.name) for field in fields(Heading)}
-        return MeasuredColumn(**own, values=values, time=time)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,9 +74,14 @@ class Measured:
     notes: tuple[str, ...] = ()
     others: tuple[Heading, ...] = ()
 
+    @property
+    def headings(self) -> list[Heading]:
+        """All columns of the file."""
+        return [*self.columns.values(), *self.others]
+
     def column(self, wanted: str) -> MeasuredColumn:
         """Return the column meant by `wanted`, see `found`; raises `SignalError` with what there is."""
-        heading = found(wanted, [*self.columns.values(), *self.others], self.provenance.uri)
+        heading = found(wanted, self.headings, self.provenance.uri)
         if heading.name not in self.columns:
             raise SignalError(f'{self.provenance.uri}: column {heading.name!r} was not read; ask for it too')
         return self.columns[heading.name]
@@ -111,20 +105,9 @@ def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
 def listed(headings: Sequence[Heading]) -> str:
     """Return names with units in one line, as many as a person reads."""
     texts = [f'{one.name} [{one.unit}]' if one.unit else one.name for one in headings[:_LISTED]]
-    more = [f'{len(headings) - _LISTED} more'] if len(headings) > _LISTED else []
-    return ', '.join(texts + more) or 'none'
-
-
-def unique(headings: Sequence[Heading]) -> list[Heading]:
-    """Return the headings with `#2`, `#3`, ... behind a name that stood before, numbered from 0 on."""
-    seen: dict[str, int] = {}
-    result = []
-    for number, heading in enumerate(headings):
-        seen[heading.name] = seen.get(heading.name, 0) + 1
-        count = seen[heading.name]
-        name = heading.name if count == 1 else f'{heading.name}#{count}'
-        result.append(replace(heading, name=name, number=number))
-    return result
+    if len(headings) > _LISTED:
+        texts.append(f'{len(headings) - _LISTED} more')
+    return ', '.join(texts) or 'none'
 
 
 def _fitting(wanted: str, headings: Sequence[Heading]) -> Iterator[list[Heading]]:

@@ -3,21 +3,13 @@
 import hashlib
 import importlib
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from engine_mount.signals.formats.bag import is_recording
 from engine_mount.signals.formats.content import Content, Stated
-from engine_mount.signals.formats.measured import (
-    Heading,
-    Measured,
-    MeasuredColumn,
-    Provenance,
-    TimeBase,
-    found,
-)
+from engine_mount.signals.formats.measured import Heading, Measured, Provenance, found
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.stores import local_copy
 
@@ -26,11 +18,18 @@ _READ = (
     '(BLF, ASC, TRC, candump), MCAP and rosbag2'
 )
 _MARKS = {
-    b'\x93NUMPY': 'npy', b'PAR1': 'parquet', b'\x89HDF': 'hdf5', b'MATLAB 7.3': 'hdf5', b'MATLAB 5': 'matlab',
+    b'\x93NUMPY': 'npy', b'PAR1': 'parquet', b'\x89HDF': 'hdf5', b'MATLAB': 'matlab',
     b'MDF ': 'mdf', b'UnFinMF ': 'mdf', b'\x89MCAP': 'bag', b'SQLite format 3': 'bag',
-    b'\xd0\xcf\x11\xe0': 'xls',
 }  # fmt: skip
 """Formats by the first bytes of their files."""
+_REFUSED = {
+    b'\xd0\xcf\x11\xe0': 'is a workbook of Excel before 2007; save it as .xlsx',
+    b'#ROSBAG V2': 'is a bag of ROS 1; convert it with rosbags-convert',
+    b'TDSm': 'is a TDMS file; export it as CSV, or as MDF',
+    b'\x1f\x8b': 'is compressed; unpack it with gunzip',
+    b'version https://git-lfs': 'is a pointer of Git LFS; fetch the file itself with git lfs pull',
+}
+"""What is known but not read, by the first bytes."""
 _SUFFIXES = {
     '.json': 'json', '.jsonl': 'json', '.ndjson': 'json', '.npy': 'npy', '.npz': 'npz', '.parquet': 'parquet',
     '.xlsx': 'excel', '.mf4': 'mdf', '.mdf': 'mdf', '.h5': 'hdf5', '.hdf5': 'hdf5', '.mat': 'matlab',
@@ -48,27 +47,20 @@ def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated |
 
     Raises `SignalError` or `SourceError` with one sentence: file, place, value, what was expected, remedy.
     """
-    stated = stated or Stated()
-    if stated.rate is not None and not (np.isfinite(stated.rate) and stated.rate > 0.0):
-        raise SignalError(f'rate ({stated.rate:g} Hz) must be above 0')
-    if stated.decimal not in ('', '.', ','):
-        raise SignalError(f'decimal sign {stated.decimal!r} must be . or ,')
     with local_copy(str(uri)) as path:
-        content = _opened(path, stated)
+        content = _opened(path, stated or Stated())
         there = content.headings
         chosen = there if columns is None else [found(wanted, there, str(uri)) for wanted in columns]
-        chosen = list(dict.fromkeys(chosen))
-        loaded = _with_rate(content.load(chosen), stated.rate)
+        loaded = content.load(list(dict.fromkeys(chosen)), named=columns is not None)
         digest, size = _hashed(path)
-    missing = {one.name: int(np.count_nonzero(np.isnan(one.values))) for one in loaded}
-    notes = dict.fromkeys(content.notes) | {
-        f'{one.name}: {missing[one.name]} of {one.values.size} samples hold no number': None
-        for one in loaded
-        if missing[one.name]
-    }
+    notes = dict.fromkeys(content.notes)
+    for one in loaded:
+        if missing := np.count_nonzero(np.isnan(one.values)):
+            notes[f'{one.name}: {missing} of {one.values.size} samples hold no number'] = None
+    columns_read = {one.name: one for one in loaded}
+    others = tuple(heading for heading in there if heading.name not in columns_read)
     provenance = Provenance(str(uri), digest, size, content.format, content.reader)
-    others = tuple(heading for heading in there if heading not in chosen)
-    return Measured({one.name: one for one in loaded}, provenance, tuple(notes), others)
+    return Measured(columns_read, provenance, tuple(notes), others)
 
 
 def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ...]:
@@ -79,11 +71,9 @@ def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ..
 
 def is_foreign(path: Path) -> bool:
     """Return whether `path` is a file, or a folder of NPY files, rather than a recording of ROS 2."""
-    if path.is_dir():
-        from engine_mount.signals.formats.arrays import is_array_folder
-
-        return not is_recording(path) and not (path / 'recording').exists() and is_array_folder(path)
-    return path.is_file() and not is_recording(path)
+    if is_recording(path) or (path / 'recording').exists():
+        return False
+    return path.is_file() or _is_array_folder(path)
 
 
 def _opened(path: Path, stated: Stated) -> Content:
@@ -101,15 +91,18 @@ def _kind_of_file(path: Path) -> str:
     with path.open('rb') as file:
         head = file.read(512)
     suffix = path.suffix.lower()
-    kind = next((kind for mark, kind in _MARKS.items() if head.startswith(mark)), '')
     if not head:
         raise SignalError(f'{path} is empty; give a file with samples')
-    if kind == 'xls':
-        raise SignalError(f'{path} is a workbook of Excel before 2007; save it as .xlsx')
+    for mark, why in _REFUSED.items():
+        if head.startswith(mark):
+            raise SignalError(f'{path} {why}')
     if head.startswith(b'PK'):
         return 'npz' if suffix == '.npz' else 'excel'
-    if kind:
-        return kind
+    if head[124:128] in (b'\0\2IM', b'\2\0MI'):  # MATLAB 7.3, whatever its words say
+        return 'hdf5'
+    for mark, kind in _MARKS.items():
+        if head.startswith(mark):
+            return kind
     if is_recording(path):
         return 'bag'
     if suffix in ('.blf', '.trc', '.asc', '.log'):
@@ -124,11 +117,9 @@ def _kind_of_file(path: Path) -> str:
 
 
 def _kind_of_folder(path: Path) -> str:
-    from engine_mount.signals.formats.arrays import is_array_folder
-
     if is_recording(path):
         return 'bag'
-    if is_array_folder(path):
+    if _is_array_folder(path):
         return 'array_folder'
     raise SignalError(
         f'{path} is a folder without a recording; give one file of it, the folder of a rosbag2 recording, or '
@@ -136,14 +127,10 @@ def _kind_of_folder(path: Path) -> str:
     )
 
 
-def _with_rate(columns: list[MeasuredColumn], rate: float | None) -> list[MeasuredColumn]:
-    """Return the columns, those without times on an even grid of the stated rate (Hz)."""
-    if rate is None:
-        return columns
-    sizes = {one.values.size for one in columns}
-    told = f'the stated rate of {rate:g} Hz'
-    bases = {size: TimeBase(np.arange(size) / rate, 0, told) for size in sizes}
-    return [replace(one, time=one.time or bases[one.values.size]) for one in columns]
+def _is_array_folder(path: Path) -> bool:
+    from engine_mount.signals.formats.arrays import is_array_folder
+
+    return is_array_folder(path)
 
 
 def _hashed(path: Path) -> tuple[str, int]:

@@ -46,11 +46,15 @@ def open_text(path: Path, stated: Stated) -> Content:
         places = list(dict.fromkeys([*numbers, *dates]))
         columns.update(zip(places, _read(path, codec, dialect, first, places, titles), strict=True))
 
-    leaves = []
-    for place, (name, header, unit) in enumerate(titles_and_units(titles, units)):
-        kind = dialect.kinds[place]
-        read = None if kind == 'text' else partial(columns.__getitem__, place)
-        leaves.append(Leaf(name, read, unit, header, date=kind == 'date'))
+    leaves = [
+        Leaf(
+            name, None if kind == 'text' else partial(columns.__getitem__, place), unit, header,
+            kind == 'date',
+        )
+        for place, ((name, header, unit), kind) in enumerate(
+            zip(titles_and_units(titles, units), dialect.kinds, strict=False)
+        )
+    ]  # fmt: skip
     notes.insert(0, f'read as {dialect.told}, {codec}')
     return Content(path, 'text table', 'engine_mount.signals', with_dates(path, leaves), notes, prepare)
 
@@ -111,18 +115,13 @@ def _titles(
     commented = _as_commented(comments[-1], dialect) if comments else []
     if commented:
         return commented, [], dialect.first, _left_out(plain)
-    row = dialect.rows[0]
-    width = len(dialect.kinds)
-    counted = [cell for cell in row if cell]
-    fractions = sum(dialect.decimal in cell for other in dialect.rows[1:] for cell in other)
-    if (
-        len(counted) > 1
-        and counted == [str(place) for place in range(len(counted))]
-        and 2 * fractions >= len(dialect.rows[1:])
-    ):  # as an export of a frame without names begins
-        names = [cell or 'index' for cell in row]
-        return names, [], dialect.first + 1, ['the first line is taken as numbers of the columns']
-    names = [str(place) for place in range(width)]
+    names = [str(place) for place in range(len(dialect.kinds))]
+    counted, behind = [cell for cell in dialect.rows[0] if cell], dialect.rows[1:]
+    fractions = sum(dialect.decimal in cell for row in behind for cell in row)
+    if len(counted) > 1 and counted == names[: len(counted)] and 2 * fractions >= len(behind):
+        # as an export of a frame without names begins
+        titles = [cell or 'index' for cell in dialect.rows[0]]
+        return titles, [], dialect.first + 1, ['the first line is taken as numbers of the columns']
     if dialect.kinds[-1] == 'missing':
         names[-1] = ''
     return names, [], dialect.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
@@ -178,22 +177,13 @@ def _read(
     path: Path, codec: str, dialect: Dialect, first: int, places: Sequence[int], titles: Sequence[str]
 ) -> list[NDArray[Any]]:
     """Return the columns at `places`; raises `SignalError` with line, column and cell."""
-    if not places:
-        return []
-    with path.open('rb') as file:
-        ends = sum(block.count(b'\n') + block.count(b'\r') for block in iter(partial(file.read, BLOCK), b''))
-    kinds = ['datetime64[ns]' if dialect.kinds[place] == 'date' else 'float64' for place in places]
-    columns = [np.empty(ends + 1, kind) for kind in kinds]  # what stays empty takes no memory
-    size = 0
-    for number, block in _samples(path, codec, dialect, first):
-        found = _in_bulk(block, dialect, places)
-        found = found or _cell_by_cell(path, number, block, dialect, places, titles)
-        for column, part in zip(columns, found, strict=True):
-            column[size : size + part.size] = part
-        size += found[0].size
-    if not size:
+    blocks = [
+        _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
+        for number, block in (_samples(path, codec, dialect, first) if places else ())
+    ]
+    if places and not blocks:
         raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [column[:size] for column in columns]
+    return [np.concatenate([block[number] for block in blocks]) for number in range(len(places))]
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:
@@ -221,10 +211,8 @@ def _in_bulk(block: str, dialect: Dialect, places: Sequence[int]) -> list[NDArra
         from pyarrow import csv as arrow_csv
     except ImportError:
         return None
-    dates = {place: dialect.kinds[place] == 'date' for place in places}
-    types = {
-        str(place): pyarrow.timestamp('ns') if date else pyarrow.float64() for place, date in dates.items()
-    }
+    number, date = pyarrow.float64(), pyarrow.timestamp('ns')
+    types = {str(place): date if dialect.kinds[place] == 'date' else number for place in places}
     data = block.encode()
     try:
         table = arrow_csv.read_csv(
@@ -242,10 +230,9 @@ def _in_bulk(block: str, dialect: Dialect, places: Sequence[int]) -> list[NDArra
         )  # fmt: skip
     except pyarrow.ArrowInvalid:
         return None
-    columns = {place: table.column(str(place)) for place in places}
-    if any(date and columns[place].null_count for place, date in dates.items()):
+    if any(table.column(name).null_count for name, kind in types.items() if kind == date):
         return None
-    return [column.to_numpy() for column in columns.values()]
+    return [column.to_numpy() for column in table.columns]
 
 
 def _cell_by_cell(
@@ -253,6 +240,7 @@ def _cell_by_cell(
 ) -> list[NDArray[Any]]:
     """Return the columns of a block whose first line has the number `first`; raises `SignalError`."""
     delimiter, width = '\t' if dialect.delimiter == BLANK else dialect.delimiter, len(dialect.kinds)
+    dates = [dialect.kinds[place] == 'date' for place in places]
     rows = []
     for number, line in enumerate(block.split('\n'), first):
         if not line:
@@ -267,8 +255,7 @@ def _cell_by_cell(
                 f'{width}; complete the line or leave it out'
             )
         row = []
-        for place in places:
-            date = dialect.kinds[place] == 'date'
+        for place, date in zip(places, dates, strict=True):
             try:
                 row.append(date_in(cells[place]) if date else number_in(cells[place], dialect.decimal))
             except ValueError:
@@ -276,19 +263,17 @@ def _cell_by_cell(
                 raise SignalError(f'{where}: {_fault(cells[place], dialect, date)}') from None
         rows.append(row)
     return [
-        np.array(column, np.int64).view('datetime64[ns]')
-        if dialect.kinds[place] == 'date'
-        else np.array(column, np.float64)
-        for place, column in zip(places, zip(*rows, strict=True), strict=True)
+        np.array(column, np.int64).view('datetime64[ns]') if date else np.array(column, np.float64)
+        for date, column in zip(dates, zip(*rows, strict=True), strict=True)
     ]
 
 
 def _fault(cell: str, dialect: Dialect, date: bool) -> str:
-    sign, other = ('point', 'comma') if dialect.decimal == '.' else ('comma', 'point')
+    sign, other = ('point', ',') if dialect.decimal == '.' else ('comma', '.')
     remedy = 'correct or remove the line'
-    if not date and kind_of(cell, ',' if dialect.decimal == '.' else '.') == 'number':
-        remedy = f'is the decimal sign a {other}? Say so with --decimal, or correct the line'
-    elif not date and re.sub('[., ]', '', cell).lstrip('+-').isdecimal():
+    if not date and kind_of(cell, other) == 'number':
+        remedy = 'is the decimal sign the other one? Say so with --decimal, or correct the line'
+    elif not date and re.sub("[., ']", '', cell).lstrip('+-').isdecimal():
         remedy = 'export without signs between thousands'
     expected = 'a date such as 2024-05-01 12:00:00.001' if date else f'a number with decimal {sign}'
     return f'{cell!r} is no number; expected is {expected}; {remedy}'

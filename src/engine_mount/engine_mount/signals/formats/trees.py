@@ -13,41 +13,36 @@ from engine_mount.signals.formats.cells import date_in
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
 from engine_mount.signals.signal import SignalError
 
-_DEEPEST = 32  # levels, chosen
+_DEEPEST = 32  # groups of an HDF5 file, whose links may form circles, chosen
 _MOST = 4096  # elements of an array of structs or cells, chosen
 _LONGEST_VECTOR = 64  # numbers of one sample, chosen: a covariance has 36
 _UNITS = ('Units', 'units', 'Unit', 'unit')
 _VALUES = ('Data', 'data', 'values', 'Values')
 """Keys of the samples, to which the unit beside them belongs."""
-_NAMES = ('name', 'Name', 'label')
 _OBJECTS = (
     'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their '
     'numbers: s.time = ts.Time; s.data = ts.Data'
 )
 
 
-def leaves_in(tree: Any, notes: list[str], name: str = '', unit: str = '', depth: int = 0) -> Iterator[Leaf]:
+def leaves_in(tree: Any, notes: list[str], name: str = '', unit: str = '') -> Iterator[Leaf]:
     """Yield the columns of nested mappings, lists of mappings, and arrays."""
-    if depth > _DEEPEST:
-        notes.append(f'{name}: deeper than {_DEEPEST} levels, left out')
-    elif isinstance(tree, Mapping):
-        own = _text(tree, _UNITS) or _text(tree.get('DataInfo'), _UNITS)
+    if isinstance(tree, Mapping):
+        own = _text(tree, *_UNITS) or _text(tree.get('DataInfo'), *_UNITS)
         for key, value in tree.items():
-            path = f'{name}.{key}'.lstrip('.')
-            yield from leaves_in(value, notes, path, own if key in _VALUES else '', depth + 1)
+            yield from leaves_in(value, notes, f'{name}.{key}'.lstrip('.'), own if key in _VALUES else '')
     elif isinstance(tree, list):
         for place, value in enumerate(tree[:_MOST]):
-            path = f'{name}.{_text(value, _NAMES) or place}'.lstrip('.')
-            yield from leaves_in(value, notes, path, depth=depth + 1)
-    elif isinstance(tree, _Turned):
-        yield from leaves_of(
-            name, tree.dataset, notes, unit or _text(tree.dataset.attrs, _UNITS), turned=True
-        )
+            key = _text(value, 'name', 'Name', 'label') or place
+            yield from leaves_in(value, notes, f'{name}.{key}'.lstrip('.'))
     elif hasattr(tree, 'dtype') and hasattr(tree, 'shape'):
-        yield from leaves_of(name, tree, notes, unit or _text(getattr(tree, 'attrs', None), _UNITS))
+        attributes = getattr(tree, 'attrs', {})
+        # HDF5 holds the rows of a matrix of MATLAB as columns
+        turned = 'MATLAB_class' in attributes and len(tree.shape) == 2
+        yield from leaves_of(name, tree, notes, unit or _text(attributes, *_UNITS), turned=turned)
 
 
-def _text(tree: Any, keys: tuple[str, ...]) -> str:
+def _text(tree: Any, *keys: str) -> str:
     """Return the first text at one of the keys, '' where there is none."""
     for key in keys if isinstance(tree, Mapping) else ():
         text = tree.get(key)
@@ -68,11 +63,11 @@ def open_json(path: Path, stated: Stated) -> Content:
     text = path.read_bytes().decode('utf-8-sig', errors='replace')
     notes: list[str] = []
     try:
-        if path.suffix.lower() in ('.jsonl', '.ndjson'):
+        if path.suffix.lower() == '.json':
+            tree = _parsed(path, text, 1)
+        else:
             lines = enumerate(text.splitlines(), 1)
             tree = [_parsed(path, line, number) for number, line in lines if line.strip()]
-        else:
-            tree = _parsed(path, text, 1)
         leaves = list(leaves_in(_as_arrays(tree, '', path), notes))
     except RecursionError:
         raise SignalError(f'{path} is nested too deeply to be signals') from None
@@ -94,41 +89,25 @@ def _as_arrays(tree: Any, name: str, path: Path) -> Any:
     """Return nested values with arrays in place of lists of numbers, of rows and of records."""
     if isinstance(tree, dict):
         return {key: _as_arrays(value, f'{name}.{key}', path) for key, value in tree.items()}
-    if not isinstance(tree, list) or not tree:
+    known = [one for one in tree if one is not None] if isinstance(tree, list) else []
+    if not known:
         return tree
-    known = [one for one in tree if one is not None]
-    if known and all(isinstance(one, dict) for one in known):
-        if _are_signals(known):
+    if all(isinstance(one, dict) for one in known):
+        longest = max((len(one) for one in known[0].values() if isinstance(one, list)), default=0)
+        if longest > max(_LONGEST_VECTOR, len(known)):  # each a signal, rather than a sample of all signals
             return [_as_arrays(one, f'{name}.{place}', path) for place, one in enumerate(tree)]
         keys = dict.fromkeys(key for one in known for key in one)
-        table = {key: [None if one is None else one.get(key) for one in tree] for key in keys}
-        return _as_arrays(table, name, path)
+        return _as_arrays({key: [one.get(key) if one else None for one in tree] for key in keys}, name, path)
     if any(isinstance(one, list) for one in known):
-        return _as_arrays(_columns(tree, name, path), name, path)
-    return _vector(tree, known)
-
-
-def _are_signals(records: list[dict[str, Any]]) -> bool:
-    """Return whether each record is a signal with its samples, rather than one sample of all signals."""
-    longest = max((len(one) for one in records[0].values() if isinstance(one, list)), default=0)
-    return longest > max(_LONGEST_VECTOR, len(records))
-
-
-def _columns(tree: list[Any], name: str, path: Path) -> dict[str, list[Any]]:
-    """Return a list of rows as columns by their numbers; raises `SignalError` for rows that differ."""
-    place, first = next((place, one) for place, one in enumerate(tree) if isinstance(one, list))
-    for number, row in enumerate(tree):
-        if row is not None and (not isinstance(row, list) or len(row) != len(first)):
-            count = f'{len(row)} values' if isinstance(row, list) else repr(row)[:40]
-            raise SignalError(
-                f'{path}, {name.lstrip(".") or "list"}[{number}] holds {count} where row {place} holds '
-                f'{len(first)}; rows must be equally long'
-            )
-    return {str(key): [None if row is None else row[key] for row in tree] for key in range(len(first))}
-
-
-def _vector(tree: list[Any], known: list[Any]) -> np.ndarray:
-    """Return a list as numbers, NaN where it holds null, as dates, or as texts."""
+        width = next(len(one) for one in known if isinstance(one, list))
+        for number, row in enumerate(tree):
+            if row is not None and (not isinstance(row, list) or len(row) != width):
+                count = f'{len(row)} values' if isinstance(row, list) else repr(row)[:40]
+                raise SignalError(
+                    f'{path}, {name.lstrip(".") or "list"}[{number}] holds {count} where others hold '
+                    f'{width}; rows must be equally long'
+                )
+        return _as_arrays({str(key): [one and one[key] for one in tree] for key in range(width)}, name, path)
     try:
         if all(isinstance(one, int | float) for one in known):
             return np.array([np.nan if one is None else one for one in tree], np.float64)
@@ -147,14 +126,10 @@ def open_matlab(path: Path, stated: Stated) -> Content:
     notes: list[str] = []
     with readable(path, 'MATLAB file', 'is it cut off? Save it again'):
         tree = loadmat(str(path), simplify_cells=True)
+    known = {name: value for name, value in tree.items() if not (name[:2] == '__' or _is_opaque(value))}
     if '__function_workspace__' in tree or any(map(_is_opaque, tree.values())):
         notes.append(_OBJECTS)
-    plain = {
-        name: _plain(value)
-        for name, value in tree.items()
-        if not name.startswith('__') and not _is_opaque(value)
-    }
-    return Content(path, 'MATLAB', 'scipy', list(leaves_in(plain, notes)), notes)
+    return Content(path, 'MATLAB', 'scipy', list(leaves_in(_plain(known), notes)), notes)
 
 
 def _is_opaque(value: Any) -> bool:
@@ -169,13 +144,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         return [_plain(one) for one in np.ravel(value)[:_MOST]]
     return value
-
-
-class _Turned:
-    """A matrix of MATLAB, whose rows HDF5 holds as columns."""
-
-    def __init__(self, dataset: Any):
-        self.dataset = dataset
 
 
 def open_hdf5(path: Path, stated: Stated) -> Content:
@@ -194,17 +162,15 @@ def _node(file: Any, node: Any, notes: list[str], depth: int) -> Any:
     if depth > _DEEPEST:
         return None
     if hasattr(node, 'items'):
-        return {
-            key: _node(file, one, notes, depth + 1) for key, one in node.items() if not key.startswith('#')
-        }
-    kind = node.attrs.get('MATLAB_class', b'')
+        groups = {key: one for key, one in node.items() if not key.startswith('#')}
+        return {key: _node(file, one, notes, depth + 1) for key, one in groups.items()}
     if 'MATLAB_empty' in node.attrs or node.shape is None:
         return None
     if 'MATLAB_object_decode' in node.attrs:
         notes.append(_OBJECTS)
         return None
-    if kind == b'char':
+    if node.attrs.get('MATLAB_class') == b'char':
         return ''.join(map(chr, np.asarray(node).reshape(-1)[:_MOST]))
     if node.dtype.kind == 'O' and node.dtype.metadata and 'ref' in node.dtype.metadata:
         return [_node(file, file[one], notes, depth + 1) for one in np.asarray(node).reshape(-1)[:_MOST]]
-    return _Turned(node) if kind and len(node.shape) == 2 else node
+    return node

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
 from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
-from engine_mount.signals.quantities import Quantity, quantity
+from engine_mount.signals.quantities import QUANTITIES, Quantity
 from engine_mount.signals.resampling import has_step, resampled
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_size
 from mount_control.settings import ControlParameters
@@ -71,20 +71,20 @@ def channels_of(
 
     Raises `SignalError` for what no command could follow.
     """
-    notes: dict[str, None] = {}
+    notes: list[str] = []
     found: dict[str, tuple[Times, FloatArray]] = {}
-    for names in ((DISPLACEMENT,), (ENGINE, CHASSIS)):
-        if DISPLACEMENT not in found and all(name in signals for name in names):
-            found[DISPLACEMENT] = _displacement({name: signals[name] for name in names}, notes)
+    ends = (DISPLACEMENT,) if DISPLACEMENT in signals else (ENGINE, CHASSIS)
+    if all(name in signals for name in ends):
+        found[DISPLACEMENT] = _displacement({name: signals[name] for name in ends}, notes)
     for name, signal in signals.items():
         if name == ACCELERATION:
             found[name] = _acceleration(signal, notes)
         elif name != DISPLACEMENT:
             found[name] = _as_sampled(signal)
-    wanted = {name: quantities.get(name) or quantity(name) for name in found}
+    wanted = {name: quantities.get(name) or QUANTITIES[name] for name in found}
     return [
         Channel(recorded_as(wanted[name]), wanted[name].unit.symbol, *pair) for name, pair in found.items()
-    ], list(notes)
+    ], list(dict.fromkeys(notes))
 
 
 def displacement_on_grid(
@@ -108,7 +108,8 @@ def displacement_on_grid(
     values = {
         name: resampled(even, step, (begin - even.begin) / SECOND, count)[:] for name, even in signals.items()
     }
-    notes += [_resampled(even, sample_rate) for even in signals.values() if not has_step(even, step)]
+    for even in signals.values():
+        _note_resampling(even, sample_rate, notes)
     stamps = np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64)
     return stamps, values[DISPLACEMENT] if DISPLACEMENT in values else values[ENGINE] - values[CHASSIS]
 
@@ -118,15 +119,17 @@ def rate_text(sample_rate: float) -> str:
     return f'{sample_rate / 1000.0:g} kHz'
 
 
-def _resampled(even: EvenSignal, sample_rate: float) -> str:
-    return f'{even.name}: resampled from {even.rate:.4g} Hz to {rate_text(sample_rate)}, band-limited'
+def _note_resampling(even: EvenSignal, sample_rate: float, notes: list[str]) -> None:
+    if not has_step(even, 1.0 / sample_rate):
+        rates = f'from {even.rate:.4g} Hz to {rate_text(sample_rate)}'
+        notes.append(f'{even.name}: resampled {rates}, band-limited')
 
 
-def _displacement(signals: Mapping[str, Signal], notes: dict[str, None]) -> tuple[Times, FloatArray]:
+def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> tuple[Times, FloatArray]:
     even = {name: evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE) for name, signal in signals.items()}
-    done = [note for one in even.values() for note in one.notes]
-    stamps, values = displacement_on_grid(even, SAMPLE_RATE, done)
-    notes.update(dict.fromkeys(done))
+    for one in even.values():
+        notes += one.notes
+    stamps, values = displacement_on_grid(even, SAMPLE_RATE, notes)
     check_size(
         ' and '.join(one.name for one in even.values()), values, 1.0 / SAMPLE_RATE,
         ControlParameters().displacement_range, 'm',
@@ -136,13 +139,12 @@ def _displacement(signals: Mapping[str, Signal], notes: dict[str, None]) -> tupl
     return stamps, values
 
 
-def _acceleration(signal: Signal, notes: dict[str, None]) -> tuple[Times, FloatArray]:
+def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
     """Return the acceleration at the rate that its topic has."""
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE_OF_ACCELERATION)
-    notes.update(dict.fromkeys(even.notes))
+    notes += even.notes
+    _note_resampling(even, SAMPLE_RATE, notes)
     step, step_ns = 1.0 / SAMPLE_RATE, sample_time_ns(SAMPLE_RATE)
-    if not has_step(even, step):
-        notes[_resampled(even, SAMPLE_RATE)] = None
     values = resampled(even, step, 0.0, round(even.length / step) + 1)[:]
     return np.arange(even.begin, even.begin + values.size * step_ns, step_ns, dtype=np.int64), values
 

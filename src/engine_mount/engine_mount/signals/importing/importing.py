@@ -1,4 +1,4 @@
-"""Foreign files made into recordings that every command takes."""
+"""A foreign file made into a recording that every command takes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -7,16 +7,14 @@ from typing import Any
 
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.importing.channels import Channel, channels_of
-from engine_mount.signals.importing.parts import join_files, parts_of, within
+from engine_mount.signals.importing.parts import parts_of
 from engine_mount.signals.importing.provenance import SCENARIO, Told, told_mapping, told_provenance
-from engine_mount.signals.importing.reading import read_files
+from engine_mount.signals.importing.reading import read_file
 from engine_mount.signals.importing.writing import write_channels
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
 from engine_mount.signals.selection import Selection
 from engine_mount.signals.signal import SECOND
 from mount_recorder.session import new_session
-
-Progress = Callable[[float, str], None]
 
 _BY_TITLES = Mapping()
 
@@ -34,8 +32,8 @@ class Imported:
     notes: list[str] = field(default_factory=list)
 
 
-def import_files(
-    files: Sequence[str | Path],
+def import_file(
+    file: str | Path,
     out: str | Path,
     *,
     columns: Sequence[str] = (),
@@ -43,56 +41,43 @@ def import_files(
     rate: float | None = None,
     mapping: Mapping | str | Path = _BY_TITLES,
     stated: Stated | None = None,
-    first: float | None = None,
-    last: float | None = None,
-    progress: Progress = lambda share, what: None,
+    progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> Imported:
-    """Write foreign `files`, paths or URIs, as the recording `out`, or one with a number for each part.
+    """Write a foreign `file`, path or URI, as the recording `out`, or one with a number for each part.
 
     `columns` are `[QUANTITY=]COLUMN[:UNIT]` beside what titles say, `time` is the column of the times, `rate`
-    (Hz) that of files without any; `mapping` is a mapping file, or what it holds, `stated` what a reader
-    cannot know. `first` and `last` (s after the first sample of all) choose a part. Raises a `ValueError` or
-    `OSError` with the reason, before anything is written.
+    (Hz) that of a file without any; `mapping` is a mapping file, or what it holds, `stated` what a reader
+    cannot know. Raises a `ValueError` or `OSError` with the reason, before anything is written.
     """
-    name = '' if isinstance(mapping, Mapping) else Path(mapping).name
+    name = '' if isinstance(mapping, Mapping) else str(mapping)
     chosen = mapping if isinstance(mapping, Mapping) else mapping_in_file(Path(mapping))
     chosen = with_options(chosen, columns, time, rate, stated=stated)
     progress(0.0, 'reading')
-    selections = read_files([str(file) for file in files], chosen)
-    signals, notes = join_files([(one.name, one.signals) for one in selections])
-    notes = [note for one in selections for note in one.notes] + notes
-    notes += [note for signal in signals.values() for note in signal.notes]
-    parts, cuts = parts_of(within(signals, first, last))
-    notes += cuts
-    shift = SECOND - parts[0].begin  # a replay dates the force table before the first sample
-    if shift > 0:
-        parts = [part.later(shift) for part in parts]
+    selection = read_file(file, chosen)
+    parts, cuts = parts_of(selection.signals)
+    own = (note for signal in selection.signals.values() for note in signal.notes)
+    notes = [*selection.notes, *own, *cuts]
+    selection = replace(selection, signals={})  # else an hour is held to the end
+    shift = 0
+    if parts[0].begin < SECOND:  # a replay dates the force table before the first sample
+        shift = SECOND - min(parts[0].begin, 0)
         notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
-    quantities = {name: quantity for one in selections for name, quantity in one.quantities.items()}
-    selections, signals = (
-        [replace(one, signals={}) for one in selections],
-        {},
-    )  # else an hour is held to the end
     imported, written = Imported(), []
     while parts:
         part = parts.pop(0)
-        channels, done = channels_of(part.signals, quantities)
+        signals = {name: replace(one, begin=one.begin + shift) for name, one in part.signals.items()}
+        channels, done = channels_of(signals, selection.quantities)
         notes += done
         written.append(channels)
         imported.lengths.append((part.end - part.begin) / SECOND)
-    del part
+    del part, signals
     imported.notes = list(dict.fromkeys(notes))
     for number, channels in enumerate(written):
         folder = Path(out)
         if len(written) > 1:
             folder = folder.with_name(f'{folder.name}_{number + 1}')
-        session = _session(
-            told_mapping(chosen, name),
-            selections,
-            channels,
-            imported.notes,
-            f'{number + 1} of {len(written)}',
-        )
+        piece = f'{number + 1} of {len(written)}'
+        session = _session(told_mapping(chosen, name), selection, channels, imported.notes, piece)
 
         def show(share: float, begun: int = number) -> None:
             progress((begun + share) / len(written), 'writing')
@@ -106,19 +91,14 @@ def import_files(
 
 
 def _session(
-    mapping: Told,
-    files: Sequence[Selection],
-    channels: Sequence[Channel],
-    notes: Sequence[str],
-    piece: str,
+    mapping: Told, selection: Selection, channels: Sequence[Channel], notes: Sequence[str], piece: str
 ) -> dict[str, Any]:
-    places = [(channel.place, channel.unit) for channel in channels]
     imported = {
-        'files': [told_provenance(one.provenance) for one in files],
+        'files': [told_provenance(selection.provenance)],
         'piece': piece,
         'mapping': mapping,
-        'columns': {name: told for one in files for name, told in one.columns.items()},
-        'topics': {f'/{place.topic.name}': f'{place.field} in {unit}' for place, unit in places},
+        'columns': selection.columns,
+        'topics': {f'/{one.place.topic.name}': f'{one.place.field} in {one.unit}' for one in channels},
         'notes': list(notes),
     }
     return new_session({'scenario': SCENARIO, 'mode': 'import', 'imported': imported})

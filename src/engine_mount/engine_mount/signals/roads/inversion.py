@@ -7,22 +7,18 @@ to the chassis cannot be told from one acceleration: all of it within the band i
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE, acceleration_at
-from engine_mount.signals.resampling import resampled
-from engine_mount.signals.roads.driving import BAND, STEP_TIME, Speed
+from engine_mount.signals.roads.driving import BAND, STEP_TIME, doubts_of_speed
 from engine_mount.signals.roads.table import EFFECTIVE
-from engine_mount.signals.signal import FloatArray, Signal, SignalError
-from mount_models.arithmetic.averages import mean
-from mount_sim.excitation.scenario import STEP_TIME as PLANT_STEP
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
+from engine_mount.signals.signal import FloatArray, Signal
+from mount_models.arithmetic.sums import mean
+from mount_sim.plant.vehicle import Vehicle
 
-_SLOWEST = 1.0  # m/s, chosen: slower, many samples fall on one place of the road
 _PAUSE = 4.0  # s, chosen: four periods of the body
 _DIGITS = 7  # of distance and height in m
 
@@ -44,24 +40,12 @@ WEAKEST = 1e-3
 back by the ratio, for there the sensor's noise would be taken for a road."""
 
 
-class Kept(NamedTuple):
-    """What comes of a recorded acceleration when the road that was found is driven: errors within the band.
-
-    `error` is the rms of the difference over that of the recording, `share` the recording's rms in the band
-    over all of it.
-    """
-
-    error: float
-    share: float
-
-
 @dataclass(frozen=True, eq=False)
 class InvertedRoad:
-    """Places and heights (n,) in m; what comes of them when they are driven; sentences."""
+    """Places and heights (n,) in m, and sentences."""
 
     distance: FloatArray
     height: FloatArray
-    kept: Kept
     notes: tuple[str, ...]
 
     def write(self, file: Path, source: str) -> Path:
@@ -75,43 +59,21 @@ class InvertedRoad:
         return file
 
 
-def inverted(signal: Signal, speed: Speed) -> InvertedRoad:
-    """Return the road behind an acceleration of the chassis in m/s^2, upwards, recorded at `speed`.
+def inverted(signal: Signal, speed: float) -> InvertedRoad:
+    """Return the road behind an acceleration of the chassis in m/s^2, upwards, recorded at `speed` (m/s).
 
     Raises `SignalError`.
     """
-    vehicle = Vehicle()
     even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)
     acceleration = acceleration_at(even, STEP_TIME)[:]
     # the road is as if repeated for ever: a pause keeps its end from its beginning
     pause = np.zeros(round(_PAUSE / STEP_TIME))
-    height = road_of(np.concatenate([acceleration, pause]), STEP_TIME, vehicle)
-    seconds = STEP_TIME * (acceleration.size - 1)
-    if speed.values.size > 1 and speed.times[-1] < seconds - 1.0:
-        raise SignalError(
-            f'the speed ends at {speed.times[-1]:g} s, the acceleration at {seconds:g} s; both must begin '
-            'together and be of one length'
-        )
-    if speed.values.min() < _SLOWEST:
-        place = int(np.argmin(speed.values))
-        raise SignalError(
-            f'at {speed.times[place]:g} s the car drives {speed.values[place]:.3g} m/s; at less than '
-            f'{_SLOWEST:g} m/s no road can be told: cut the recording to where it drives'
-        )
-    places = speed.places(STEP_TIME, seconds + 0.5 * STEP_TIME)
-    again = _driven(height, vehicle)[: acceleration.size]
-    wanted, got = (in_band(each - mean(each), STEP_TIME) for each in (acceleration, again))
-    size = float(np.sqrt(np.mean(wanted**2)))
-    result = Kept(float(np.sqrt(np.mean((got - wanted) ** 2))) / size, size / float(np.std(acceleration)))
-    notes = [*even.notes, *speed.notes()]
+    height = road_of(np.concatenate([acceleration, pause]), STEP_TIME, Vehicle())[: acceleration.size]
+    notes = [*even.notes, *doubts_of_speed(speed)]
     reached = 0.4 * even.rate
     if reached < BAND[1]:
         notes.append(f'recorded at {even.rate:.4g} Hz: above {reached:.3g} Hz nothing is known')
-    notes.append(
-        f'driven without friction it gives the acceleration back within {100.0 * result.error:.2g} % rms '
-        f'from {BAND[0]:g} to {BAND[1]:g} Hz, where {100.0 * result.share:.3g} % of its rms lie'
-    )
-    return InvertedRoad(places, height[: acceleration.size], result, tuple(notes))
+    return InvertedRoad(speed * STEP_TIME * np.arange(height.size), height, tuple(notes))
 
 
 def road_of(acceleration: FloatArray, step_time: float, vehicle: Vehicle) -> FloatArray:
@@ -127,12 +89,6 @@ def road_of(acceleration: FloatArray, step_time: float, vehicle: Vehicle) -> Flo
     response = chassis_response(vehicle, frequency[used])
     road[used] = spectrum[used] * fade[used] * _inverse(response)
     return np.asarray(np.fft.irfft(road, acceleration.size), np.float64)
-
-
-def in_band(values: FloatArray, step_time: float) -> FloatArray:
-    """Return what `values` (n,) hold within `BAND`, faded at its edges as the road is."""
-    frequency = np.fft.rfftfreq(values.size, step_time)
-    return np.asarray(np.fft.irfft(np.fft.rfft(values) * _fade(frequency), values.size), np.float64)
 
 
 def chassis_response(vehicle: Vehicle, frequency: FloatArray) -> ComplexArray:
@@ -173,11 +129,3 @@ def _inverse(response: ComplexArray) -> ComplexArray:
     """Return 1 / response, held back where the response is weak (Tikhonov)."""
     floor = WEAKEST * float(np.median(np.abs(response)))
     return np.asarray(np.conj(response) / (np.abs(response) ** 2 + floor**2))
-
-
-def _driven(height: FloatArray, vehicle: Vehicle) -> FloatArray:
-    """Return the chassis acceleration (n,) on the road, driven twice on end: the first time is transient."""
-    twice = EvenSignal('the road', STEP_TIME, np.tile(height, 2), 0)
-    road = resampled(twice, PLANT_STEP, count=2 * height.size * round(STEP_TIME / PLANT_STEP))[:]
-    _, acceleration = ride_without_friction(vehicle, resting_vehicle(), road, np.zeros_like(road), PLANT_STEP)
-    return np.asarray(acceleration[:: round(STEP_TIME / PLANT_STEP)][height.size :])

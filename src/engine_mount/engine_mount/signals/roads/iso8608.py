@@ -1,4 +1,4 @@
-"""Class, unevenness and waviness of a road by ISO 8608, and periodic unevenness such as paving stones.
+"""Class, unevenness and waviness of a road by ISO 8608.
 
 The density Gd(n) of the height over the spatial frequency n is smoothed in octaves up to 0.0312 cycles/m, in
 thirds of them up to 0.25, in twelfths above, and a line Gd(n0) (n / n0)^-w is fitted to it in logarithms from
@@ -24,17 +24,10 @@ _GAUSSIAN = math.sqrt(math.log(2.0) / 2.0) / math.pi
 """Standard deviation over the wavelength that is halved (ISO 16610-21)."""
 _SMOOTHING = ((0.0312, 1), (0.25, 3), (math.inf, 12))  # up to cycles/m: bands to the octave
 _LONGEST_SEGMENT = 256.0  # m, chosen: four averages over a kilometre, and a band below 0.011 cycles/m
-_PARTS = 8  # chosen: so many averages make a peak of chance unlikely
-_PEAK = 5.0  # chosen: of eight averages one in 10^8 is so far above its neighbours
-_NEIGHBOURS = 0.75  # octaves to either side
 _FEWEST_BANDS = 4
 _LONG = 0.3  # cycles/m, chosen: a road's density has its maximum below
 _CLIFF = 30.0  # chosen: no road falls so far below all that it was before, but a filter does
 _FADED = 3  # bands, chosen: what a filter took before that
-_HANN_WIDTH = 1.5  # lines of the spectrum: what a sine is spread over
-_LOWEST_WAVE = 1e-4  # m, chosen: less is not felt beside the roughness of asphalt
-_MOST = 3
-_HARMONIC = 0.06  # chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +79,6 @@ def root_mean_square(profile: RoadProfile) -> float:
     return float(np.sqrt(np.mean(without_long_waves(profile.height, profile.spacing) ** 2)))
 
 
-class Period(NamedTuple):
-    """Something that comes again: wavelength and amplitude (m), density over that of its neighbours."""
-
-    wavelength: float
-    amplitude: float
-    ratio: float
-
-
 class Unevenness(NamedTuple):
     """Gd(n0) (m^3), waviness, class, and what they were taken from: bands (n,) in cycles/m, densities in m^3.
 
@@ -107,7 +92,6 @@ class Unevenness(NamedTuple):
     density: FloatArray
     lowest: float
     highest: float
-    periods: tuple[Period, ...]
 
     @property
     def beyond(self) -> bool:
@@ -124,34 +108,20 @@ class Unevenness(NamedTuple):
             told.append(
                 'too short or too coarse for 0.1 cycles/m: the class continues the line and is a guess'
             )
-        told += [
-            f'periodic unevenness (stones, slabs or joints): {1e3 * period.amplitude:.2g} mm at a wavelength '
-            f'of {period.wavelength:.3g} m, {period.ratio:.0f} times the density around it'
-            for period in self.periods
-        ]
         return tuple(told)
 
 
 def unevenness(profile: RoadProfile) -> Unevenness:
-    """Return class, roughness, waviness and periodic content of a road."""
-    raw, density = _density(profile.height, profile.spacing, min(profile.length, _LONGEST_SEGMENT))
-    frequency, smoothed = _smoothed(raw, density)
+    """Return class, roughness and waviness of a road."""
+    frequency, smoothed = _smoothed(*_density(profile))
     lowest, highest = _held(frequency, smoothed)
     used = (frequency >= max(FITTED[0], lowest)) & (frequency <= min(FITTED[1], highest))
     if np.count_nonzero(used) < _FEWEST_BANDS:
         used = np.ones(frequency.size, bool)
     slope, level = np.polyfit(np.log(frequency[used] / REFERENCE_FREQUENCY), np.log(smoothed[used]), 1)
     roughness = float(np.exp(level))
-    return Unevenness(
-        roughness,
-        -float(slope),
-        class_of(roughness),
-        frequency,
-        smoothed,
-        float(frequency[used][0]),
-        float(frequency[used][-1]),
-        _periods(profile, (roughness, -float(slope)), highest),
-    )
+    first, last = map(float, frequency[used][[0, -1]])
+    return Unevenness(roughness, -float(slope), class_of(roughness), frequency, smoothed, first, last)
 
 
 def _held(frequency: FloatArray, density: FloatArray) -> tuple[float, float]:
@@ -171,12 +141,13 @@ def class_of(roughness: float) -> str:
     return CLASSES[min(max(number, 0), len(CLASSES) - 1)]
 
 
-def _density(height: FloatArray, spacing: float, segment: float) -> tuple[FloatArray, FloatArray]:
+def _density(profile: RoadProfile) -> tuple[FloatArray, FloatArray]:
     """Return spatial frequencies (cycles/m) above 0 and one-sided densities (m^3) of heights."""
     from scipy.signal import welch
 
-    count = min(height.size, max(round(segment / spacing), 16))
-    frequency, density = welch(height, 1.0 / spacing, 'hann', count, detrend='linear')
+    segment = min(profile.length, _LONGEST_SEGMENT)
+    count = min(profile.height.size, max(round(segment / profile.spacing), 16))
+    frequency, density = welch(profile.height, 1.0 / profile.spacing, 'hann', count, detrend='linear')
     return frequency[1:], np.maximum(density[1:], np.finfo(float).tiny)
 
 
@@ -193,27 +164,3 @@ def _smoothed(frequency: FloatArray, density: FloatArray) -> tuple[FloatArray, F
             means.append(density[inside].mean())
         lower = upper
     return np.array(centres), np.array(means)
-
-
-def _periods(profile: RoadProfile, line: tuple[float, float], highest: float) -> tuple[Period, ...]:
-    """Return the waves that stand out of their neighbours and of the fitted line, the highest first.
-
-    At most three up to `highest` (cycles/m), and none that is a harmonic of one of them.
-    """
-    frequency, density = _density(profile.height, profile.spacing, profile.length / _PARTS)
-    fitted = line[0] * (frequency / REFERENCE_FREQUENCY) ** -line[1]
-    amplitude = np.sqrt(2.0 * density * _HANN_WIDTH * frequency[0])
-    found: list[Period] = []
-    for place in np.argsort(-amplitude):
-        inside = 2 <= place < frequency.size - 2 and frequency[place] <= highest
-        if not inside or amplitude[place] < _LOWEST_WAVE or len(found) == _MOST:
-            continue
-        near = np.abs(np.log2(frequency / frequency[place])) < _NEIGHBOURS
-        near[place - 2 : place + 3] = False
-        if density[place] < density[place - 2 : place + 3].max() or np.count_nonzero(near) < _FEWEST_BANDS:
-            continue
-        ratio = density[place] / max(np.median(density[near]), fitted[place])
-        multiple = frequency[place] * np.array([period.wavelength for period in found])
-        if ratio > _PEAK and not np.any(np.abs(multiple - np.round(multiple)) < _HARMONIC):
-            found.append(Period(float(1.0 / frequency[place]), float(amplitude[place]), float(ratio)))
-    return tuple(found)

@@ -1,21 +1,18 @@
-"""A road from a file: a track of OpenCRG, or height over distance in a table; whether it is one, and even."""
+"""A road from a table of height over distance; whether it is one, and even."""
 
-import hashlib
-import math
+import re
 from pathlib import Path
 
 import numpy as np
 
 from engine_mount.signals.even_grid import interpolated
-from engine_mount.signals.formats.measured import Provenance
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name
-from engine_mount.signals.roads.crg import read_track
 from engine_mount.signals.roads.iso8608 import RoadProfile, root_mean_square, unevenness
-from engine_mount.signals.selection import name_of, select_rows
+from engine_mount.signals.selection import select_rows
 from engine_mount.signals.signal import FloatArray, SignalError
-from engine_mount.signals.sources.stores import local_copy
+from engine_mount.signals.sources.uris import name_of
 
 EFFECTIVE = 'effective_height'
 """Name of a height that is already the one behind the tyre."""
@@ -42,65 +39,35 @@ _HEIGHT = Quantity(
 _OPTION = '--column {column}:{unit}, of a distance --distance {column}:{unit}'
 
 
-def road_profile(
-    uri: str | Path,
-    *,
-    lateral: float = 0.0,
-    column: str = '',
-    distance: str = '',
-    spacing: float = math.nan,
-) -> RoadProfile:
+def road_profile(uri: str | Path, *, column: str = '', distance: str = '') -> RoadProfile:
     """Return the road in the file at `uri`, checked, on an even grid.
 
-    `lateral` (m, left of the reference line) chooses the track of an OpenCRG file; `column` and `distance`,
-    NAME or NAME:UNIT, the columns of a table, `spacing` (m) stands in for a distance. Raises `SignalError` or
-    `SourceError` with one sentence.
+    `column` and `distance` are NAME or NAME:UNIT of columns, the distance may be that between two heights
+    (m). Raises `SignalError` or `SourceError` with one sentence.
     """
     if str(uri).lower().endswith('.crg'):
-        with local_copy(str(uri)) as path:
-            content = path.read_bytes()
-        places, heights, notes = read_track(name_of(str(uri)), content, lateral)
-        digest = hashlib.sha256(content).hexdigest()
-        provenance = Provenance(str(uri), digest, len(content), 'OpenCRG', 'engine_mount.signals')
-        return checked_profile(places, heights, provenance, notes)
+        raise SignalError(f'{uri}: OpenCRG is not read; export one track as a table of distance and height')
     measured = read(uri)
-    known = by_name(_HEIGHT) if math.isfinite(spacing) else by_name(_HEIGHT, _DISTANCE)
+    spaced = re.fullmatch(r'[\d.]+(e-?\d+)?', distance)
+    known = by_name(_HEIGHT) if spaced else by_name(_HEIGHT, _DISTANCE)
     said = {'height': column, 'distance': distance}
     texts = [f'{name}={text}' for name, text in said.items() if text and name in known]
     mapping = with_options(Mapping(option=_OPTION), texts, known=known)
     rows = select_rows(measured, mapping, known, known)
-    places = rows.get('distance', spacing * np.arange(rows['height'].size))
+    heights, name = rows['height'], name_of(str(uri))
+    places = float(distance) * np.arange(heights.size) if spaced else rows['distance']
     chosen = mapping.columns['height'].column if column else EFFECTIVE
     effective = chosen == EFFECTIVE and EFFECTIVE in measured.columns
-    return checked_profile(places, rows['height'], measured.provenance, measured.notes, effective=effective)
-
-
-def checked_profile(
-    places: FloatArray,
-    heights: FloatArray,
-    provenance: Provenance,
-    notes: tuple[str, ...] = (),
-    *,
-    effective: bool = False,
-) -> RoadProfile:
-    """Return heights (n,) in m at places (n,) in m as a road; raises `SignalError` where they are none."""
-    name = name_of(provenance.uri)
-    known = np.flatnonzero(np.isfinite(heights))
-    if not known.size:
-        raise SignalError(f'{name} holds no height: all {heights.size} are missing')
-    missing = heights.size - 1 - int(known[-1] - known[0])
-    if missing:
-        notes = (*notes, f'{missing} missing heights at the ends are left out')
-    even, done = _even_places(name, places[known], heights[known])
-    profile = RoadProfile(*even, provenance, (*notes, *done), effective)
+    spacing, even, done = _even_places(name, places, heights)
+    profile = RoadProfile(
+        float(places[0]), spacing, even, measured.provenance, (*measured.notes, *done), effective
+    )
     _check_road(profile)
     return profile
 
 
-def _even_places(
-    name: str, places: FloatArray, heights: FloatArray
-) -> tuple[tuple[float, float, FloatArray], list[str]]:
-    """Return first place, spacing and heights on an even grid, and what was done."""
+def _even_places(name: str, places: FloatArray, heights: FloatArray) -> tuple[float, FloatArray, list[str]]:
+    """Return spacing and heights on an even grid from the first place on, and what was done."""
     steps = np.diff(places)
     back = np.flatnonzero(steps <= 0.0)
     if back.size:
@@ -128,23 +95,21 @@ def _even_places(
     exact = float(length) / (count - 1)
     grid = places[0] + exact * np.arange(count)
     if not wide and np.abs(places - grid).max() <= _ON_THE_GRID * exact:
-        return (float(places[0]), exact, heights), []
+        return exact, heights, []
     note = f'brought from uneven places onto an even grid of {exact:.4g} m'
     if wide:
         note = f'{wide} gaps are interpolated, the longest of {steps[longest]:.3g} m at {places[longest]:g} m'
-    return (float(places[0]), exact, interpolated(places, heights, grid)), [note]
+    return exact, interpolated(places, heights, grid), [note]
 
 
 def _check_road(profile: RoadProfile) -> None:
     """Raise `SignalError` for heights in another unit, and for an acceleration in their place."""
     rms = root_mean_square(profile)
     if not SMOOTHEST <= rms <= ROUGHEST:
-        what, guess = 'rougher than any road', 'are they in mm instead of m?'
-        if rms < SMOOTHEST:
-            what, guess = 'smoother than any road', 'are they in m instead of mm?'
+        what, guess = ('rougher', 'mm instead of m') if rms > ROUGHEST else ('smoother', 'm instead of mm')
         raise SignalError(
-            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} ({SMOOTHEST:g} .. '
-            f'{ROUGHEST:g} m, chosen); {guess}'
+            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} than any road '
+            f'({SMOOTHEST:g} .. {ROUGHEST:g} m, chosen); are they in {guess}?'
         )
     waviness = unevenness(profile).waviness
     if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:

@@ -18,7 +18,6 @@ from engine_mount.signals.sources.source import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'
 LIMIT = '20GB'  # chosen: about a hundred hours of one mount
-SPARE = 1 << 20  # bytes, chosen: left free on the disk beside what is fetched
 
 
 def cache_folder() -> Path:
@@ -76,20 +75,17 @@ def _make_room(folder: Path, name: str, size: int) -> None:
     limit = size_in_bytes(os.environ.get(LIMIT_VARIABLE) or LIMIT)
     copies = []
     for place in folder.iterdir():
-        with contextlib.suppress(FileNotFoundError):  # removed by another process
-            if place.name.rpartition('-')[2].isdecimal():
-                copies.append((place.stat().st_mtime, int(place.name.rpartition('-')[2]), place))
+        with contextlib.suppress(FileNotFoundError, ValueError):  # removed by another process, or no copy
+            copies.append((place.stat().st_mtime, int(place.name.rpartition('-')[2]), place))
     used = sum(bytes_ for _, bytes_, _ in copies)
     for _, bytes_, place in sorted(copies):
-        if used + size <= limit and shutil.disk_usage(folder).free >= size + SPARE:
-            break
-        used -= bytes_ * _remove(place)
-    free = shutil.disk_usage(folder).free
-    if used + size > limit or free < size + SPARE:
+        if used + size > limit:
+            used -= bytes_ * _remove(place)
+    if used + size > limit:
         raise SourceError(
-            f'{name}: {_amount(size)} are needed in {folder}, which may hold {_amount(limit)} and has '
-            f'{_amount(used)} in use, {_amount(free)} are free on its disk; make room, or choose another '
-            f'limit or folder by {LIMIT_VARIABLE} or {FOLDER_VARIABLE}'
+            f'{name}: {size / 1e6:g} MB are needed in {folder}, which may hold {limit / 1e6:g} MB and has '
+            f'{used / 1e6:g} MB in use; make room, or choose another limit or folder by {LIMIT_VARIABLE} or '
+            f'{FOLDER_VARIABLE}'
         )
 
 
@@ -118,8 +114,3 @@ def _lock(place: Path, kind: int) -> int | None:
             return handle
     os.close(handle)
     return None
-
-
-def _amount(size: int) -> str:
-    unit, bytes_ = ('GB', 1e9) if size >= 1e9 else ('MB', 1e6) if size >= 1e6 else ('kB', 1e3)
-    return f'{size / bytes_:.1f} {unit}'

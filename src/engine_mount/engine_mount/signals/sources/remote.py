@@ -7,8 +7,7 @@ import importlib
 import logging
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import nan
 from pathlib import Path, PurePosixPath
@@ -36,7 +35,7 @@ _KEYS = {
     'http': "what the server wants to know stands in fsspec's configuration, as client_kwargs of http",
 }
 _REFUSED = {  # exceptions of the libraries below fsspec, by name: they are not loaded here
-    'DefaultCredentialsError', 'HostKeyNotVerifiable', 'KeyEncryptionError', 'KeyImportError',
+    'DefaultCredentialsError', 'KeyEncryptionError', 'KeyImportError',
     'NoCredentialsError', 'PartialCredentialsError', 'PermissionDenied', 'ProfileNotFound',
     'ClientConnectorCertificateError', 'SFTPPermissionDenied', 'PermissionError',
 }  # fmt: skip
@@ -45,12 +44,8 @@ _OF_THIS_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 _MARKS = ('ETag', 'etag', 'LastModified', 'mtime', 'updated', 'Last-Modified', 'created')
 
 
-@dataclass(frozen=True)
-class RemoteFile:
-    """A file in a store, and its place in the folder that was listed; `.` for the file itself."""
-
-    entry: Entry
-    place: PurePosixPath
+RemoteFile = tuple[Entry, PurePosixPath]
+"""A file in a store, and its place in the folder that was listed; `.` for the file itself."""
 
 
 def list_files(uri: str) -> list[RemoteFile]:
@@ -71,34 +66,30 @@ def remote_copy(uri: str, progress: Progress) -> Iterator[Path]:
     name = name_of(uri)
     if name in ('', '.', '..') or '/' in name:
         name = 'recording'
-    size = sum(file.entry.size for file in files)
+    size = sum(entry.size for entry, _ in files)
 
     def fill(folder: Path) -> None:
         done = 0
-        for file in files:
-            target = folder / name / file.place
+        for entry, place in files:
+            target = folder / name / place
             target.parent.mkdir(parents=True, exist_ok=True)
-            _fetch(file.entry, target, done, size, progress)
-            done += file.entry.size
-        if _key(list_files(uri)) != key:
+            _fetch(entry, target, done, size, progress)
+            done += entry.size
+        if list_files(uri) != files:
             raise SourceError(
                 f'{shown(uri)} was changed while it was fetched; fetch it once its writer has ended'
             )
 
-    key = _key(files)
+    # the same only while all files are as they are
+    key = hashlib.sha256(repr(files).encode()).hexdigest()[:32]
     with cached_copy(key, name, size, fill) as path:
         yield path
-
-
-def _key(files: Sequence[RemoteFile]) -> str:
-    """Return what stays the same only while all files are as they are."""
-    return hashlib.sha256(repr(files).encode()).hexdigest()[:32]
 
 
 def _list_files(uri: str) -> list[RemoteFile]:
     files, path = _filesystem(uri)
     if not uri.endswith('/') and (info := files.info(path))['type'] != 'directory':
-        return [RemoteFile(_entry(uri, info), PurePosixPath('.'))]
+        return [(_entry(uri, info), PurePosixPath('.'))]
     listed = files.find(path, detail=True)
     if not listed and not files.isdir(path):
         raise FileNotFoundError(uri)
@@ -110,8 +101,8 @@ def _list_files(uri: str) -> list[RemoteFile]:
         if info['type'] == 'link' or info.get('size') is None:  # links of SFTP, all files by HTTP
             info = files.info(name)
         if info['type'] != 'directory':
-            found.append(RemoteFile(_entry(inside(uri, str(place)), info), place))
-    return sorted(found, key=lambda file: file.entry.uri)
+            found.append((_entry(inside(uri, str(place)), info), place))
+    return sorted(found, key=lambda file: file[0].uri)
 
 
 def _entry(uri: str, info: dict[str, Any]) -> Entry:
@@ -148,10 +139,12 @@ def _fetch(entry: Entry, target: Path, done: int, size: int, progress: Progress)
 
 def _retry(uri: str, work: Callable[[], T]) -> T:
     """Return what `work` returns, repeated where the connection breaks; raises `SourceError`."""
-    begin = time.monotonic()
-    attempt = 0
-    while True:
-        attempt += 1
+    begin, pause, reason = time.monotonic(), FIRST_PAUSE, ''
+    for attempt in range(ATTEMPTS):
+        if attempt:
+            time.sleep(pause * random.uniform(0.75, 1.0))
+            pause = min(LONGEST_PAUSE, 2.0 * pause)
+            _filesystem_class(uri).clear_instance_cache()  # a connection that broke stays broken
         try:
             return work()
         except (SourceError, MissingLibraryError):
@@ -159,43 +152,34 @@ def _retry(uri: str, work: Callable[[], T]) -> T:
         except Exception as error:  # of any library below fsspec
             if isinstance(error, OSError) and error.errno in _OF_THIS_DISK:
                 raise
-            lasting, reason, remedy = _reason(error, uri)
-            if lasting or attempt >= ATTEMPTS:
-                tries = (
-                    f' ({attempt} attempts within {time.monotonic() - begin:.0f} s)' if attempt > 1 else ''
-                )
-                kind = SourceError if lasting else StoreAwayError
-                raise kind(f'{shown(uri)}: {reason}{tries}; {remedy}') from error
-        pause = min(LONGEST_PAUSE, FIRST_PAUSE * (1 << attempt - 1))
-        time.sleep(pause * random.uniform(0.75, 1.0))
-        _filesystem_class(uri).clear_instance_cache()  # a connection that broke stays broken
+            reason, remedy = _reason(error, uri)
+            if remedy:
+                raise SourceError(f'{shown(uri)}: {reason}; {remedy}') from error
+    raise StoreAwayError(
+        f'{shown(uri)}: {reason} ({ATTEMPTS} attempts within {time.monotonic() - begin:.0f} s); is the store '
+        'reachable from here?'
+    )
 
 
-def _reason(error: BaseException, uri: str) -> tuple[bool, str, str]:
-    """Return whether another attempt would fail as well, the reason in one line, and the remedy."""
+def _reason(error: BaseException, uri: str) -> tuple[str, str]:
+    """Return the reason in one line, and the remedy where another attempt would fail as well, else ''."""
     cause = error.__cause__  # HTTP of fsspec calls `not found` whatever went wrong on the way
-    if isinstance(error, FileNotFoundError) and (
-        isinstance(cause, OSError) or type(cause).__module__.startswith('aiohttp')
-    ):
-        error = cause or error
-    told = str(getattr(error, 'status', None) or getattr(error, 'code', None))
-    status = int(told) if told.isdecimal() else 0
+    missing = isinstance(error, FileNotFoundError)
+    if missing and cause and (isinstance(cause, OSError) or type(cause).__module__.startswith('aiohttp')):
+        error, missing = cause, isinstance(cause, FileNotFoundError)
+    code = str(getattr(error, 'status', None) or getattr(error, 'code', None))
+    status = int(code) if code.isdecimal() else 0
     classes = {kind.__name__ for kind in type(error).__mro__}
     words = f'{type(error).__name__}: {" ".join(str(error).split())}'.removesuffix(': ')
-    if type(error).__name__ == 'HostKeyNotVerifiable':
-        return (
-            True,
-            words,
-            'connect once with ssh, check the key of the host and keep it in ~/.ssh/known_hosts',
-        )
+    if 'HostKeyNotVerifiable' in classes:
+        return words, 'connect once with ssh, check the key of the host and keep it in ~/.ssh/known_hosts'
     if status in (401, 403) or classes & _REFUSED or str(error).startswith('Forbidden'):  # the last of gcsfs
-        return True, words, _KEYS.get(_kind(uri), 'is this folder yours?')
-    if isinstance(error, FileNotFoundError) or status in (404, 410):
-        return True, 'nothing of this name is there', 'engine-mount ls lists a folder'
-    lasting = (NotADirectoryError, IsADirectoryError, ValueError, TypeError)
-    if isinstance(error, lasting) or (400 <= status < 500 and status not in _PASSING_STATUS):
-        return True, words, 'engine-mount ls lists a folder'
-    return False, words, 'is the store reachable from here?'
+        return words, _KEYS.get(_kind(uri), 'is this folder yours?')
+    remedy = 'engine-mount ls lists a folder'
+    if missing or status in (404, 410):
+        return 'nothing of this name is there', remedy
+    lasting = isinstance(error, NotADirectoryError | IsADirectoryError | ValueError | TypeError)
+    return words, remedy if lasting or (400 <= status < 500 and status not in _PASSING_STATUS) else ''
 
 
 def _kind(uri: str) -> str:
@@ -214,7 +198,7 @@ def _filesystem_class(uri: str) -> Any:
         required('gcsfs', what)
     elif kind == 'http':
         required('aiohttp', what)
-    return fsspec.get_filesystem_class(kind if kind != 'http' else scheme_of(uri))
+    return fsspec.get_filesystem_class(scheme_of(uri))
 
 
 def _filesystem(uri: str) -> tuple[Any, str]:

@@ -20,7 +20,7 @@ def entries(uri: str) -> Iterator[Entry]:
     if not is_local(uri):
         from engine_mount.signals.sources.remote import list_files
 
-        yield from (file.entry for file in list_files(uri))
+        yield from (entry for entry, _ in list_files(uri))
         return
     place = local_path(uri)
     for path in sorted(_files(place)) if place.is_dir() else [place]:

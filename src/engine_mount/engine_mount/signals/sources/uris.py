@@ -78,7 +78,9 @@ def shown(uri: str) -> str:
 
 
 def name_of(uri: str) -> str:
-    """Return the last part of the path of a URI: the name of a local copy."""
+    """Return the last part of a path, or of the path of a URI: the name of a local copy."""
+    if not is_uri(uri):
+        return Path(uri).name or uri
     scheme = scheme_of(uri)
     path = uri.partition('://')[2]
     if scheme in _WITH_QUERY:

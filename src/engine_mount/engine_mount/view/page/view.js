@@ -54,7 +54,7 @@ function show() {
   const known = seen.frozen || seen.intervals, end = known.length ? known[known.length - 1][1] : 0;
   const begin = end - Number(element('span').value);
   const visible = known.filter(([, time]) => time >= begin);
-  for (const { spec, lines } of seen.chart.panels) lines.forEach((line, place) => fill(line, spec.keys[place], visible));
+  for (const { spec, lines } of seen.chart.panels) lines.forEach((line, place) => fill(line, spec.curves[place].key, visible));
   seen.chart.shown = [begin, end > begin ? end : begin + 1];
   draw(seen.chart);
 }
@@ -77,19 +77,9 @@ element('pause').onclick = () => {
   say('pause', seen.frozen ? 'go on' : 'pause');
   show();
 };
-element('mark').onclick = async () => {
-  try {
-    const answer = await fetch(`mark${location.search}`, { method: 'POST' });
-    say('answer', (await answer.json()).answer);
-  } catch (error) {
-    say('answer', 'no mark was set: the view is out of reach');
-  }
-  setTimeout(() => say('answer', ''), 5000);
-};
 element('span').onchange = show;
 document.onvisibilitychange = show;
 document.onkeydown = (event) => {
-  if (event.key === 'm') element('mark').click();
   if (event.key === ' ' && event.target === document.body) { event.preventDefault(); element('pause').click(); }
 };
 connect();

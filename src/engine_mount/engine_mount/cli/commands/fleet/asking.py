@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
-from engine_mount.cli.commands.options import JsonFile
-from engine_mount.cli.terminal import note, terminal
+from engine_mount.cli.commands.options import JsonFile, argument, flag, option, write_figures
 
 if TYPE_CHECKING:
     import pyarrow
+
+    from engine_mount.cli.screen import TerminalScreen
 
 QUERY_EPILOG = """Exit code: 0 when the question is answered, 1 with the reason when not.
 
@@ -47,75 +47,57 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
-_FOLDED = 24  # characters, chosen: a text column of a table is at least so wide
+_NUMBERS = ('int', 'uint', 'float', 'double', 'decimal')
 
 
 def query(
-    folder: Annotated[Path, typer.Argument(metavar='FOLDER', help='catalogue or result')],
-    sql: Annotated[str, typer.Argument(metavar='SQL', help='one SELECT')],
-    csv: Annotated[bool, typer.Option('--csv', help='print the answer as CSV')] = False,
-    as_json: Annotated[bool, typer.Option('--json', help='print the answer as JSON: a list of rows')] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='with --csv or --json: write the answer to this file')
-    ] = None,
-    time_limit: Annotated[
-        float, typer.Option(min=0.1, metavar='S', help='a question that takes longer is refused')
-    ] = 60.0,
+    folder: Annotated[Path, argument('catalogue or result', 'FOLDER')],
+    sql: Annotated[str, argument('one SELECT', 'SQL')],
+    csv: Annotated[bool, flag('--csv', 'print the answer as CSV')] = False,
+    as_json: Annotated[bool, flag('--json', 'print the answer as JSON: a list of rows')] = False,
+    time_limit: Annotated[float, option('a question that takes longer is refused', 'S', least=0.1)] = 60.0,
 ) -> None:
     """Ask a catalogue or a result a question in SQL."""
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import query
 
     if csv and as_json:
         raise typer.BadParameter('choose --csv or --json, not both')
-    if out is not None and not (csv or as_json):
-        raise typer.BadParameter('--out goes with --csv or --json')
     answer = query(folder, sql, time_limit)
-    if not (csv or as_json):
-        _print_rows(answer, terminal())
-        return
-    text = _csv(answer) if csv else _json(answer)
-    if out is None:
-        typer.echo(text, nl=False)
+    if csv or as_json:
+        typer.echo(_csv(answer) if csv else _json(answer), nl=False)
     else:
-        out.write_text(text, encoding='utf-8')
+        _print_rows(answer, TerminalScreen())
 
 
 def worst(
-    folder: Annotated[Path, typer.Argument(metavar='FOLDER', help='result or catalogue')],
-    by: Annotated[str, typer.Option(metavar='COLUMN', help='column of numbers')],
-    count: Annotated[int, typer.Option(min=1, metavar='NUMBER', help='how many')] = 10,
+    folder: Annotated[Path, argument('result or catalogue', 'FOLDER')],
+    by: Annotated[str, option('column of numbers', 'COLUMN')],
+    count: Annotated[int, option('how many', least=1)] = 10,
     json_file: JsonFile = None,
 ) -> None:
     """List the recordings with the largest values of a column, with the commands that open them."""
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import worst
-    from engine_mount.reports.json_file import write_json
 
-    console = terminal()
-    found = worst(folder, by, count)
-    rows = []
-    for number, (row, uri, commands) in enumerate(found, 1):
+    screen, rows = TerminalScreen(), []
+    for row, uri, commands in worst(folder, by, count):
         recording, mount, value = row['recording'], row['mount'] or '', row[by]
-        name = f'{recording} {mount}'.rstrip()
-        console.print('\n    '.join([f'{number:>2}. {name}: {by} {value:.6g}', *commands]), soft_wrap=True)
         rows.append({'recording': recording, 'mount': mount, 'uri': uri, by: value, 'commands': commands})
-    if not found:
-        console.print(f'no row has a number in {by}')
-    if json_file is not None:
-        write_json({'by': by, 'worst': rows}, json_file)
+        name = f'{recording} {mount}'.rstrip()
+        screen.say('\n    '.join([f'{len(rows):>2}. {name}: {by} {value:.6g}', *commands]))
+    if not rows:
+        screen.say(f'no row has a number in {by}')
+    write_figures({'by': by, 'worst': rows}, json_file)
 
 
 def report(
-    result: Annotated[Path, typer.Argument(metavar='RESULT', help='folder of fleet replay')],
-    out: Annotated[
-        Path | None, typer.Option(metavar='FILE', help='the page; default: report.html in RESULT')
-    ] = None,
+    result: Annotated[Path, argument('folder of fleet replay', 'RESULT')],
+    out: Annotated[Path | None, option('the page; default: report.html in RESULT', 'FILE')] = None,
     by: Annotated[
-        str,
-        typer.Option(metavar='COLUMN', help='by which the worst are chosen; default: the largest difference'),
+        str, option('by which the worst are chosen; default: the largest difference', 'COLUMN')
     ] = '',
-    count: Annotated[
-        int, typer.Option(min=0, metavar='NUMBER', help='recordings with a picture of their own')
-    ] = 10,
+    count: Annotated[int, option('recordings with a picture of their own', least=0)] = 10,
 ) -> None:
     """Write one page: how figures are spread before and after the change, the worst, what failed and why.
 
@@ -124,37 +106,30 @@ def report(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.page import write_page
 
-    console = terminal()
-    with TerminalScreen(console).bar('replaying the worst', transient=True) as show:
+    screen = TerminalScreen()
+    with screen.bar('replaying the worst', transient=True) as show:
         file, looks = write_page(result, out, by, count, lambda share, name: show(share, detail=name))
     for look in looks:
         if look.reason:
-            note(console, f'{look.name}: no picture: {look.reason}')
-    console.print(f'report     {file}', soft_wrap=True)
+            screen.note(f'{look.name}: no picture: {look.reason}')
+    screen.say(f'report     {file}')
 
 
-def _print_rows(answer: 'pyarrow.Table', console: Console) -> None:
+def _print_rows(answer: 'pyarrow.Table', screen: 'TerminalScreen') -> None:
     """Print rows as a table where it fits the terminal, else one below another."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
 
     names = answer.column_names
     rows = [[_text(value) for value in row.values()] for row in answer.to_pylist()]
-    numbers = [
-        str(kind).startswith(('int', 'uint', 'float', 'double', 'decimal')) for kind in answer.schema.types
-    ]
     widths = [max(map(len, column)) for column in zip(names, *rows, strict=True)]
-    least = [width if number else min(width, _FOLDED) for width, number in zip(widths, numbers, strict=True)]
-    if sum(least) + len(least) <= console.width:
-        sides = ''.join('r' if number else 'l' for number in numbers)
-        TerminalScreen(console).table(Table('', sides, rows, names))
+    if sum(widths) + len(widths) <= screen.console.width:
+        sides = ''.join('r' if str(kind).startswith(_NUMBERS) else 'l' for kind in answer.schema.types)
+        screen.table(Table('', sides, rows, names))
     else:
-        label = max(map(len, names))
         for row in rows:
-            for name, text in zip(names, row, strict=True):
-                console.print(f'{name:<{label}}  {text}', soft_wrap=True)
-            console.print()
-    console.print(f'{len(rows)} row{"" if len(rows) == 1 else "s"}')
+            pairs = zip(names, row, strict=True)
+            screen.say('\n'.join(f'{name:<{max(map(len, names))}}  {text}' for name, text in pairs) + '\n')
+    screen.say(f'{len(rows)} row{"" if len(rows) == 1 else "s"}')
 
 
 def _text(value: Any) -> str:

@@ -2,17 +2,26 @@
 
 import contextlib
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from engine_mount.cli.commands.options import JsonFile, Scheduler, Workers
-from engine_mount.cli.commands.other_than_recorded import OtherThanRecorded, changes_of
-from engine_mount.cli.completion import named
-from engine_mount.cli.terminal import note, terminal
+from engine_mount.cli.commands.options import (
+    JsonFile,
+    OtherThanRecorded,
+    Scheduler,
+    Workers,
+    argument,
+    changes_of,
+    flag,
+    option,
+    write_figures,
+)
+
+if TYPE_CHECKING:
+    from engine_mount.cli.screen import TerminalScreen
 
 EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
 
@@ -49,7 +58,7 @@ Examples:
 
 `engine-mount fleet replay drives --set mount_control.highest_current=2.0 --out result`
 
-`engine-mount fleet replay CATALOGUE --policy switched_viscous --out result --workers 2`
+`engine-mount fleet replay CATALOGUE --set policy=switched_viscous --out result --workers 2`
 
 `engine-mount fleet replay s3://bucket/drives --set continuous_viscous.full_amplitude=0.0006 --out result`
 
@@ -65,36 +74,32 @@ _LISTED = 10  # chosen: recordings that could not be fetched; all of them are in
 
 
 def example(
-    out: Annotated[Path, typer.Option(metavar='FOLDER', help='folder to create')],
-    recordings: Annotated[
-        int, typer.Option(metavar='NUMBER', help='how many of the fleet, spread over it')
-    ] = 200,
+    out: Annotated[Path, option('folder to create', 'FOLDER')],
+    recordings: Annotated[int, option('how many of the fleet, spread over it')] = 200,
     seconds: Annotated[
-        float,
-        typer.Option(metavar='S', help='length of the excitation of each drive, a sweep at most its own'),
+        float, option('length of the excitation of each drive, a sweep at most its own', 'S')
     ] = 4.0,
-    workers: Annotated[int, typer.Option(min=0, metavar='NUMBER', help='processes; 0: one on each core')] = 0,
+    workers: Workers = 0,
 ) -> None:
     """Make recordings of short simulated drives, a few of them damaged, to try a fleet on."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.example import make_example
 
-    console = terminal()
-    failed = 0
-    with TerminalScreen(console).bar('driving') as show:
+    screen, failed = TerminalScreen(), 0
+    with screen.bar('driving') as show:
         for count, done in enumerate(make_example(out, recordings, seconds, workers), 1):
             show(count / recordings, detail=f'{count} of {recordings}')
             if done.result is None:
                 failed += 1
-                note(console, done.reason)
-    console.print(f'recordings {recordings - failed} in {out}', soft_wrap=True)
+                screen.note(done.reason)
+    screen.say(f'recordings {recordings - failed} in {out}')
     if failed:
         raise typer.Exit(1)
 
 
 def index(
-    uris: Annotated[list[str], typer.Argument(metavar='URI...', help='folders or recordings, paths or URIs')],
-    out: Annotated[Path, typer.Option(metavar='CATALOGUE', help='folder to make or to bring up to date')],
+    uris: Annotated[list[str], argument('folders or recordings, paths or URIs', 'URI...')],
+    out: Annotated[Path, option('folder to make or to bring up to date', 'CATALOGUE')],
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
     json_file: JsonFile = None,
@@ -102,85 +107,78 @@ def index(
     """Write what each recording is and holds into a catalogue: a row for it, and one for each event."""
     from time import monotonic
 
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.catalogue import index
-    from engine_mount.reports.json_file import write_json
 
-    console, began = terminal(), monotonic()
-    with _resumable(console, 'indexing', transient=True) as progress:
+    screen, began = TerminalScreen(), monotonic()
+    with _resumable(screen, 'indexing', transient=True) as progress:
         found = index(uris, out, progress, scheduler=scheduler, workers=workers)
     counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'unreadable')}
     for name, count in {**counts, 'catalogue': out}.items():
-        console.print(f'{name:<12}{count}', soft_wrap=True)
+        screen.say(f'{name:<12}{count}')
     if found.unreadable:
-        what = f'{found.unreadable} {"is" if found.unreadable == 1 else "are"} unreadable'
-        _note_question(console, what, out, "recordings where kind = 'unreadable'")
-    if json_file is not None:
-        figures = {'catalogue': str(out), 'rows': found.recordings.num_rows, **counts}
-        write_json(figures | {'wall_s': monotonic() - began}, json_file)
+        _note_question(screen, f'{found.unreadable} unreadable', out, "recordings where kind = 'unreadable'")
+    figures = {'catalogue': str(out), 'rows': found.recordings.num_rows, **counts}
+    write_figures(figures | {'wall_s': monotonic() - began}, json_file)
 
 
 def replay(
     places: Annotated[
         list[str],
-        typer.Argument(
-            metavar='CATALOGUE|URI...', help='catalogues, or folders and URIs below which recordings lie'
-        ),
+        argument('catalogues, or folders and URIs below which recordings lie', 'CATALOGUE|URI...'),
     ],
-    out: Annotated[Path, typer.Option(metavar='RESULT', help='folder of the result, new or interrupted')],
+    out: Annotated[Path, option('folder of the result, new or interrupted', 'RESULT')],
     settings: OtherThanRecorded = None,
-    policy: Annotated[
-        str, typer.Option(metavar='NAME', help='another policy', autocompletion=named('policy'))
-    ] = '',
     closed_loop: Annotated[
-        bool,
-        typer.Option('--closed-loop', help='simulate engine and mount anew over recorded accelerations'),
+        bool, flag('--closed-loop', 'simulate engine and mount anew over recorded accelerations')
     ] = False,
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
     json_file: JsonFile = None,
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.drives.replay import parsed_changes
     from engine_mount.fleet.replay import replay_fleet
-    from engine_mount.reports.json_file import write_json
 
-    changes = changes_of([*(settings or []), *([f'policy={policy}'] if policy else [])])
+    changes = parsed_changes(changes_of(settings))
     if not changes:
-        raise typer.BadParameter('say what is to be other than recorded, with --set or --policy')
-    console = terminal()
-    with _resumable(console, 'replaying') as progress:
-        options = {'scheduler': scheduler, 'workers': workers}
-        done = replay_fleet(places, changes, out, closed_loop, progress, **options)
+        raise typer.BadParameter('say what is to be other than recorded: --set NAME=VALUE')
+    screen = TerminalScreen()
+    with _resumable(screen, 'replaying') as progress:
+        done = replay_fleet(places, changes, out, closed_loop, progress, scheduler=scheduler, workers=workers)
     figures = done.figures
     before = f' ({figures["done_before"]} done before)' if figures['done_before'] else ''
     others = f'{figures["another_policy"]} with another policy, ' if figures['another_policy'] else ''
-    lines = [
+    screen.say(
         f'recordings {figures["recordings"]}{before}: {figures["replayed"]} replayed, {others}'
-        f'{figures["failed"]} failed',
+        f'{figures["failed"]} failed'
+    )
+    screen.say(
         f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
-        f'{figures["real_time_factor"]:.0f} x real time',
-        f'result     {out}',
-    ]
-    console.print('\n'.join(lines), soft_wrap=True)
+        f'{figures["real_time_factor"]:.0f} x real time'
+    )
+    screen.say(f'result     {out}')
     if figures['failed']:
-        _note_question(console, f'{figures["failed"]} failed', out, "result where outcome = 'failed'")
-    if json_file is not None:
-        write_json(figures, json_file)
+        _note_question(screen, f'{figures["failed"]} failed', out, "result where outcome = 'failed'")
+    write_figures(figures, json_file)
     for row in done.not_fetched[:_LISTED]:
-        note(console, f'{row["recording"]} (the same command tries it again): {row["reason"]}')
+        screen.note(f'{row["recording"]} (the same command tries it again): {row["reason"]}')
     if (more := len(done.not_fetched) - _LISTED) > 0:
-        note(console, f'{more} more, whose rows tell the reason; the same command tries them again')
+        screen.note(f'{more} more, whose rows tell the reason; the same command tries them again')
     if done.not_fetched:
         raise typer.Exit(1)
 
 
 @contextlib.contextmanager
-def _resumable(console: Console, what: str, **options: Any) -> Iterator[Any]:
+def _resumable(
+    screen: 'TerminalScreen', what: str, *, transient: bool = False
+) -> Iterator[Callable[[int, int], None]]:
     """Give what shows the progress of a job, and say after an interrupt or a lost cluster how it goes on."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.runner import SchedulerLostError
     from mount_bringup.graph.shutdown import Interrupted
 
-    with TerminalScreen(console).bar(what, **options) as show:
+    with screen.bar(what, transient=transient) as show:
         try:
             yield lambda done, of: show(done / max(of, 1), detail=f'{done} of {of} recordings')
         except KeyboardInterrupt:
@@ -189,7 +187,7 @@ def _resumable(console: Console, what: str, **options: Any) -> Iterator[Any]:
             raise SchedulerLostError(f'{error}; with this cluster or another one {_GOES_ON}') from None
 
 
-def _note_question(console: Console, what: str, folder: Path, rows: str) -> None:
+def _note_question(screen: 'TerminalScreen', what: str, folder: Path, rows: str) -> None:
     """Print the command that lists the recordings of these rows, each with its reason."""
     sql = f'select recording, reason from {rows}'
-    note(console, f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')
+    screen.note(f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')

@@ -1,25 +1,25 @@
-"""All faults by name: what each means, and what it changes while it is present."""
+"""All faults by name: what each changes, and which are present when, told before a run or injected."""
 
 import math
+import re
 import zlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from mount_driver.bus import Frame
 from mount_driver.can_library import can
-from mount_driver.protocol import MountCodec, Status
+from mount_driver.protocol import MountCodec
+from mount_models.quantity import ParameterError
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
-from mount_sim.electronics.electronics import Reading
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
 
-if TYPE_CHECKING:
-    from mount_sim.plant.plant import Plant
-
 Frames = list[can.Message]
+Change = Callable[['Fault', Any], Any] | None
+"""What becomes of a value while a fault is present."""
 
 
 class Kind(NamedTuple):
@@ -32,12 +32,12 @@ class Kind(NamedTuple):
     """
 
     meaning: str
-    reading: 'Callable[[Fault, Reading], Reading] | None' = None
-    counters: 'Callable[[Fault, tuple[int, int]], tuple[int, int]] | None' = None
-    frames: 'Callable[[Fault, Frames], Frames] | None' = None
-    status: 'Callable[[Fault, Status], Status] | None' = None
-    current: 'Callable[[Fault, float], float] | None' = None
-    plant: 'Callable[[Fault, Plant], Plant] | None' = None
+    reading: Change = None
+    counters: Change = None
+    frames: Change = None
+    status: Change = None
+    current: Change = None
+    plant: Change = None
     deaf: bool = False
     """Setpoints are not received."""
     duration: float = math.inf
@@ -121,12 +121,7 @@ _WIDTH_SAMPLE, _WIDTH_MICROSECOND = 1 << 16, 1 << 32
 _US = 1e6  # us per s
 
 
-def _none_sent(fault: Fault, frames: Frames) -> Frames:
-    """Send no frame."""
-    return []
-
-
-def _bus_off(fault: Fault, frames: Frames) -> Frames:
+def _bus_off(fault, frames):
     """Send the error frame of a controller that is bus off, then nothing.
 
     An error frame is local to a controller and no bus carries it. SocketCAN shows the controller's own to the
@@ -137,32 +132,27 @@ def _bus_off(fault: Fault, frames: Frames) -> Frames:
     return [error] if fault.count == 1 else []
 
 
-def _lost(share: float) -> Callable[[Fault, Frames], Frames]:
+def _lost(share):
     """Lose this share of the frames, at random."""
 
-    def some(fault: Fault, frames: Frames) -> Frames:
+    def some(fault, frames):
         arriving = fault.random.uniform(len(frames)) >= share
         return [frame for frame, arrives in zip(frames, arriving, strict=True) if arrives]
 
     return some
 
 
-def _delayed(samples: int) -> Callable[[Fault, Frames], Frames]:
+def _delayed(samples):
     """Delay frames by some samples; those under way when the fault ends are lost."""
 
-    def late(fault: Fault, frames: Frames) -> Frames:
+    def late(fault, frames):
         fault.past.append(_copies(frames))
         return fault.past.popleft() if len(fault.past) > samples else []
 
     return late
 
 
-def _duplicated(fault: Fault, frames: Frames) -> Frames:
-    """Send each frame twice."""
-    return [frame for frame in frames for _ in range(2)]
-
-
-def _reordered(fault: Fault, frames: Frames) -> Frames:
+def _reordered(fault, frames):
     """Send the frames of every tenth sample after those of the next."""
     fault.count += 1
     if fault.count % _REORDERED == 0:
@@ -171,19 +161,19 @@ def _reordered(fault: Fault, frames: Frames) -> Frames:
     return frames + fault.past.popleft() if fault.past else frames
 
 
-def _frozen_counter(fault: Fault, frames: Frames) -> Frames:
+def _frozen_counter(fault, frames):
     """Give all measurements the same alive counter, with a check sum that is right."""
     for frame in frames:
         if frame.arbitration_id == _CODEC.measurement.frame_id:
-            alive, measurement = _CODEC.decode_measurement(frame.data)
+            alive, measurement = _CODEC.measurement.decode(frame.data)
             frame.data = _CODEC.encode_measurement(measurement, int(fault.keep(alive)))
     return frames
 
 
-def _damaged(damage: Callable[[can.Message], None]) -> Callable[[Fault, Frames], Frames]:
+def _damaged(damage):
     """Damage the frames of every third sample."""
 
-    def some(fault: Fault, frames: Frames) -> Frames:
+    def some(fault, frames):
         fault.count += 1
         if fault.count % _EVERY == 1:
             for frame in frames:
@@ -193,37 +183,36 @@ def _damaged(damage: Callable[[can.Message], None]) -> Callable[[Fault, Frames],
     return some
 
 
-def _change_byte(frame: can.Message) -> None:
-    """Change the last byte."""
+def _change_last_byte(frame):
     frame.data[-1] ^= 0xFF
 
 
-def _shorten(frame: can.Message) -> None:
+def _shorten(frame):
     """Remove the last bytes."""
     frame.data = frame.data[:-_LENGTH_LESS]
     frame.dlc = len(frame.data)
 
 
-def _replayed(fault: Fault, frames: Frames) -> Frames:
+def _replayed(fault, frames):
     """Send after each frame one of 100 samples ago once more, as it was."""
     fault.past.append(_copies(frames))
     return frames + fault.past.popleft() if len(fault.past) > _REPLAYED else frames
 
 
-def _babbling(fault: Fault, frames: Frames) -> Frames:
+def _babbling(fault, frames):
     """Add frames of another node, with identifiers that are none of this mount's."""
     numbers = fault.random.uniform(_BABBLED)
     foreign = (Frame(_FOREIGN[int(number * len(_FOREIGN))], number.tobytes()) for number in numbers)
     return [*frames, *foreign]
 
 
-def _drifting_clock(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _drifting_clock(fault, counters):
     """Let the microsecond counter run 1000 ppm too fast."""
     sample, microseconds = counters
     return sample, microseconds + round(_CLOCK_DRIFT * (microseconds - round(fault.begin * _US)))
 
 
-def _wrapping_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _wrapping_counters(fault, counters):
     """Let both counters go through their highest value to 0 when the fault begins."""
     sample, microseconds = counters
     wrap = round(fault.begin * fault.sample_rate)
@@ -233,7 +222,7 @@ def _wrapping_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, in
     )
 
 
-def _reset_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
+def _reset_counters(fault, counters):
     """Start both counters from 0 when the power is back; until then no setpoint is received."""
     back = round(fault.end * fault.sample_rate)
     after = counters[0] - back
@@ -241,7 +230,7 @@ def _reset_counters(fault: Fault, counters: tuple[int, int]) -> tuple[int, int]:
     return counters if fault.deaf else (after, round(after / fault.sample_rate * _US))
 
 
-def _copies(frames: Frames) -> Frames:
+def _copies(frames):
     """Return the frames as they are now, which no later change of the given ones changes."""
     return [Frame(frame.arbitration_id, bytearray(frame.data)) for frame in frames]
 
@@ -250,27 +239,27 @@ def _copies(frames: Frames) -> Frames:
 
 
 def _displacement(meaning: str, change: Callable[[Fault, float], float]) -> Kind:
-    def reading(fault: Fault, reading: Reading) -> Reading:
+    def reading(fault, reading):
         return reading._replace(displacement=change(fault, reading.displacement))
 
     return Kind(meaning, reading=reading)
 
 
-def _noisy(fault: Fault, displacement: float) -> float:
+def _noisy(fault, displacement):
     return displacement + _NOISE * float(fault.random.normal(1, 1)[0, 0])
 
 
-def _flipped(fault: Fault, displacement: float) -> float:
+def _flipped(fault, displacement):
     fault.count += abs(displacement) > _FAR
     return -displacement if fault.count else displacement
 
 
-def _drifting(fault: Fault, displacement: float) -> float:
+def _drifting(fault, displacement):
     fault.drift += _DRIFT / fault.sample_rate
     return displacement + fault.drift
 
 
-def _ripple_noisy(fault: Fault, reading: Reading) -> Reading:
+def _ripple_noisy(fault, reading):
     current, flux = 1.0 + _RIPPLE_NOISE * math.sqrt(0.5) * fault.random.normal(1, 2)[0]
     return reading._replace(
         current_rate=float(current) * reading.current_rate, flux_rate=float(flux) * reading.flux_rate
@@ -284,13 +273,13 @@ def _reported(meaning: str, **status: Any) -> Kind:
 def _supply(meaning: str, volts: float) -> Kind:
     """The status reports the voltage and the current loop has it."""
 
-    def plant(fault: Fault, plant: 'Plant') -> 'Plant':
+    def plant(fault, plant):
         return plant._replace(coil=plant.coil._replace(link_voltage=max(volts, _DEAD_SUPPLY)))
 
     return Kind(meaning, status=lambda _, sound: sound._replace(supply_voltage=volts), plant=plant)
 
 
-def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
+def _coil_shorted(fault, plant):
     """Half of the resistance, a quarter of the inductance and of the force."""
     return plant._replace(
         coil=plant.coil._replace(resistance=_SOUND_TURNS * plant.coil.resistance),
@@ -298,7 +287,7 @@ def _coil_shorted(fault: Fault, plant: 'Plant') -> 'Plant':
     )
 
 
-def _coil_hot(fault: Fault, plant: 'Plant') -> 'Plant':
+def _coil_hot(fault, plant):
     celsius = REFERENCE_CELSIUS + _HOTTER / (plant.temperature.copper or TemperatureCoefficients().copper)
     return plant._replace(electronics=plant.electronics._replace(coil_temperature=fault.keep(celsius)))
 
@@ -306,7 +295,7 @@ def _coil_hot(fault: Fault, plant: 'Plant') -> 'Plant':
 def _mechanics(meaning: str, *, scale: float | None = None, **changes: float) -> Kind:
     """The closing mechanics have other values, and the friction another scale."""
 
-    def plant(fault: Fault, plant: 'Plant') -> 'Plant':
+    def plant(fault, plant):
         friction = plant.friction if scale is None else plant.friction._replace(scale=scale)
         return plant._replace(mechanics=plant.mechanics._replace(**changes), friction=friction)
 
@@ -318,17 +307,19 @@ def _bus(meaning: str, change: Any = None, **options: Any) -> Kind:
 
 
 FAULTS: dict[str, Kind] = {
-    'can_silent': _bus('no frames are sent', _none_sent),
+    'can_silent': _bus('no frames are sent', lambda *_: []),
     'bus_off': _bus('an error frame tells of bus off, then no frame passes either way', _bus_off, deaf=True),
     'lost_1': _bus('1 % of the frames are lost, at random', _lost(0.01)),
     'lost_5': _bus('5 % of the frames are lost, at random', _lost(0.05)),
     'lost_50': _bus('50 % of the frames are lost, at random', _lost(0.5)),
     'delayed': _bus('frames arrive 5 ms late', _delayed(5)),
     'delayed_50': _bus('frames arrive 50 ms late', _delayed(50)),  # later than the setpoint timeout
-    'duplicated': _bus('each frame arrives twice', _duplicated),
+    'duplicated': _bus(
+        'each frame arrives twice', lambda _, sent: [frame for frame in sent for _ in range(2)]
+    ),
     'reordered': _bus('the frames of every tenth sample arrive behind those of the next', _reordered),
     'frozen_counter': _bus('all measurements carry the same alive counter', _frozen_counter),
-    'wrong_crc': _bus('the frames of every third sample are damaged', _damaged(_change_byte)),
+    'wrong_crc': _bus('the frames of every third sample are damaged', _damaged(_change_last_byte)),
     'wrong_length': _bus('the frames of every third sample are 4 bytes too short', _damaged(_shorten)),
     'replayed': _bus('behind each frame comes one of 100 samples ago once more', _replayed),
     'babbling': _bus('5 frames with foreign identifiers in each sample', _babbling),
@@ -405,3 +396,148 @@ FAULTS: dict[str, Kind] = {
         'the core halves do not move, nothing presses on the pads', spring_stiffness=_BLOCKING
     ),
 }
+
+
+T = TypeVar('T')
+
+FORM = 'NAME@t[:duration], times in s of simulated time since the activation of mount_sim'
+_INJECTED = 'NAME[:duration], NAME ..., durations in s'
+_LONGEST = 7200.0  # s, chosen: as long as a run can be
+_NUMBER = r'[0-9.]+(?:e-?[0-9]+)?'
+_WRITTEN = re.compile(rf'(\w+)(?:@({_NUMBER}))?(?::({_NUMBER}))?')
+
+
+def told_faults(texts: Iterable[str], seed: int = 0, sample_rate: float = SAMPLE_RATE) -> list[Fault]:
+    """Return the faults of texts `NAME@t[:duration]`, which stay without one; raises `ParameterError`."""
+    return [_fault(text, FORM, seed, sample_rate) for text in texts]
+
+
+def injected_faults(text: str, seed: int = 0, sample_rate: float = SAMPLE_RATE) -> list[Fault]:
+    """Return the faults of a text `NAME[:duration], ...`, as they begin at 0 s; raises `ParameterError`."""
+    parts = [part.strip() for part in text.split(',') if part.strip()]
+    found = [_fault(part, _INJECTED, seed, sample_rate) for part in parts]
+    for fault in found:
+        if fault.kind.from_start:
+            raise ParameterError(
+                f'{fault.name} begins with a run: give it in `faults`, as in {fault.name}@10'
+            )
+    return found
+
+
+def check_without_bus(texts: Iterable[str]) -> None:
+    """Raise `ParameterError` for a fault that shows on the bus only, where there is none."""
+    for fault in told_faults(texts):
+        if fault.kind.on_bus:
+            raise ParameterError(
+                f'fault {fault.name} shows on the CAN bus only, and a run in core has none: '
+                'drive in real time'
+            )
+
+
+class Faults:
+    """The faults of one run; everything it returns passes all that are present.
+
+    `inject` and `end_injected` may be called from any thread.
+    """
+
+    def __init__(self, texts: Iterable[str] = (), seed: int = 0, sample_rate: float = SAMPLE_RATE):
+        self._seed, self._sample_rate = seed, sample_rate
+        self.present: tuple[Fault, ...] = ()
+        """The faults that are present since the last `look`."""
+        self._faults = told_faults(dict.fromkeys(texts), seed, sample_rate)
+        self._orders: deque[Fault | None] = deque()  # None: end what was injected
+        self._injected: list[str] = []
+        self._change = self._next_change(-math.inf)
+
+    @property
+    def none_told(self) -> bool:
+        """Whether no fault was told before the run."""
+        return not self._faults
+
+    def due(self, time: float) -> bool:
+        """Whether faults begin or end at `time` (s), so that `look` is needed."""
+        return time >= self._change
+
+    def look(self, time: float) -> None:
+        """Begin and end what is due at `time` (s)."""
+        while self._orders:
+            self._take(self._orders.popleft(), time)
+        self.present = tuple(fault for fault in self._faults if fault.times[0] <= time < fault.times[1])
+        self._change = self._next_change(time)
+        if self._orders:  # one that came meanwhile
+            self._change = -math.inf
+
+    def inject(self, text: str) -> str:
+        """Begin the faults in `text` with the next sample; return a sentence about it, or raise."""
+        found = injected_faults(text, self._seed, self._sample_rate)
+        if not found:
+            raise ParameterError('inject names no fault; set it to such as "coil_open, lost_5:2"')
+        begun = (
+            f'{fault.name} for {fault.end:g} s' if math.isfinite(fault.end) else fault.name for fault in found
+        )
+        sentence = f'begun: {", ".join(begun)}'
+        self._injected += [fault.name for fault in found]
+        self._orders.extend(found)
+        self._change = -math.inf
+        return sentence
+
+    def end_injected(self) -> str:
+        """End all injected faults with the next sample; return a sentence about it."""
+        names, self._injected = self._injected, []
+        self._orders.append(None)
+        self._change = -math.inf
+        return f'ended: {", ".join(names)}' if names else 'no fault was injected'
+
+    def through(self, part: str, value: T) -> T:
+        """Return a value as the faults that are present change it; `part` is a field of `Kind`."""
+        for fault in self.present:
+            change = getattr(fault.kind, part)
+            if change is not None:
+                value = change(fault, value)
+        return value
+
+    @property
+    def deaf(self) -> bool:
+        """Whether setpoints are lost."""
+        return any(fault.deaf for fault in self.present)
+
+    @property
+    def restarts(self) -> bool:
+        """Whether the electronics begin anew with this sample."""
+        return any(fault.restarts for fault in self.present)
+
+    def _next_change(self, time: float) -> float:
+        times = (moment for fault in self._faults for moment in fault.times)
+        return min((moment for moment in times if moment > time), default=math.inf)
+
+    def _take(self, order: Fault | None, time: float) -> None:
+        if order is None:
+            self._faults = [fault for fault in self._faults if not fault.injected or fault.kind.for_good]
+        else:
+            order.begin, order.end, order.injected = time, time + order.end, True
+            self._faults.append(order)
+
+
+def _fault(text: str, form: str, seed: int, sample_rate: float) -> Fault:
+    found = _WRITTEN.fullmatch(text)
+    if found is None or (found[2] is None) is (form is FORM):
+        raise ParameterError(f'fault {text!r:.60} is not written as {form}')
+    name = found[1]
+    if name not in FAULTS:
+        raise ParameterError(f'fault {name!r} is unknown; known are {", ".join(FAULTS)}')
+    kind = FAULTS[name]
+    begin = _time(text, found[2] or '0')
+    duration = _time(text, found[3]) if found[3] else kind.duration
+    if duration <= 0.0:
+        raise ParameterError(f'fault {text!r}: its duration must be longer than 0 s')
+    return Fault(name, kind, begin, begin + duration, seed, sample_rate, deaf=kind.deaf)
+
+
+def _time(text: str, number: str) -> float:
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.inf
+    if not value <= _LONGEST:
+        raise ParameterError(f'fault {text!r}: a time ({number} s) must lie within 0 .. {_LONGEST:g} s')
+    return value

@@ -1,14 +1,57 @@
-"""Small least squares in plain arithmetic: LAPACK's last bits depend on the processor, these do not.
+"""Mean, straight lines in a table and small least squares: every sum from the first value to the last.
 
-A = Q R by Householder's reflections (Golub, Van Loan, *Matrix Computations*, section 5.3), every sum from the
-first row to the last.
-"""
+numpy and LAPACK add in an order of their own, which depends on the processor; these do not."""
 
 import math
 
 import numpy as np
 
 from mount_models.arithmetic.compiled import compiled
+
+
+@compiled
+def mean(values):
+    """Return the mean of `values`, (n,); NaN of none."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total / values.size
+
+
+@compiled
+def standard_deviation(values):
+    """Return the standard deviation of the distribution that `values`, (n,), are drawn from; NaN of one."""
+    middle, total = mean(values), 0.0
+    for value in values:
+        total += (value - middle) * (value - middle)
+    return math.sqrt(total / (values.size - 1))
+
+
+@compiled
+def interpolated(x, x_row, y_row):
+    """Return y at `x` between the points (`x_row`, `y_row`), (n,) and x rising; constant beyond both ends."""
+    low, high = 0, x_row.size - 1
+    if not x > x_row[low]:
+        return y_row[low] if x <= x_row[low] else x  # not a number stays it
+    if x >= x_row[high]:
+        return y_row[high]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x_row[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    share = (x - x_row[low]) / (x_row[high] - x_row[low])
+    return y_row[low] + share * (y_row[high] - y_row[low])
+
+
+@compiled
+def each_interpolated(x, x_row, y_row):
+    """Return `interpolated` at each of `x`, (m,)."""
+    result = np.empty(x.size)
+    for k in range(x.size):
+        result[k] = interpolated(x[k], x_row, y_row)
+    return result
 
 
 @compiled

@@ -1,8 +1,13 @@
-"""What the coil's temperature does to the gap curves, and how a measurement is carried back to them.
+"""What temperature and supply do to the coil's ripple, and how a reading is carried back to the gap curves.
 
 A warmer core conducts less, so the ripple reaches more of it: the inductance rises, and a gap read from
 it would be too small. The calibration tells by how much at one other temperature; in between the shift goes
 with the square root of the conductivity, as the depth of the skin does (derived).
+
+The bridge holds a mean current by its duty D = (1 + R i / U) / 2. The longer it was at plus before, the more
+of the ripple's field is still in the skin of the iron when the sample is taken, so D decides how much
+reluctance the ripple meets there: with the same gap and current L_i falls with R / U. The share of the skin
+in 1 / L_i is known from the calibration at a second temperature, where it changes by the conductivity.
 """
 
 import math
@@ -10,8 +15,11 @@ from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
+from mount_models.arrays import FloatArray
+from mount_models.coil.copper import resistance_at
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, check_range_of, evaluate
 from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
 
 CONDUCTIVITY_COEFFICIENT = 0.0043
@@ -63,13 +71,10 @@ def inductance_at_calibration(
     share = _checked_share(compensation, celsius)
     if share == 0.0:
         return inductance
-
     curve, shift = curves.inductance_of_gap, compensation.reluctance_shift
-
-    def reluctance(gap: float) -> float:
-        return 1.0 / float(evaluate(curve, gap))
-
-    return 1.0 / _without_shift(1.0 / inductance, reluctance, share, shift, curve)
+    return 1.0 / _without_shift(
+        1.0 / inductance, lambda gap: 1.0 / float(evaluate(curve, gap)), share, shift, curve
+    )
 
 
 def crossing_at_calibration(
@@ -82,13 +87,8 @@ def crossing_at_calibration(
     share = _checked_share(compensation, celsius)
     if share == 0.0:
         return current
-
     curve, shift = curves.crossing_current_of_gap, compensation.crossing_shift
-
-    def crossing(gap: float) -> float:
-        return float(evaluate(curve, gap))
-
-    return _without_shift(current, crossing, share, shift, curve)
+    return _without_shift(current, lambda gap: float(evaluate(curve, gap)), share, shift, curve)
 
 
 def check_compensation(compensation: TemperatureCompensation, curves: GapCurves) -> None:
@@ -105,12 +105,7 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
             f'({c.calibration_celsius:g} degC) by {_LEAST_DIFFERENCE:g} K or more; record warmer or colder'
         )
     for name in ('reluctance_shift', 'crossing_shift'):
-        shift = getattr(c, name)
-        if not (shift.low < shift.high and shift.scale > 0.0):
-            raise LawRefusedError(
-                f'{name} must have a positive scale ({shift.scale:g}) and a range in rising order '
-                f'({shift.low:g} .. {shift.high:g}); calibrate again'
-            )
+        check_range_of(name, getattr(c, name))
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
         raise LawRefusedError(
             f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '
@@ -149,22 +144,107 @@ def _without_shift(
     shift: ScaledPolynomial,
     curve: ScaledPolynomial,
 ) -> float:
-    """Return `value` less the share of the shift at the gap at which it is what is measured."""
-    gap = _gap_at(lambda gap: calibrated(gap) + share * _shift(shift, gap), value, curve)
-    return value - share * _shift(shift, gap)
+    """Return `value` less the share of the shift at the gap (m) at which it is what is measured.
+
+    Where the curve does not reach it, the nearer end counts.
+    """
+    low, high = curve.low, curve.high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if calibrated(middle) + share * _shift(shift, middle) < value:
+            low = middle
+        else:
+            high = middle
+    return value - share * _shift(shift, 0.5 * (low + high))
 
 
 def _shift(shift: ScaledPolynomial, gap: float) -> float:
     return float(evaluate(shift, min(max(gap, shift.low), shift.high)))
 
 
-def _gap_at(rising: Callable[[float], float], value: float, curve: ScaledPolynomial) -> float:
-    """Return the gap (m) of the curve at which a `rising` function reaches `value`, or the nearer end."""
-    low, high = curve.low, curve.high
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if rising(middle) < value:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+class Bridge(NamedTuple):
+    """The bridge that drives the coil: its voltage at the calibration, and when it samples the ripple."""
+
+    link_voltage: Annotated[
+        float, Quantity('V', 'voltage U of the bridge at which the gap curves hold', 1.0, 100.0)
+    ] = 14.0
+    lowest_voltage: Annotated[
+        float, Quantity('V', 'lowest voltage to which the curves are carried', 1.0, 100.0, 'chosen')
+    ] = 8.0
+    highest_voltage: Annotated[
+        float, Quantity('V', 'highest voltage to which the curves are carried', 1.0, 100.0, 'chosen')
+    ] = 18.0
+    sample_phase: Annotated[
+        float,
+        Quantity(
+            '1', 'time from switching to the sample, in periods of the bridge', 0.001, 0.4, '18 of 200 us'
+        ),
+    ] = 0.09
+
+
+def duty(resistance: npt.ArrayLike, current: npt.ArrayLike, voltage: npt.ArrayLike) -> FloatArray:
+    """Return the share D of positive voltage (V) that holds a current (A) in a resistance (ohm)."""
+    held = np.asarray(resistance, float) * np.asarray(current, float)
+    return np.asarray(0.5 * (1.0 + held / np.asarray(voltage, float)))
+
+
+def skin_shape(bridge: Bridge, duty: npt.ArrayLike) -> FloatArray:
+    """Return the reluctance of the skin over the duty D, up to a factor that is the same for every D.
+
+    Derived for plates that no ripple crosses: every past switching adds 1 / sqrt(its age), so with phase q
+    s(D) = sum_m [(q + m)^-1/2 - (q + 1 - D + m)^-1/2] / (1 - D).
+    NaN where the bridge cannot hold a current.
+    """
+    off = 1.0 - np.asarray(duty, float)
+    off = np.where((off > 0.0) & (off < 1.0), off, np.nan)
+    total = np.zeros(off.shape)
+    for m in range(_TERMS):
+        total = total + (
+            1.0 / math.sqrt(bridge.sample_phase + m) - 1.0 / np.sqrt(bridge.sample_phase + off + m)
+        )
+    # what remains of the sum is an integral from half a term before it on
+    rest = bridge.sample_phase + _TERMS - 0.5
+    total = total + 2.0 * (np.sqrt(rest + off) - math.sqrt(rest))
+    return np.asarray(total / off)
+
+
+def skin_ratio(bridge: Bridge, duty: npt.ArrayLike, calibrated: npt.ArrayLike) -> FloatArray:
+    """Return the reluctance of the skin at the `calibrated` duty over that at `duty`."""
+    return np.asarray(skin_shape(bridge, calibrated) / skin_shape(bridge, duty))
+
+
+def at_calibrated_duty(inductance: npt.ArrayLike, gap_reluctance: float, ratio: npt.ArrayLike) -> FloatArray:
+    """Return what inductances (H) would be at the duty of the calibration, by `skin_ratio`.
+
+    1 / L_i is the reluctance of the gap (`gap_reluctance`, 1/H) and that of the skin; only this one changes.
+    """
+    inductance = np.asarray(inductance, float)
+    share = 1.0 - inductance * gap_reluctance
+    return np.asarray(inductance / (1.0 + share * (np.asarray(ratio, float) - 1.0)))
+
+
+def gap_reluctance(
+    bridge: Bridge,
+    curves: GapCurves,
+    compensation: TemperatureCompensation,
+    resistance: float,
+    rest_current: float,
+    gap: float,
+) -> float:
+    """Return the share of the gap in 1 / L_i (1/H) at a gap (m) within the curves, else at their nearer end.
+
+    At `rest_current` (A) from one temperature of the calibration to the other the skin alone has changed: by
+    the conductivity, and by the duty, as the coil has `resistance` (ohm) at 20 degC.
+    """
+    c = compensation
+    shift, curve = c.reluctance_shift, curves.inductance_of_gap
+    gap = min(max(gap, shift.low, curve.low), shift.high, curve.high)
+    cold, warm = (
+        float(skin_shape(bridge, duty(resistance_at(resistance, celsius), rest_current, bridge.link_voltage)))
+        for celsius in (c.calibration_celsius, c.reference_celsius)
+    )
+    change = (1.0 + skin_change(c, c.reference_celsius)) * warm / cold - 1.0
+    return 1.0 / float(evaluate(curve, gap)) - float(evaluate(shift, gap)) / change
+
+
+_TERMS = 24  # chosen: the sum is right to 1e-5 by then

@@ -1,4 +1,7 @@
-"""The current-force law as the controller knows it, its inverse and its check (Eqs 3, 4, Table 1)."""
+"""The electromagnet as the controller knows it: force law (Eqs 3, 4, Table 1), its inverse and its check.
+
+With gap estimates it becomes contact force, offset current and current-force table.
+"""
 
 import math
 from typing import Annotated, NamedTuple
@@ -8,9 +11,9 @@ import numpy.typing as npt
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import atan
+from mount_models.arrays import FloatArray
 from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
-
-FloatArray = npt.NDArray[np.float64]
+from mount_models.sampling import HIGHEST_CURRENT
 
 LOWEST_SHARE = 1.0 / 60.0
 """Of the highest current, chosen: 0.05 A of 3 A."""
@@ -107,8 +110,14 @@ def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> 
     """
     current, gap = np.broadcast_arrays(np.asarray(current, float), np.asarray(gap, float))
     check_gap(law, gap)
-    _check_current(law, current)
-    return _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)[()]
+    force = _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)
+    outside = np.isnan(force)
+    if outside.any():
+        raise OutsideLawError(
+            f'coil current ({float(current[outside].flat[0]):.3f} A) must lie within 0.000 .. '
+            f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
+        )
+    return force[()]
 
 
 def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
@@ -220,15 +229,6 @@ def _each_current(law, force, gap):
     return result
 
 
-def _check_current(law: ForceLaw, current: FloatArray) -> None:
-    inside = (current >= 0.0) & (current <= law.current_high * (1.0 + _ROUNDING))
-    if not inside.all():
-        raise OutsideLawError(
-            f'coil current ({float(current[~inside].flat[0]):.3f} A) must lie within 0.000 .. '
-            f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
-        )
-
-
 def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: FloatArray, what: str) -> None:
     if failed.any():
         row, column = np.argwhere(failed)[0]
@@ -236,3 +236,91 @@ def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: Flo
             f'the force must {what}; at {gaps[row] * 1e6:.0f} um and {currents[column]:.2f} A this law does '
             f'not: narrow its range of gaps, measure more points, or look for outliers'
         )
+
+
+_STEP = 0.5  # N, chosen
+
+
+class ForceTableError(ValueError):
+    """A current-force table cannot be built; the text says why and the remedy."""
+
+
+def zero_current_rest_gap(
+    law: ForceLaw, spring_stiffness: float, gap_at_rest_current: float, rest_current: float
+) -> float:
+    """Return the gap (m) at 0 A from that measured at `rest_current` (A), which already closes it a little.
+
+    Derived: d_rest = d + F(i, d) / k_s; the 492 um of section 3.2 are measured at 0.2 A.
+    """
+    return (
+        gap_at_rest_current + float(checked_force(law, rest_current, gap_at_rest_current)) / spring_stiffness
+    )
+
+
+def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) -> float:
+    """Return the magnetic force F_c = k_s (d_rest - d_c) (N) at which the pads just touch."""
+    if not rest_gap > contact_gap:
+        raise ForceTableError(
+            f'contact gap ({contact_gap * 1e6:.1f} um) must lie below the rest gap '
+            f'({rest_gap * 1e6:.1f} um); measure both again: the pads may be stuck to the rod'
+        )
+    return spring_stiffness * (rest_gap - contact_gap)
+
+
+def offset_current(
+    law: ForceLaw, spring_stiffness: float, rest_gap: float, contact_gap: float, light_pressure: float
+) -> float:
+    """Return the current (A) of the ready position, `light_pressure` (N) past just touching (section 3.2)."""
+    wanted = contact_force(spring_stiffness, rest_gap, contact_gap) + light_pressure
+    return float(checked_current_for_force(law, wanted, contact_gap))
+
+
+def current_force_table(
+    law: ForceLaw,
+    spring_stiffness: float,
+    pad_stiffness: float,
+    rest_gap: float,
+    contact_gap: float,
+    current_high: float = HIGHEST_CURRENT,
+) -> FloatArray:
+    """Return the current-force table, shape (2, N): rows current (A) and normal force on the pads (N).
+
+    Both rows rise strictly, from the contact current at 0 N in steps of 0.5 N to `current_high` (A). The
+    spring's share is subtracted and the pads' compression included: at normal force F_N the gap is
+    d = d_c - F_N / k_p and the magnet pulls F_N + k_s (d_rest - d).
+    Raises `ForceTableError`, or `OutsideLawError` where the law does not reach.
+    """
+    contact_force(spring_stiffness, rest_gap, contact_gap)
+    highest = _highest_normal_force(law, spring_stiffness, pad_stiffness, rest_gap, contact_gap, current_high)
+    normal_force = np.append(np.arange(0.0, highest - 0.01 * _STEP, _STEP), highest)
+    gap = contact_gap - normal_force / pad_stiffness
+    current = checked_current_for_force(law, normal_force + spring_stiffness * (rest_gap - gap), gap)
+    current[-1] = current_high
+    table = np.stack([current, normal_force])
+    if not (np.diff(table) > 0.0).all():  # also where it is not a number
+        raise ForceTableError('current-force table must rise strictly; initialise the actuator again')
+    return table
+
+
+def _highest_normal_force(
+    law: ForceLaw,
+    spring_stiffness: float,
+    pad_stiffness: float,
+    rest_gap: float,
+    contact_gap: float,
+    current: float,
+) -> float:
+    """Return the normal force (N) at `current` (A): the magnet's pull less the spring's, pads compressed."""
+    normal_force = 0.0
+    for _ in range(50):  # each step is some thirty times smaller than the one before
+        gap = contact_gap - normal_force / pad_stiffness
+        following = float(checked_force(law, current, gap)) - spring_stiffness * (rest_gap - gap)
+        if not following > 0.0:
+            raise ForceTableError(
+                f'current_high ({current:.2f} A) must close the pads; it leaves {-following:.1f} N of the '
+                f'spring unbalanced at {gap * 1e6:.1f} um: check both gap estimates, or allow more current'
+            )
+        if abs(following - normal_force) < 1e-9:
+            break
+        normal_force = following
+    return normal_force

@@ -1,1 +1,0 @@
-"""The electromagnet as the controller knows it: its force law."""

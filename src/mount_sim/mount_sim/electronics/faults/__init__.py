@@ -1,1 +1,0 @@
-"""What can go wrong in electronics, sensors, coil, pads and on the bus; several faults at once."""
