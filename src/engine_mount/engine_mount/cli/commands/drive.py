@@ -20,7 +20,6 @@ from engine_mount.cli.commands.options import (
     Rate,
     Scale,
     Settings,
-    Snapshot,
     SpeedText,
     Split,
     TimeColumn,
@@ -54,7 +53,7 @@ Examples:
 
 `engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
-`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
+`engine-mount drive --split 500MB` - in several files
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
 
@@ -139,8 +138,7 @@ def drive(
     report: Annotated[
         bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
-    split: Split = None,
-    snapshot: Snapshot = '',
+    split: Split = '',
     priority: Priority = 10,
     restarts: Annotated[
         int, option('times that a node may be lost within a minute before the drive ends; 0: none', least=0)
@@ -152,8 +150,8 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
-    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
-    from engine_mount.settings.amounts import checked_recorder, recorder_options
+    from engine_mount.reports.drive.results import evaluate_drive
+    from engine_mount.settings.amounts import recorder_options
 
     screen = TerminalScreen()
     if 'list' in (fault or []):
@@ -176,7 +174,7 @@ def drive(
     elif file:
         raise typer.BadParameter('--road is a scenario of its own; leave out --file')
     parameters = changes_of(settings)
-    if recorder := recorder_options(split or [], snapshot):
+    if recorder := recorder_options(split):
         parameters.setdefault('mount_recorder', {}).update(recorder)
     excitation = None
     if road:
@@ -205,11 +203,7 @@ def drive(
         )  # fmt: skip
     except CombinationError as error:
         raise typer.BadParameter(str(error)) from None
-    recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
-    if recorded.snapshot:
-        told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
-    else:
-        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+    told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     write_figures(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []
     for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):
