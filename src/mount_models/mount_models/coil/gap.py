@@ -73,11 +73,13 @@ def crossing_current_from_gap(curves: GapCurves, gap: npt.ArrayLike) -> FloatArr
 
 def gap_per_inductance(curves: GapCurves, inductance: npt.ArrayLike) -> FloatArray:
     """Return d(gap)/d(inductance) (m/H, negative) at the rest current, to carry a standard deviation over."""
+    rest_gap_from_inductance(curves, inductance)  # refuses what lies outside the curve
     return slope(curves.gap_of_inductance, inductance)
 
 
 def gap_per_crossing_current(curves: GapCurves, current: npt.ArrayLike) -> FloatArray:
     """Return d(gap)/d(crossing current) (m/A, positive), to carry a standard deviation over."""
+    gap_from_crossing_current(curves, current)  # refuses what lies outside the curve
     return slope(curves.gap_of_crossing_current, current)
 
 
