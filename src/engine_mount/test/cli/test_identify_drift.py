@@ -77,12 +77,3 @@ def test_values_that_scatter_more_than_stated_are_less_sure():
     stated, wide = (fit_line(hours, values, np.full(6, std)) for std in (0.01, 10.0))
     assert stated.slope_std == pytest.approx(fit_line(hours, values).slope_std)
     assert wide.slope_std == pytest.approx(10.0 / np.sqrt(17.5))
-
-
-def test_without_stated_deviations_the_scatter_of_the_values_tells_that_of_the_slope():
-    random = np.random.default_rng(1)
-    hours = np.arange(0.0, 180.0, 30.0)
-    fits = [fit_line(hours, 0.8 - 4e-4 * hours + 4e-3 * random.standard_normal(6)) for _ in range(400)]
-    slopes, stated = np.array([(fit.slope, fit.slope_std) for fit in fits]).T
-    assert slopes.mean() == pytest.approx(-4e-4, abs=5e-6)
-    assert np.sqrt(np.mean(stated**2)) == pytest.approx(slopes.std(), rel=0.1)

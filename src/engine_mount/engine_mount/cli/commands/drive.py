@@ -97,7 +97,7 @@ def drive(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Scale = None,
-    road: Annotated[str, option('measured road: a table of height over distance', 'FILE')] = '',
+    road: Annotated[str, option('road: a table of height over distance', 'FILE')] = '',
     speed: SpeedText = '',
     distance: Distance = '',
     contact_length: Annotated[

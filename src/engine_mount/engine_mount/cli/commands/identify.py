@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from engine_mount.cli.calibration.given import per_file
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
@@ -23,15 +21,9 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, group
 
-app = typer.Typer(
-    cls=Group,
-    name='identify',
-    help='Identify parameters from recordings of a rack.',
-    no_args_is_help=True,
-    rich_markup_mode='markdown',
-)
+app = group('identify', 'Identify parameters from recordings of a rack.')
 
 EPILOG = (
     EXIT_CODES
