@@ -102,7 +102,7 @@ class MountControl(SafeLifecycleNode):
         path.start()
 
     def activate(self) -> None:
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
@@ -112,7 +112,7 @@ class MountControl(SafeLifecycleNode):
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
-        self.report_publisher_conflict()
+        self.data_path.publisher_watch.report()
         self.get_logger().info(
             f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
             f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'

@@ -14,8 +14,8 @@ from mount_control.policy import switched_viscous
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
 from mount_models.damper import damper_curve
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.simplified import faded_coefficient
+from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coefficient
+from mount_models.friction.simplified import fade_weight
 from mount_ros import topics
 
 PAPER = compiled_with(switched_viscous)
@@ -70,7 +70,8 @@ def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_c
         if abs(velocity) < 0.006:
             continue  # below 4 N the floor of the coefficient may act
         deflection = np.sign(velocity) * traces['friction_deflection'][place - 1]
-        law = faded_coefficient(FrictionCoefficients(), velocity, deflection, now['normal_force'])
+        mu = dynamic_coefficient(FrictionCoefficients(), velocity, deflection, now['normal_force'])
+        law = fade_weight(velocity) * mu
         assert now['friction_coefficient'] == pytest.approx(law, rel=2e-3)
 
 

@@ -61,7 +61,7 @@ class MountDriver(SafeLifecycleNode):
 
     def activate(self) -> None:
         self.ending.wait(max(0.0, self._not_before - time.monotonic()))
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         # ROS time is tied to the steady clock here, once: later steps of the system's clock move nothing.
         epoch_offset = time.time_ns() - time.monotonic_ns()
         period = sample_time_ns(self._settings.sample_rate)
@@ -82,7 +82,7 @@ class MountDriver(SafeLifecycleNode):
         exchange.start(threaded=not attended)
         self._exchange = exchange
         self._health = Health(exchange, self._settings, started, lockstep=self.lockstep)
-        self.report_publisher_conflict()
+        self.data_path.publisher_watch.report()
         if attended:
             self._path.add_poll(exchange.poll)
 

@@ -63,7 +63,7 @@ class MountInit(SafeLifecycleNode):
         if self._unsubscribed:
             self._dialogue.forget_streams()
             self._subscribe_streams()
-        self.wait_for_sole_publishers()
+        self.data_path.publisher_watch.wait_for_sole(self.ending)
         self._dialogue.await_quiet(self._init_parameters.quiet_duration, self.ending)
         parameters = self._init_parameters
         if self.lockstep:  # only silence can tell a stalled chain from a slow machine

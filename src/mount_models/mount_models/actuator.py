@@ -110,8 +110,14 @@ def checked_force(law: ForceLaw, current: npt.ArrayLike, gap: npt.ArrayLike) -> 
     """
     current, gap = np.broadcast_arrays(np.asarray(current, float), np.asarray(gap, float))
     check_gap(law, gap)
-    _check_current(law, current)
-    return _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)[()]
+    force = _each_force(law, current.ravel(), gap.ravel()).reshape(gap.shape)
+    outside = np.isnan(force)
+    if outside.any():
+        raise OutsideLawError(
+            f'coil current ({float(current[outside].flat[0]):.3f} A) must lie within 0.000 .. '
+            f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
+        )
+    return force[()]
 
 
 def checked_current_for_force(law: ForceLaw, force: npt.ArrayLike, gap: npt.ArrayLike) -> FloatArray:
@@ -221,15 +227,6 @@ def _each_current(law, force, gap):
     for k in range(gap.size):
         result[k] = current_for_force(law, force[k], gap[k])
     return result
-
-
-def _check_current(law: ForceLaw, current: FloatArray) -> None:
-    inside = (current >= 0.0) & (current <= law.current_high * (1.0 + _ROUNDING))
-    if not inside.all():
-        raise OutsideLawError(
-            f'coil current ({float(current[~inside].flat[0]):.3f} A) must lie within 0.000 .. '
-            f'{law.current_high:.3f} A; beyond it the force law was never fitted: limit the current'
-        )
 
 
 def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: FloatArray, what: str) -> None:

@@ -17,7 +17,7 @@ from mount_models.coil.copper import CoilHeating, check_heating
 from mount_models.coil.correction import Bridge, TemperatureCompensation, check_compensation
 from mount_models.coil.gap import GapCurves, check_gap_curves
 from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact, check_coefficients
+from mount_models.friction.contact import FrictionContact, check_friction
 from mount_models.plain_yaml import YamlError, excerpt, plain_yaml, text_of_file
 from mount_models.quantity import Quantity, check_name, check_range, quantities
 from mount_models.sampling import HIGHEST_CURRENT
@@ -147,7 +147,7 @@ def _check(specimen: Specimen) -> None:
     if specimen.temperature is not None:
         check_compensation(specimen.temperature, specimen.gap_curves)
     check_heating(specimen.heating)
-    check_coefficients(friction_coefficients(specimen.friction))
+    check_friction(friction_coefficients(specimen.friction), friction_contact(specimen.friction))
     bridge = specimen.bridge
     if not bridge.lowest_voltage <= bridge.link_voltage <= bridge.highest_voltage:
         raise SpecimenError(

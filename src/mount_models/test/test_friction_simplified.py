@@ -9,7 +9,7 @@ from mount_models.friction.coefficient import FrictionCoefficients, dynamic_coef
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import (
     LOWEST_COEFFICIENT,
-    faded_coefficient,
+    fade_weight,
     normal_force_for,
     simplified_response,
     simplified_step,
@@ -18,6 +18,10 @@ from mount_models.friction.simplified import (
 
 COEFS = FrictionCoefficients()
 CONTACT = FrictionContact()
+
+
+def _faded(coefs, velocity, deflection_u, normal_force):
+    return fade_weight(velocity) * dynamic_coefficient(coefs, velocity, deflection_u, normal_force)
 
 
 @pytest.mark.parametrize('dt', [1e-5, 1e-4, 1e-3])
@@ -64,10 +68,10 @@ def test_deflection_settles_where_the_spring_carries_the_friction_force():
 
 def test_force_fades_to_zero_at_rest_and_is_whole_at_sliding_speed():
     assert simplified_step(CONTACT, COEFS, 0.0, 0.0, 100.0, 1e-3)[0] == 0.0
-    assert faded_coefficient(COEFS, 0.001, 0.0, 100.0) == pytest.approx(
+    assert _faded(COEFS, 0.001, 0.0, 100.0) == pytest.approx(
         (1.0 - np.exp(-1.0)) * dynamic_coefficient(COEFS, 0.001, 0.0, 100.0), rel=1e-12
     )
-    assert faded_coefficient(COEFS, 0.005, 0.0, 100.0) == pytest.approx(
+    assert _faded(COEFS, 0.005, 0.0, 100.0) == pytest.approx(
         dynamic_coefficient(COEFS, 0.005, 0.0, 100.0), rel=1e-9
     )
 
@@ -88,7 +92,7 @@ def needed(force, velocity, deflection_u, start):
 def test_normal_force_gives_the_desired_force(velocity, sign, force, deflection_u, start):
     normal_force, coefficient = needed(force, sign * velocity, deflection_u, start)
     assert coefficient * normal_force == pytest.approx(force, rel=1e-12)
-    mu = faded_coefficient(COEFS, sign * velocity, deflection_u, normal_force)
+    mu = _faded(COEFS, sign * velocity, deflection_u, normal_force)
     assert mu * normal_force == pytest.approx(force, rel=1e-3)
 
 

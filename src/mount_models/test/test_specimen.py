@@ -156,9 +156,8 @@ def test_friction_parameters_pass_through():
 @pytest.mark.parametrize(
     ('friction', 'sentence'),
     [
-        ({'a_p1': -5.0}, r'coefficient of friction \(.* at \+10 mm/s'),
-        ({'a_n1': -5.0}, r'coefficient of friction \(0 at -10 mm/s and 40 N\) must lie within 0\.05'),
-        ({'a_p2': 5.0}, r'coefficient of friction .* must lie within 0\.05 \.\. 5'),
+        ({'a_p1': -5.0}, r'coefficient of friction .* must be greater than 0'),
+        ({'a_n1': -5.0}, r'coefficient of friction .* must be greater than 0'),
         ({'lowest_normal_force': 200.0}, r'lowest_normal_force \(200 N\) must not exceed'),
         ({'contact_stiffness': 1.0}, r'friction\.contact_stiffness \(1 N/m\) must lie within'),
         ({'a_q1': 1.0}, "'a_q1' is no parameter of friction; did you mean a_"),

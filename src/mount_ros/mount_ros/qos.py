@@ -1,6 +1,6 @@
 """Quality of service of each topic, publisher's and subscriber's side."""
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mount_ros.topics import Delivery, Topic
 
@@ -12,9 +12,8 @@ MARK_DEPTH = 100  # chosen
 def publisher_qos(topic: Topic) -> QoSProfile:
     """Return what the publisher of `topic` offers: always reliable, which suits every subscriber."""
     if topic.delivery is Delivery.LATCHED:
-        return _profile(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
-    depth = STREAM_DEPTH if topic.delivery is Delivery.STREAM else MARK_DEPTH
-    return _profile(depth, ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
+        return QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    return QoSProfile(depth=STREAM_DEPTH if topic.delivery is Delivery.STREAM else MARK_DEPTH)
 
 
 def control_qos(topic: Topic, *, lockstep: bool) -> QoSProfile:
@@ -22,10 +21,4 @@ def control_qos(topic: Topic, *, lockstep: bool) -> QoSProfile:
     if topic.delivery is Delivery.LATCHED:
         return publisher_qos(topic)
     reliability = ReliabilityPolicy.RELIABLE if lockstep else ReliabilityPolicy.BEST_EFFORT
-    return _profile(CONTROL_DEPTH, reliability, DurabilityPolicy.VOLATILE)
-
-
-def _profile(depth: int, reliability: ReliabilityPolicy, durability: DurabilityPolicy) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability, durability=durability
-    )
+    return QoSProfile(depth=CONTROL_DEPTH, reliability=reliability)

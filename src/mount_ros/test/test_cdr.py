@@ -10,7 +10,6 @@ from std_msgs.msg import String
 
 from mount_ros.messages import cdr
 from mount_ros.messages.cdr import CdrWriter, joint_state
-from mount_ros.messages.scalars import OneNumberLayout, temperature_of
 
 texts = st.text(st.characters(exclude_characters='\x00', codec='utf-8'), max_size=12)
 numbers = st.lists(st.floats(allow_nan=False), max_size=5)
@@ -54,11 +53,3 @@ def test_padding_is_zero_where_the_middleware_leaves_what_was_there():
     raw = CdrWriter().header('abcd').numbers('d', 0.0).raw  # five bytes with its end: padding to eight
     end_of_text = raw.index(b'abcd\x00') + 5
     assert raw[end_of_text : end_of_text + 3] == bytes(3)
-
-
-def test_a_temperature_comes_back_with_its_stamp():
-    raw = OneNumberLayout(cdr.temperature).pack(5_123_456_789, -12.3)
-    assert temperature_of(raw) == (5_123_456_789, -12.3)
-    message = deserialize_message(raw, Temperature)
-    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 123_456_789)
-    assert (message.temperature, message.variance) == (-12.3, 0.0)

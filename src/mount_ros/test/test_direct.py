@@ -1,8 +1,6 @@
 """Direct delivery within a process: in the sender's thread, once, published besides, never after the end."""
 
-import sys
 import threading
-import types
 
 import pytest
 from rclpy.node import Node
@@ -118,50 +116,3 @@ def test_nothing_is_taken_behind_the_end_of_a_path_that_waits_for_the_message_un
     stopping.join()
     send(sample(2))
     assert len(taken) == 1
-
-
-def test_a_sender_that_has_ended_leaves_the_topic_to_the_middleware(make_path, context):
-    thread = DataThread(context)
-    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
-    sender.sender(DISPLACEMENT)
-    taken = Taken()
-    receiver.subscribe(DISPLACEMENT, taken, directly=True)
-    receiver.start()
-    sender.stop()
-    stranger = make_path('stranger', DataThread(context))
-    send = stranger.sender(DISPLACEMENT)
-    wait_until(lambda: not receiver.unmatched() and not stranger.unmatched(), 'connection')
-    wait_until(lambda: (send(sample(9)), taken.stamps)[1], 'the message')
-
-
-def test_an_exception_of_the_receiver_is_not_that_of_the_sender(make_path, context):
-    thread = DataThread(context)
-    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
-    send = sender.sender(DISPLACEMENT)
-
-    def take(raw):
-        raise ZeroDivisionError('no')
-
-    receiver.subscribe(DISPLACEMENT, take, directly=True)
-    send(sample(1))
-    assert receiver.refused == 1
-    assert 'ZeroDivisionError: no' in receiver.refusal
-
-
-def test_one_function_hands_a_message_over_and_a_lone_sender_publishes_without_any(make_path, context):
-    thread, calls = DataThread(context), []
-    sender, receiver = make_path('sender', thread), make_path('receiver', thread)
-    send = sender.sender(DISPLACEMENT)
-
-    def take(raw):
-        sys.setprofile(None)
-
-    message = sample(1)
-    receiver.subscribe(DISPLACEMENT, take, directly=True)
-    sys.setprofile(lambda frame, event, _: event == 'call' and calls.append(frame.f_code.co_name))
-    try:
-        send(message)
-    finally:
-        sys.setprofile(None)
-    assert calls == ['send', 'receive', 'take']
-    assert not isinstance(make_path('lone', None).sender(DISPLACEMENT), types.FunctionType)

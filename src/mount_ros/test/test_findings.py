@@ -41,24 +41,6 @@ def test_a_burst_counts_for_as_long_as_the_window_lasts_and_is_told_in_the_same_
     assert told[-1] == (Level.OK, 'well')
 
 
-def test_a_window_forgets_however_rarely_it_is_looked_at():
-    window = SlidingWindow(0)
-    assert [window.earlier(time, count) for time, count in ((0.0, 1), (WINDOW, 2), (3 * WINDOW, 3))] == [
-        0,
-        1,
-        2,
-    ]
-
-
-def test_a_finding_that_came_back_is_told_afresh():
-    standing = ActiveFindings()
-    said = [
-        standing.keep(verdict_on(found, 'well', {})).sentence
-        for found in ([loss(1)], [], [loss(7)], [loss(9)])
-    ]
-    assert said == ['1 lost; check the bus', 'well', '7 lost; check the bus', '7 lost; check the bus']
-
-
 def test_a_graver_level_is_told_at_once_and_the_first_error_speaks_alone():
     hot, hotter = Finding(Level.WARN, 'hot', '120 degC'), Finding(Level.ERROR, 'hot', '150 degC')
     standing = ActiveFindings()

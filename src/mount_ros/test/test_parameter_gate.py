@@ -39,12 +39,6 @@ def _set(node, **values):
     return node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
 
 
-def test_before_configure_everything_can_be_set_and_nothing_is_told(subject):
-    results = _set(subject, lower=5.0, upper=4.0, name='second', lockstep=True)
-    assert all(result.successful for result in results)
-    assert subject.taken == []
-
-
 @pytest.mark.parametrize('activated', [False, True])
 def test_once_configured_run_time_parameters_are_checked_set_and_told(subject, activated):
     subject.trigger_configure()
@@ -59,13 +53,6 @@ def test_once_configured_run_time_parameters_are_checked_set_and_told(subject, a
     assert _set(subject, lower=1.5)[0].successful
     assert _set(subject, lower=1.6)[0].successful
     assert subject.taken[1:] == [({'lower': Change(1.5, 1.6)}, 1.6)]
-
-
-def test_what_goes_only_together_can_be_set_together(subject):
-    subject.trigger_configure()
-    both = [Parameter('lower', value=8.0), Parameter('upper', value=9.0)]
-    assert subject.set_parameters_atomically(both).successful
-    assert subject.taken == [({'lower': Change(1.0, 8.0), 'upper': Change(2.0, 9.0)}, 8.0)]
 
 
 @pytest.mark.parametrize(('name', 'value'), [('name', 'second'), ('lockstep', True)])

@@ -10,7 +10,7 @@ from ros_testing import LIMIT, wait_until
 import mount_ros.publishers
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import message_class
-from mount_ros.publishers import NAMING_TIME, PublisherConflictError, PublisherWatch, UnnamedPublisher
+from mount_ros.publishers import PublisherConflictError, PublisherWatch
 from mount_ros.qos import publisher_qos
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, TOPICS
 
@@ -84,23 +84,6 @@ def test_a_second_publisher_is_known_before_its_first_message_is_used(heard, pub
     heard.publisher_watch.wait_for_sole(threading.Event())
 
 
-def test_one_node_alone_may_stand_in_for_the_writer(heard, publish_from):
-    publish_from('player')
-    wait_until(lambda: heard.unmatched() == [], 'the player')
-    assert _settled(heard) == ('', '')
-    publish_from('mount_driver_io')
-    wait_until(
-        lambda: _settled(heard)[0].startswith('/car/player must not publish'), 'the player to be named'
-    )
-
-
-def test_a_node_of_the_right_name_in_another_namespace_is_a_stranger(heard, publish_from):
-    publish_from('mount_driver_io')
-    publish_from('mount_driver_io', namespace='/other_car')
-    named = '/other_car/mount_driver_io must not publish'
-    wait_until(lambda: _settled(heard)[0].startswith(named), 'the other car to be named')
-
-
 @pytest.mark.parametrize('name', ['mount_driver_io', 'player'])
 def test_two_of_one_name_are_a_doubt_until_no_killed_one_can_be_left(heard, publish_from, monkeypatch, name):
     twins = [publish_from(name) for _ in range(2)]
@@ -151,33 +134,22 @@ def _info(name, kind=DISPLACEMENT.type, namespace='/car'):
 
 
 def test_a_node_without_a_name_is_a_doubt_and_one_of_another_type_is_not_heard(heard, monkeypatch):
-    infos = [_info('mount_driver_io'), _info('stranger', 'std_msgs/msg/String')]
+    infos = [_info('player'), _info('stranger', 'std_msgs/msg/String')]  # one may stand in for the writer
     monkeypatch.setattr(heard.node, 'get_publishers_info_by_topic', lambda topic: infos)
     heard.publisher_watch.check()
     assert (heard.publisher_watch.confirmed, heard.publisher_watch.suspected) == ('', '')
+    infos[0] = _info('mount_driver_io')
     infos.append(_info('_NODE_NAME_UNKNOWN_', namespace='_NODE_NAMESPACE_UNKNOWN_'))
     heard.publisher_watch.check()
     assert heard.publisher_watch.confirmed == ''
     assert heard.publisher_watch.suspected.startswith(
         'a node without a name must not publish displacement too'
     )
-    infos[-1] = _info('evil')
-    heard.publisher_watch.check()
-    assert heard.publisher_watch.confirmed.startswith('/car/evil must not publish displacement too')
-
-
-def test_the_name_of_a_writer_is_awaited_for_a_moment_from_its_first_message(monkeypatch):
-    now, nameless = [100.0], UnnamedPublisher()
-    monkeypatch.setattr(mount_ros.publishers.time, 'monotonic', lambda: now[0])
-    assert not nameless.is_awaited(False)
-    for _ in range(2):
-        begin = now[0]
-        assert nameless.is_awaited(True)
-        now[0] = begin + 0.9 * NAMING_TIME
-        assert nameless.is_awaited(True)
-        now[0] = begin + 1.1 * NAMING_TIME
-        assert not nameless.is_awaited(True)
-        assert not nameless.is_awaited(False)  # named, or gone
+    for name, namespace in (('evil', '/car'), ('mount_driver_io', '/other_car')):
+        infos[-1] = _info(name, namespace=namespace)
+        heard.publisher_watch.check()
+        named = f'{namespace}/{name} must not publish displacement too'
+        assert heard.publisher_watch.confirmed.startswith(named)
 
 
 class Publishers:

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from mount_ros.messages import scalars
 from mount_ros.messages.cdr import wrench
 from mount_ros.messages.scalars import MessageError, OneNumberLayout, ScalarsLayout, ScalarsReader, stamp_of
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, DISPLACEMENT, control_trace
@@ -22,23 +21,12 @@ floats = st.floats(allow_nan=False)
 
 @given(stamp=stamps, numbers=st.tuples(floats, floats), slopes=st.tuples(floats, floats))
 def test_packed_messages_are_what_the_middleware_reads(stamp, numbers, slopes):
-    message = deserialize_message(ScalarsLayout(COIL_RIPPLE).pack(stamp, numbers, slopes), JointState)
+    raw = ScalarsLayout(COIL_RIPPLE).pack(stamp, numbers, slopes)
+    assert ScalarsLayout(COIL_RIPPLE).unpack(raw) == (stamp, numbers, slopes)
+    message = deserialize_message(raw, JointState)
     assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
     assert tuple(message.name) == COIL_RIPPLE.names
     assert (tuple(message.position), tuple(message.velocity)) == (numbers, slopes)
-
-
-@given(stamp=stamps, numbers=st.tuples(floats, floats), slopes=st.tuples(floats, floats))
-def test_unpack_returns_what_was_packed(stamp, numbers, slopes):
-    layout = ScalarsLayout(COIL_RIPPLE)
-    assert layout.unpack(layout.pack(stamp, numbers, slopes)) == (stamp, numbers, slopes)
-
-
-def test_two_layouts_of_a_topic_understand_each_other_without_the_slow_path(monkeypatch):
-    raw = ScalarsLayout(DISPLACEMENT).pack(STAMP, (0.001,))
-    reader = ScalarsLayout(DISPLACEMENT)
-    monkeypatch.setattr(reader, '_unpack_foreign', lambda _: pytest.fail('read as a foreign message'))
-    assert reader.unpack(raw) == (STAMP, (0.001,), ())
 
 
 def test_a_record_is_packed_in_the_order_of_the_names():
@@ -55,25 +43,18 @@ def test_a_foreign_order_of_names_is_read_by_name():
     message.header.stamp.sec = 7
     stamp, positions, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
     assert (stamp, positions, velocities) == (7_000_000_000, (3.0, 1.0), (6.0, 4.0))
+    message.velocity = []
+    assert all(map(math.isnan, ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))[2]))
 
 
-def test_a_reader_takes_names_from_messages_of_any_and_remembers_their_layout(monkeypatch):
+def test_a_reader_takes_names_from_messages_of_any_layout():
     reader = ScalarsReader(('current', 'magnitude'))
     named = (('current',), ('x', 'magnitude', 'current'))
     short, long = (ScalarsLayout(control_trace(names)) for names in named)
     assert reader.read(long.pack(STAMP, (1.0, 2.0, 3.0))) == (STAMP, [3.0, 2.0])
-    monkeypatch.setattr(scalars, 'deserialise', lambda *_: pytest.fail('decoded once more'))
-    assert reader.read(long.pack(STAMP + 1, (4.0, 5.0, 6.0))) == (STAMP + 1, [6.0, 5.0])
-    monkeypatch.undo()
     stamp, (current, magnitude) = reader.read(short.pack(STAMP, (7.0,)))
     assert (stamp, current) == (STAMP, 7.0)
     assert math.isnan(magnitude)
-
-
-def test_missing_velocities_are_unknown_and_not_zero():
-    message = JointState(name=['coil_current', 'flux_density'], position=[1.0, math.nan])
-    _, _, velocities = ScalarsLayout(COIL_RIPPLE).unpack(serialize_message(message))
-    assert all(math.isnan(value) for value in velocities)
 
 
 def test_a_message_without_the_declared_name_is_refused():

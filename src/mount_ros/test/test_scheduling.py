@@ -35,35 +35,6 @@ def test_the_middleware_names_its_threads_as_those_that_carry_the_data_are_told_
     assert not any(map(by_locks.fullmatch, names)), 'data is taken by shared memory, which has locks'
 
 
-def test_threads_of_python_are_found_by_their_own_names():
-    threads = Threads()
-    assert threads.names()[threads.own] == 'MainThread'
-    assert 0.0 < threads.processor_time(threads.own) < 3600.0
-
-
-INHERITING = """
-import os, threading
-from mount_ros.nodes.scheduling import drop_real_time
-threading.Thread(target=threading.Event().wait, daemon=True).start()
-print(drop_real_time(), {os.sched_getscheduler(int(task)) for task in os.listdir('/proc/self/task')})
-"""
-
-
-@needs_real_time
-def test_a_process_started_in_real_time_becomes_ordinary_with_all_its_threads():
-    def start_urgent():
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(3))
-
-    process = subprocess.run(
-        [sys.executable, '-c', INHERITING],
-        preexec_fn=start_urgent,
-        capture_output=True,
-        text=True,
-        timeout=LIMIT,
-    )
-    assert process.stdout == f'3 {{{os.SCHED_OTHER}}}\n'
-
-
 SPINNING = """
 import os, threading
 from mount_ros.nodes.lifecycle import SafeLifecycleNode

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from mount_driver.protocol import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
-from mount_sim.electronics.electronics import ElectronicsParameters, status_every
+from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
 
 _REMEMBERED = 1024  # samples whose sending time is kept
@@ -47,13 +47,11 @@ class ElectronicsLoop:
         self,
         mount: SimulatedMount,
         can_end: CanEnd,
-        electronics: ElectronicsParameters,
         publish: Callable[[int], None],
     ):
         self._mount = mount
         self._can_end = can_end
         self._status_every = status_every(mount.sample_rate)
-        self._electronics = electronics
         self._publish = publish
         self._sent_at = [math.nan] * _REMEMBERED
         self._asked: int | None = None  # lock-step: the sample that waits for its answer
@@ -180,8 +178,8 @@ class ElectronicsLoop:
         beyond, self._beyond_told = self._beyond_told, self._mount.beyond_range.samples
         return Status(
             displacement_sensor=self._beyond_told > beyond,
-            supply_voltage=self._electronics.supply_voltage,
-            coil_temperature_celsius=self._electronics.coil_temperature,
+            supply_voltage=self._mount.electronics.supply_voltage,
+            coil_temperature_celsius=self._mount.electronics.coil_temperature,
             setpoint_timeout=not self._mount.enabled,
             e2e_error=self._failed_told > failed,
         )

@@ -32,7 +32,7 @@ from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
 from mount_sim.plant.mounts import ALONE, general_name, mount_names, texts_of_mount, values_of_mount
-from mount_sim.plant.simulated_car import DivergedError, SimulatedCar, mount_parameters
+from mount_sim.plant.simulated_car import DivergedError, SimulatedCar
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
@@ -87,8 +87,7 @@ class MountSim(SafeLifecycleNode):
             own = values_of_mount(self._values, name)
             can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate)
             self._can_ends.append(can_end)
-            electronics = mount_parameters(self._values, name).electronics
-            self._loops[name] = ElectronicsLoop(mount, can_end, electronics, partial(self._publish, name))
+            self._loops[name] = ElectronicsLoop(mount, can_end, partial(self._publish, name))
         self._loop = CarLoop(self._loops, drift, rate)
         self._counted = SlidingWindow({})
         self._ending.clear()

@@ -9,9 +9,10 @@ contact is the full model; nothing else acts.
 import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike
 from mount_models.arrays import FloatArray
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
-from mount_models.quantity import ParameterError, with_values
+from mount_models.quantity import ParameterError
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE, SAMPLE_TIME
 from mount_sim.plant.friction import full_response
 from mount_sim.plant.reluctance import ReluctanceActuator
@@ -43,13 +44,12 @@ FORCE_CURRENTS = np.linspace(0.1, HIGHEST_CURRENT, 59)
 """Currents at which the force is taken at each gap, A (chosen)."""
 
 
-@dataclass(frozen=True)
-class Rack:
+class Rack(NamedTuple):
     """A rack with one actuator in it; `noise` is the relative standard deviation of each sensor."""
 
-    actuator: ReluctanceActuator = field(default_factory=ReluctanceActuator)
-    coil: RippleCoil = field(default_factory=RippleCoil)
-    temperature: TemperatureCoefficients = field(default_factory=TemperatureCoefficients)
+    actuator: ReluctanceActuator = ReluctanceActuator()
+    coil: RippleCoil = RippleCoil()
+    temperature: TemperatureCoefficients = TemperatureCoefficients()
     noise: float = 0.01
     seed: int = 0
 
@@ -110,8 +110,7 @@ def drawn_rack(seed: int, noise: float = 0.01) -> Rack:
     actuator, coil = ReluctanceActuator(), RippleCoil()
     drawn = partial(_drawn, random)
     return Rack(
-        with_values(
-            actuator,
+        actuator._replace(
             gap_area=drawn(actuator.gap_area),
             core_length=drawn(actuator.core_length),
             saturation_polarisation=drawn(actuator.saturation_polarisation, 0.05),
@@ -119,7 +118,7 @@ def drawn_rack(seed: int, noise: float = 0.01) -> Rack:
             residual_gap=drawn(actuator.residual_gap, 0.25),
             leakage_permeance=drawn(actuator.leakage_permeance),
         ),
-        with_values(coil, conductivity=drawn(coil.conductivity)),
+        coil._replace(conductivity=drawn(coil.conductivity)),
         TemperatureCoefficients(core=drawn(0.0043, 0.2)),
         noise,
         seed,
@@ -176,8 +175,7 @@ _DRAWN = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class RackNoise:
+class RackNoise(NamedTuple):
     """Noise of the rack's sensors: `relative` rms of each force (and of ramp displacements) over its own rms.
 
     `displacement` in m is that of the position sensor in the long strokes of the sawtooth (chosen: it comes

@@ -13,7 +13,6 @@ from mount_driver.exchange import Exchange
 from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec, Setpoint
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.loop import ElectronicsLoop
 
 CODEC = MountCodec()
@@ -34,7 +33,6 @@ class Car:
         self._loop = ElectronicsLoop(
             mount,
             self._end,
-            ElectronicsParameters(),
             lambda number: self.setpoints.append(mount.truth['current_setpoint']),
         )
         self._tap = self.bus()  # hears what the driver sends

@@ -17,7 +17,6 @@ from mount_driver.parameters import DriverParameters
 from mount_driver.protocol import MountCodec
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.electronics import ElectronicsParameters
 from mount_sim.loop import ElectronicsLoop
 
 CODEC = MountCodec()
@@ -106,9 +105,7 @@ class Link:
         there, back = (Way(random, lambda: self.now, longest) for _ in range(2))
         self.random, self.ways = random, (there, back)
         self.host, self.electronics = Worker(random, LONGEST_STALL), Worker(random, longest)
-        self._loop = ElectronicsLoop(
-            mount, CanEnd(Bus(back, there)), ElectronicsParameters(), lambda number: None
-        )
+        self._loop = ElectronicsLoop(mount, CanEnd(Bus(back, there)), lambda number: None)
         self._answers = deque()  # time, stamp, current
         self._latency = 0
         self.exchange = Exchange(

@@ -15,7 +15,7 @@ from ros_testing import LIMIT
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
 from mount_sim.electronics.can_end import CanEnd
-from mount_sim.electronics.electronics import ElectronicsParameters, Reading
+from mount_sim.electronics.electronics import Reading
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError, until_ending
 from mount_sim.quantisation import quantised_displacement
 
@@ -74,10 +74,9 @@ def ends():
     host.bus.shutdown()
 
 
-def _loop(mount, end, published=None, **electronics):
-    parameters = ElectronicsParameters(**electronics)
+def _loop(mount, end, published=None):
     publish = (published if published is not None else []).append
-    return ElectronicsLoop(mount, end, parameters, publish)
+    return ElectronicsLoop(mount, end, publish)
 
 
 def _car(loop):

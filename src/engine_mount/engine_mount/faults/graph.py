@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,7 +20,6 @@ from engine_mount.faults.observers import Report, observers, since
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import CONTROL, SIM, SIMULATED
 from mount_models.quantity import ParameterError
-from mount_ros.nodes.process import tied
 
 PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine that is not busy
 SHARED_MEMORY = Path('/dev/shm')
@@ -239,3 +239,21 @@ def _shared_memory(process: psutil.Process) -> set[str]:
     except psutil.Error:
         return set()
     return {path.name for path in paths if path.parent == SHARED_MEMORY}
+
+
+_TIED = """
+import ctypes, os, signal, sys
+ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
+if os.getppid() != int(sys.argv[1]):  # it ended before
+    sys.exit(1)
+os.execvp(sys.argv[2], sys.argv[2:])
+"""
+
+
+def tied(command: Sequence[str]) -> list[str]:
+    """Return the command that runs `command`, a foreign program, and is killed when this process ends.
+
+    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
+    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
+    """
+    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]

@@ -124,7 +124,7 @@ def rack(
     from mount_models.friction.contact import FrictionContact
     from mount_sim.rack import Rack, drawn_friction, drawn_rack, write_force, write_friction, write_ripple
 
-    simulated = replace(drawn_rack(seed) if drawn else Rack(seed=seed), noise=noise)
+    simulated = (drawn_rack(seed) if drawn else Rack(seed=seed))._replace(noise=noise)
     pads = drawn_friction(seed) if drawn else (FrictionContact(), FrictionCoefficients())
     out, steps = Path(folder), 2 + len(celsius)
     out.mkdir(parents=True, exist_ok=True)

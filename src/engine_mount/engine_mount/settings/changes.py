@@ -34,5 +34,4 @@ def changed_parameters(parameters: Known) -> dict[str, dict[str, tuple[Any, Any]
 def _differs(value: Any, default: Any) -> bool:
     if isinstance(default, tuple):
         return bool(value) and tuple(value) != default
-    is_known = value == value or default == default  # NaN says that a value is unknown
-    return is_known and value != default
+    return value != default and not (value != value and default != default)  # NaN is unknown

@@ -10,7 +10,6 @@ from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError
 
 Settings = dict[str, dict[str, Any]]
-_FIRST = 'mount_control'  # the node that is meant where none is named
 
 
 def settings_of_options(options: Sequence[str], known: Known | None = None) -> Settings:
@@ -47,8 +46,8 @@ def owned(name: str, known: Known | None = None) -> tuple[str, str]:
     if parameter and (node.rpartition('/')[2] in {*known, *NODES} or '/' in node):
         return node, parameter
     owners = [node for node, names in known.items() if name in names]
-    if _FIRST in owners:
-        return _FIRST, name
+    if 'mount_control' in owners:
+        return 'mount_control', name
     if len(owners) > 1:
         raise ParameterError(
             f'{name!r} is a parameter of {", ".join(owners)}: write which, as in {owners[0]}.{name}'

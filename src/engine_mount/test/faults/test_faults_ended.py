@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from ros_testing import free_domain
 
 from engine_mount.faults import session
 from engine_mount.faults.case import MATRIX
-from engine_mount.faults.graph import Place
+from engine_mount.faults.graph import Place, tied
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -37,3 +38,11 @@ def test_the_graph_that_runs_is_ended_whatever_signal_comes(monkeypatch, number)
             session.run_faults(cases, place, lambda *_: None, lambda *_: None)
     assert ended == [number]
     assert signal.getsignal(number) is before
+
+
+def test_a_program_of_others_is_not_run_for_a_starter_that_has_ended(monkeypatch):
+    assert subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=True).stdout == b'run\n'
+    with subprocess.Popen(['true']) as other:
+        monkeypatch.setattr(os, 'getpid', lambda: other.pid)
+        ended = subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=False)
+    assert (ended.returncode, ended.stdout) == (1, b'')

@@ -59,9 +59,6 @@ class Bucket:
         for file in folder.iterdir():
             self.put(f'{key}/{file.name}', file.read_bytes())
 
-    def put_in_parts(self, key, data, size):
-        self._files.pipe_file(f'drives/{key}', data, chunksize=size)
-
 
 @contextlib.contextmanager
 def sftp_store(folder, home, port=0):

@@ -41,32 +41,23 @@ def test_numbers_times_and_units_come_back(made):
     assert not [note for note in measured.notes if 'hold no number' in note]
 
 
-def test_headings_are_told_without_reading_and_only_chosen_columns_are_read(made):
+def test_only_chosen_columns_are_read_and_the_provenance_tells_the_bytes(made):
     _, file = made
-    there = headings(file.path, file.stated)
     measured = read(file.path, [file.names['travel']], file.stated)
     assert [one.values.size for one in measured.columns.values()] == [N]
-    assert {one.name for one in there} == {one.name for one in (*measured.columns.values(), *measured.others)}
-
-
-def test_the_provenance_tells_the_bytes(made):
-    _, file = made
-    told = read(file.path, [file.names['az']], file.stated).provenance
+    assert {one.name for one in headings(file.path, file.stated)} == {one.name for one in measured.headings}
+    told = measured.provenance
     assert told.uri == str(file.path)
-    if file.path.is_file():
-        content = file.path.read_bytes()
-        assert (told.sha256, told.size) == (hashlib.sha256(content).hexdigest(), len(content))
-    else:
-        lines = [
-            f'{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.relative_to(file.path).as_posix()}\n'
-            for one in sorted(file.path.rglob('*')) if one.is_file()
-        ]  # fmt: skip
-        assert told.sha256 == hashlib.sha256(''.join(lines).encode()).hexdigest()
-        assert told.size == sum(one.stat().st_size for one in file.path.rglob('*') if one.is_file())
-
-
-def test_a_column_that_is_not_there_is_refused_with_those_that_are(made):
-    _, file = made
+    files = (
+        [file.path] if file.path.is_file() else sorted(one for one in file.path.rglob('*') if one.is_file())
+    )
+    hashes = [hashlib.sha256(one.read_bytes()).hexdigest() for one in files]
+    whole = hashes[0]
+    if file.path.is_dir():
+        names = [one.relative_to(file.path).as_posix() for one in files]
+        lines = ''.join(f'{each}  {name}\n' for each, name in zip(hashes, names, strict=True))
+        whole = hashlib.sha256(lines.encode()).hexdigest()
+    assert (told.sha256, told.size) == (whole, sum(one.stat().st_size for one in files))
     with pytest.raises(SignalError, match=r"has no column 'yaw'; its columns are .*"):
         read(file.path, ['yaw'], file.stated)
 

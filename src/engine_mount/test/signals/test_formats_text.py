@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError
 
 ROWS = [[0.0, 1.25, -3.5e-3], [0.01, 2.5, 1200.0], [0.02, -0.125, 7.0], [0.03, 0.5, 8.75]]
+TITLES = ('t [s]', 'az [g]', 'Höhe [µm]')
 
 
 @pytest.fixture(params=['pyarrow', 'without pyarrow'])
@@ -25,21 +27,15 @@ def _either_parser(request, monkeypatch):
         monkeypatch.setattr(module, '_in_bulk', lambda *_: None)
 
 
-def _written(rows, delimiter, decimal='.', titles=('t [s]', 'az [g]', 'Weg [mm]'), end='\n', tail=''):
-    lines = [delimiter.join(titles) + tail] if titles else []
-    lines += [delimiter.join(repr(value).replace('.', decimal) for value in row) + tail for row in rows]
-    return end.join(lines) + end
-
-
 def _read(tmp_path, text, columns=None, encoding='utf-8', **stated):
     path = tmp_path / 'drive.csv'
     path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
     return read(path, columns, Stated(**stated))
 
 
-def _refusal(tmp_path, text, columns=None, **stated):
+def _refusal(tmp_path, text):
     with pytest.raises(SignalError) as caught:
-        _read(tmp_path, text, columns, **stated)
+        _read(tmp_path, text)
     assert str(tmp_path / 'drive.csv') in str(caught.value)
     return str(caught.value)
 
@@ -49,30 +45,22 @@ def _is_told(measured, rows=ROWS):
 
 
 @pytest.mark.usefixtures('_either_parser')
-@pytest.mark.parametrize('end', ['\n', '\r\n', '\r'])
-@pytest.mark.parametrize('tail', ['', 'trailing'])
+@pytest.mark.parametrize('tail', [False, True])
 @pytest.mark.parametrize(
-    ('delimiter', 'decimal'),
-    [(',', '.'), (';', '.'), (';', ','), ('\t', '.'), ('\t', ','), ('|', '.'), ('|', ',')],
-)
-def test_delimiters_decimal_signs_and_line_ends(tmp_path, delimiter, decimal, tail, end):
-    text = _written(ROWS, delimiter, decimal, end=end, tail=delimiter if tail else '')
-    measured = _read(tmp_path, text)
+    ('delimiter', 'decimal', 'end', 'encoding'),
+    [
+        (',', '.', '\n', 'utf-8'), (';', '.', '\r', 'cp1252'), (';', ',', '\r\n', 'utf-8-sig'),
+        ('\t', '.', '\n', 'cp1252'), ('\t', ',', '\r\n', 'utf-16'), ('|', ',', '\r', 'utf-8'),
+    ],
+)  # fmt: skip
+def test_delimiters_decimal_signs_line_ends_and_encodings(tmp_path, delimiter, decimal, end, encoding, tail):
+    cells = [TITLES, *([repr(value).replace('.', decimal) for value in row] for row in ROWS)]
+    text = end.join(delimiter.join(row) + delimiter * tail for row in cells) + end
+    measured = _read(tmp_path, text, encoding=encoding)
     _is_told(measured)
     told = [(one.name, one.unit, one.number) for one in measured.columns.values()]
-    assert told == [('t', 's', 0), ('az', 'g', 1), ('Weg', 'mm', 2)]
+    assert told == [('t', 's', 0), ('az', 'g', 1), ('Höhe', 'µm', 2)]
     assert f'decimal {"point" if decimal == "." else "comma"}' in measured.notes[0]
-
-
-@pytest.mark.usefixtures('_either_parser')
-@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16', 'cp1252'])
-def test_encodings(tmp_path, encoding):
-    titles = ('Zeit [s]', 'Höhe [µm]', 'Kraft (N)')
-    measured = _read(tmp_path, _written(ROWS, ';', ',', titles), encoding=encoding)
-    _is_told(measured)
-    assert [(one.name, one.unit) for one in measured.columns.values()] == [
-        ('Zeit', 's'), ('Höhe', 'µm'), ('Kraft', 'N')
-    ]  # fmt: skip
 
 
 @pytest.mark.usefixtures('_either_parser')
@@ -93,14 +81,16 @@ def test_runs_of_blanks(tmp_path, decimal):
         ('System;Q7\nRate;1000\n\nt;az\ns;g\n0;1.5\n1;2.5\n2;3.5\n', ['t', 'az']),
         ('Time (s)   Acc z (g)\n0.0   1.5\n1.0   2.5\n2.0  3.5\n', ['Time', 'Acc z']),
         ('"t","az"\n"0","1,5"\n"1","2,5"\n"2","3,5"\n', ['t', 'az']),
-        (',0,1\n0,0,1.5\n1,1,2.5\n2,2,3.5\n', None),
+        (',0,1\n0,0,1.5\n1,1,2.5\n2,2,3.5\n', ['0', '1']),
         ('az\n1,5\n2,5\n3,5\n', ['az']),
+        ('t,state,az\n0,on,1.5\n1,off,2.5\n2,on,3.5\n', ['t', 'az']),
     ],
 )
 def test_where_the_titles_stand(tmp_path, text, names):
     measured = _read(tmp_path, text)
-    assert list(measured.columns)[-2:] == (names or ['0', '1'])
+    assert list(measured.columns)[-2:] == names
     np.testing.assert_array_equal(list(measured.columns.values())[-1].values, [1.5, 2.5, 3.5])
+    assert ('state: no numbers, left out' in measured.notes) == ('state' in text)
 
 
 def test_a_row_of_units_gives_the_units(tmp_path):
@@ -115,10 +105,9 @@ def test_a_row_of_units_gives_the_units(tmp_path):
         ('Weg [mm]', 'Weg', 'mm'), ('Weg (mm)', 'Weg', 'mm'), ('accel_z/g', 'accel_z', 'g'),
         ('disp_mm', 'disp', 'mm'), ('Kraft in N', 'Kraft', 'N'), ('a / (m/s²)', 'a', 'm/s²'),
         ('acc_m_s2', 'acc', 'm/s2'), ('v_in_per_s', 'v', 'in/s'),
-        ('Acc (front left)', 'Acc (front left)', ''),
-        ('accel_z', 'accel_z', ''), ('m/s', 'm/s', ''), ('acc[0]', 'acc[0]', ''), ('phase_a', 'phase_a', ''),
-        ('friction_force_kip', 'friction_force', 'kip'), ('x_min', 'x_min', ''), ('Time, s', 'Time', 's'),
-        ('Acc (m/s^2)', 'Acc', 'm/s^2'), ('Time (s)', 'Time', 's'), ('', '', ''), ('n [1/min]', 'n', '1/min'),
+        ('Acc (front left)', 'Acc (front left)', ''), ('m/s', 'm/s', ''), ('acc[0]', 'acc[0]', ''),
+        ('phase_a', 'phase_a', ''), ('x_min', 'x_min', ''), ('Time, s', 'Time', 's'),
+        ('n [1/min]', 'n', '1/min'),
     ],
 )  # fmt: skip
 def test_names_and_units_of_titles(title, name, unit):
@@ -133,23 +122,18 @@ def test_missing_values_are_nan_and_told(tmp_path):
 
 
 @pytest.mark.usefixtures('_either_parser')
-@pytest.mark.parametrize('zone', ['', 'Z', '+01:00'])
-def test_dates_are_the_times_of_the_other_columns(tmp_path, zone):
-    lines = ['when;az', *(f'2024-05-01 12:00:0{place}.250{zone};{place},5' for place in range(5))]
+@pytest.mark.parametrize(
+    ('form', 'hours'),
+    [
+        ('2024-05-01 12:00:0{}.250', 0), ('2024-05-01T12:00:0{}.250Z', 0),
+        ('2024-05-01 12:00:0{}.250+01:00', 1), ('1.5.2024 12:00:0{},250', 0),
+    ],
+)  # fmt: skip
+def test_dates_are_the_times_of_the_other_columns(tmp_path, form, hours):
+    lines = ['when;az', *(f'{form.format(place)};{place},5' for place in range(5))]
     column = _read(tmp_path, '\n'.join(lines), ['az']).column('az')
     np.testing.assert_array_equal(column.time.times, np.arange(5.0))
-    hour = 3600 * 10**9 if zone == '+01:00' else 0
-    assert column.time.begin == 1714564800_250_000_000 - hour
-
-
-def test_columns_of_text_are_left_out_and_told(tmp_path):
-    measured = _read(tmp_path, 't,state,az\n0,on,1.5\n1,off,2.5\n2,on,3.5\n')
-    assert list(measured.columns) == ['t', 'az']
-    assert measured.column('az').number == 2
-    assert 'state: no numbers, left out' in measured.notes
-
-
-# What can be read in two ways
+    assert column.time.begin == (1714564800 - 3600 * hours) * 10**9 + 250_000_000
 
 
 @pytest.mark.parametrize(
@@ -161,20 +145,18 @@ def test_columns_of_text_are_left_out_and_told(tmp_path):
     ],
 )
 def test_what_can_be_read_in_two_ways_is_refused(tmp_path, text):
-    assert 'or' in _refusal(tmp_path, text)
-    assert 'state' in _refusal(tmp_path, text)
+    refusal = _refusal(tmp_path, text)
+    assert ' or ' in refusal
+    assert 'state' in refusal
 
 
-def test_what_is_stated_decides(tmp_path):
+def test_titles_or_what_is_stated_decide(tmp_path):
+    assert list(_read(tmp_path, 't,x\n0,1\n2,3\n').columns) == ['t', 'x']
+    np.testing.assert_array_equal(_read(tmp_path, 'x\n0,1\n2,3\n').column('x').values, [0.1, 2.3])
     assert list(_read(tmp_path, '0,1\n2,3\n', decimal=',').columns) == ['0']
     assert list(_read(tmp_path, '0,1\n2,3\n', delimiter=',').columns) == ['0', '1']
     values = _read(tmp_path, 't;x\n999;1,000\n1000;1,001\n', decimal=',').column('x').values
     np.testing.assert_array_equal(values, [1.0, 1.001])
-
-
-def test_titles_decide_what_the_numbers_leave_open(tmp_path):
-    assert list(_read(tmp_path, 't,x\n0,1\n2,3\n').columns) == ['t', 'x']
-    np.testing.assert_array_equal(_read(tmp_path, 'x\n0,1\n2,3\n').column('x').values, [0.1, 2.3])
 
 
 @pytest.mark.usefixtures('_either_parser')
@@ -182,10 +164,7 @@ def test_titles_decide_what_the_numbers_leave_open(tmp_path):
     ('line', 'reason'),
     [
         ('1.5;x', "column 'az': 'x' is no number; expected is a number with decimal point"),
-        (
-            '1.5;2,5',
-            "'2,5' is no number; expected is a number with decimal point; is the decimal sign the other",
-        ),
+        ('1.5;2,5', "'2,5' is no number; expected is a number with decimal point; is the decimal sign the"),
         ('1.5;1,234.5', 'export without signs between thousands'),
         ('1.5', "1 cells ('1.5') where the others have 2"),
         ('1.5;2;3', '3 cells'),
@@ -209,16 +188,17 @@ def test_a_line_far_behind_is_counted_across_blocks(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ('text', 'reason'),
     [
-        ('', 'is empty'),
         ('\n \n', 'is empty'),
         ('# only\n', 'comments and blank lines only'),
         ('some words\nmore of them here\n', 'is no line of a table of numbers'),
         ('t,x\n0,1,2,3\n1,5,2,5\n', '2 titles (t, x) above lines of 4 cells'),
+        ('0,000;1.234,500\n0,001;1.235,250\n', "'1.234,500' is no number; .* signs between thousands"),
+        ("t,x\n0.5,1'234.5\n1.5,1'235.5\n", 'signs between thousands'),
         (b'\x00\x01\x02' * 500, 'is no text'),
     ],
 )
 def test_what_is_no_table_is_refused(tmp_path, text, reason):
-    assert reason in _refusal(tmp_path, text)
+    assert re.search(reason.replace('(', r'\(').replace(')', r'\)'), _refusal(tmp_path, text))
 
 
 # Generated dialects

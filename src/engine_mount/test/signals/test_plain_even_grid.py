@@ -12,15 +12,7 @@ NUMBERS = np.arange(COUNT)
 TIMES = PERIOD * NUMBERS
 
 
-def drive(times):
-    """Body, engine and wheel of a car, 1.3 to 19 Hz, and so much of each that the largest is about 4."""
-    return sum(
-        a * np.sin(2.0 * np.pi * f * times + p)
-        for a, f, p in ((1, 1.3, 0), (2, 7.7, 1), (0.8, 12, 2), (0.3, 19, 3))
-    )
-
-
-VALUES = drive(TIMES)
+VALUES = sum(a * np.sin(2.0 * np.pi * f * TIMES + f) for a, f in ((1, 1.3), (2, 7.7), (0.8, 12), (0.3, 19)))
 
 
 def even(times, values=VALUES, longest_gap=0.125):
@@ -39,10 +31,6 @@ def changed(place, stamp):
     return times
 
 
-def random(seed=1):
-    return np.random.default_rng(seed)
-
-
 def test_even_stamps_change_nothing():
     found = even(TIMES + 46_000.0)
     np.testing.assert_array_equal(found.values, VALUES)
@@ -52,7 +40,7 @@ def test_even_stamps_change_nothing():
 
 
 def test_stamps_that_jitter_about_even_samples_change_none():
-    found = even(TIMES + random().uniform(-0.3, 0.3, COUNT) * PERIOD)
+    found = even(TIMES + np.random.default_rng(1).uniform(-0.3, 0.3, COUNT) * PERIOD)
     np.testing.assert_array_equal(found.values, VALUES)
     assert found.rate == pytest.approx(100.0, rel=1e-3)
     assert 'taken as evenly spaced at 100 Hz' in found.notes[0]
@@ -92,19 +80,16 @@ def test_what_fills_a_gap_stays_near_the_samples_beside_it():
     ('times', 'reason'),
     [
         (TIMES[::-1], 'time does not rise at sample 1: 0.000000 s is followed by -0.010000 s'),
-        (np.zeros(COUNT), 'time does not rise at sample 1'),
         (changed(7, 1.0), 'time does not rise at sample 8: 1.000000 s is followed by 0.080000 s'),
         (TIMES * 1000.0, 'has 0.1 samples per second (is its time in seconds?)'),
         (TIMES * 2.1, 'at least 50 are needed'),
         (TIMES + 0.12 * (NUMBERS > 500), 'has a gap of 0.130 s at 5.000 s; up to 0.125 s are interpolated'),
-        (TIMES + 3.0 * (NUMBERS > 500), 'has a gap of 3.010 s at 5.000 s'),
         (TIMES + 0.2 * (NUMBERS > COUNT - 10), 'has a gap of 0.210 s at 29.900 s'),
         (
             changed(1000, TIMES[999] + 1e-6),
             'samples 999 and 1000 are 0.001 ms apart at 9.990 s, less than 2.5 ms: say their --rate',
         ),
         (PERIOD * (NUMBERS // 5 * 5 + 4), 'say their --rate if they were taken evenly'),
-        (PERIOD * (NUMBERS // 20 * 20 + 19), 'has a gap of 0.200 s'),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_the_place(times, reason):

@@ -22,11 +22,6 @@ def _short_pauses(monkeypatch):
     monkeypatch.setattr(remote, 'FIRST_PAUSE', 1e-3)
 
 
-@pytest.fixture
-def copies(own_home):
-    return own_home / 'copies'
-
-
 def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob('*') if path.is_file()}
 
@@ -108,34 +103,27 @@ def test_what_is_changed_in_the_store_comes_anew(s3):
     assert first.read_bytes() == b'one'
 
 
-def test_a_file_in_parts_comes_whole(s3):
-    s3.put_in_parts('a.bin', DATA * 4, 5 << 20)
-    assert fetched('s3://drives/a.bin').read_bytes() == DATA * 4
-
-
-def test_a_connection_that_breaks_is_tried_again(breaking, copies):
+def test_a_connection_that_breaks_is_tried_again(breaking):
     way, uri = breaking
     way.bytes_each = 500_000
 
-    def mend(done, of):
+    def mend():
+        wait_for(lambda: way.broken)
         way.bytes_each = None
 
-    wait = threading.Thread(target=lambda: (wait_for(lambda: way.broken), mend(0, 0)))
+    wait = threading.Thread(target=mend)
     wait.start()
     assert fetched(uri).read_bytes() == DATA
     wait.join()
-    assert way.broken
 
 
-def test_a_store_that_stays_away_ends_in_a_sentence_and_leaves_nothing(breaking, copies):
+def test_a_store_that_stays_away_ends_in_a_sentence_and_leaves_nothing(breaking, own_home):
     way, uri = breaking
     way.bytes_each = 500_000  # of a file of 2 MB
-    with pytest.raises(
-        StoreAwayError, match=r'a\.bin: .+ \(4 attempts within .*\); is the store reachable'
-    ) as end:
+    with pytest.raises(StoreAwayError, match=r'a\.bin: .+ \(4 attempts within .*is the store reach') as end:
         fetched(uri)
     assert str(end.value).startswith(uri)
-    assert not files_of(copies)
+    assert not files_of(own_home / 'copies')
     way.away = True
     with pytest.raises(StoreAwayError, match='4 attempts'):
         fetched(uri)
@@ -168,35 +156,16 @@ def test_a_host_whose_key_is_not_known_is_refused(sftp, own_home):
 
 
 @pytest.mark.parametrize('change', ['a.bin', 'b.bin'])
-def test_a_folder_that_changes_while_it_is_fetched_is_refused(sftp, copies, change):
+def test_a_folder_that_changes_while_it_is_fetched_is_refused(sftp, own_home, change):
     port, folder = sftp
     (folder / 'run').mkdir()
     (folder / 'run' / 'a.bin').write_bytes(DATA)
-    changes = iter([b'xyz'])
-
-    def write(done, of):
-        for content in changes:
-            (folder / 'run' / change).write_bytes(DATA + content)
-
     with pytest.raises(SourceError, match=r'was changed while it was fetched|bytes came instead of'):
-        fetched(f'sftp://127.0.0.1:{port}/run', write)
-    assert not files_of(copies)
-
-
-def test_a_file_that_is_shorter_than_its_size_is_refused(web, copies, monkeypatch):
-    server, folder = web
-    (folder / 'a.bin').write_bytes(DATA)
-    plain = remote._filesystem
-
-    def cut(uri):
-        files, path = plain(uri)
-        files.get_file = lambda path, target, callback: remote.Path(target).write_bytes(DATA[:-1])
-        return files, path
-
-    monkeypatch.setattr(remote, '_filesystem', cut)
-    with pytest.raises(StoreAwayError, match='2097151 bytes came instead of 2097152'):
-        fetched(f'{server.uri}/a.bin')
-    assert not files_of(copies)
+        fetched(
+            f'sftp://127.0.0.1:{port}/run',
+            lambda done, of: (folder / 'run' / change).write_bytes(DATA + b'xyz'),
+        )
+    assert not files_of(own_home / 'copies')
 
 
 def test_a_server_that_tells_no_size_is_refused(reference):
@@ -243,7 +212,7 @@ def test_links_of_sftp_are_followed_and_letters_of_names_stay_as_they_are(sftp):
     assert fetched(entry.uri).name == name
 
 
-def test_what_a_killed_process_left_is_not_taken_for_a_file(web, copies):
+def test_what_a_killed_process_left_is_not_taken_for_a_file(web, own_home):
     server, folder = web
     (folder / 'a.bin').write_bytes(DATA)
     server.gate.clear()
@@ -251,5 +220,5 @@ def test_what_a_killed_process_left_is_not_taken_for_a_file(web, copies):
         wait_for(lambda: server.asked['GET'] >= 1)
         process.kill()
     server.gate.set()
-    assert [name.startswith('.part-') for name in files_of(copies)] == [True]
+    assert [name.startswith('.part-') for name in files_of(own_home / 'copies')] == [True]
     assert fetched(f'{server.uri}/a.bin').read_bytes() == DATA

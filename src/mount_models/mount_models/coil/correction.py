@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from mount_models.arrays import FloatArray
 from mount_models.coil.copper import resistance_at
-from mount_models.coil.gap import GapCurves, ScaledPolynomial, evaluate
+from mount_models.coil.gap import GapCurves, ScaledPolynomial, check_range_of, evaluate
 from mount_models.quantity import LawRefusedError, OutsideLawError, Quantity
 
 CONDUCTIVITY_COEFFICIENT = 0.0043
@@ -105,12 +105,7 @@ def check_compensation(compensation: TemperatureCompensation, curves: GapCurves)
             f'({c.calibration_celsius:g} degC) by {_LEAST_DIFFERENCE:g} K or more; record warmer or colder'
         )
     for name in ('reluctance_shift', 'crossing_shift'):
-        shift = getattr(c, name)
-        if not (shift.low < shift.high and shift.scale > 0.0):
-            raise LawRefusedError(
-                f'{name} must have a positive scale ({shift.scale:g}) and a range in rising order '
-                f'({shift.low:g} .. {shift.high:g}); calibrate again'
-            )
+        check_range_of(name, getattr(c, name))
     if not 1.0 + c.conductivity_coefficient * (c.lowest_celsius - c.calibration_celsius) > 0.1:
         raise LawRefusedError(
             f'conductivity_coefficient ({c.conductivity_coefficient:g} 1/K) must leave the core a '

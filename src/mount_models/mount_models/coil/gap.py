@@ -125,12 +125,17 @@ def _value(polynomial: ScaledPolynomial, x: npt.ArrayLike, name: str, unit: str,
     return evaluate(polynomial, x)
 
 
-def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
+def check_range_of(name: str, polynomial: ScaledPolynomial) -> None:
+    """Raise `LawRefusedError` unless scale and range of a polynomial can be."""
     if not (polynomial.low < polynomial.high and polynomial.scale > 0.0):
         raise LawRefusedError(
             f'{name} must have a positive scale ({polynomial.scale:g}) and a range in rising order '
             f'({polynomial.low:g} .. {polynomial.high:g}); calibrate again'
         )
+
+
+def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
+    check_range_of(name, polynomial)
     x = np.linspace(polynomial.low, polynomial.high, 301)
     steps = np.sign(slope(polynomial, x))
     falters = ~((steps == steps[0]) & (steps != 0.0))

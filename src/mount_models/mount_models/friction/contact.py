@@ -6,17 +6,11 @@ import numpy as np
 
 from mount_models.friction.coefficient import (
     FrictionCoefficients,
-    dynamic_coefficient,
     offset_coefficient,
     slope_coefficient,
 )
 from mount_models.friction.simplified import FADED_BELOW
 from mount_models.quantity import LawRefusedError, Quantity
-
-LOWEST, HIGHEST = 0.05, 5.0
-"""mu of both pads that is believed (chosen): linings have 0.4 .. 1.8, the controller's floor 0.05."""
-SPEEDS = (0.01, 0.05)
-"""m/s: the fastest strokes of the rack, and 1 mm at 8 Hz, at which the controller relies on them."""
 
 HIGHEST_AT_ALL = 20.0
 """mu of both pads that is simulated and controlled (chosen): only numbers that went astray have more."""
@@ -45,20 +39,6 @@ class FrictionContact(NamedTuple):
     ] = 4.0e6
 
 
-def check_coefficients(coefs: FrictionCoefficients) -> None:
-    """Raise `LawRefusedError` unless mu is plausible both ways and over the normal force."""
-    _check_order(coefs)
-    for speed in SPEEDS:
-        for velocity in (speed, -speed):
-            for load in (coefs.lowest_normal_force, coefs.highest_normal_force):
-                mu = float(dynamic_coefficient(coefs, velocity, 0.0, load))
-                if not LOWEST <= mu <= HIGHEST:
-                    raise LawRefusedError(
-                        f'coefficient of friction ({mu:.3g} at {1e3 * velocity:+.0f} mm/s and {load:g} N) '
-                        f'must lie within {LOWEST:g} .. {HIGHEST:g}; identify the friction again'
-                    )
-
-
 def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> None:
     """Raise `LawRefusedError` unless friction stays finite and positive wherever it can come to be.
 
@@ -66,7 +46,12 @@ def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> Non
     at any deflection xi of the contact. With mu = a + b u the equation of the creeping element (Eqs 8 and 9),
     d_R xi' = F_N (a + b u) - c_R xi, has an end only if F_N b stays below c_R: mu = a c_R / (c_R - F_N b).
     """
-    _check_order(coefs)
+    low, high = coefs.lowest_normal_force, coefs.highest_normal_force
+    if low > high:
+        raise LawRefusedError(
+            f'lowest_normal_force ({low:g} N) must not exceed highest_normal_force ({high:g} N); '
+            'exchange them, or identify again'
+        )
     stiffness = contact.tangential_stiffness
     for speed in (FADED_BELOW, coefs.slope_velocity_limit, HIGHEST_SPEED):
         for velocity in (speed, -speed):
@@ -90,12 +75,3 @@ def check_friction(coefs: FrictionCoefficients, contact: FrictionContact) -> Non
                         f'{HIGHEST_AT_ALL:g}; set the parameters a_*, alpha_* and b_* of the friction closer '
                         'to their defaults'
                     )
-
-
-def _check_order(coefs: FrictionCoefficients) -> None:
-    low, high = coefs.lowest_normal_force, coefs.highest_normal_force
-    if low > high:
-        raise LawRefusedError(
-            f'lowest_normal_force ({low:g} N) must not exceed highest_normal_force ({high:g} N); '
-            'exchange them, or identify again'
-        )

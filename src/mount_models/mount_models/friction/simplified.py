@@ -5,7 +5,6 @@ import numpy as np
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1
 from mount_models.friction.coefficient import (
-    dynamic_coefficient,
     dynamic_coefficient_with,
     load_within_limits,
     offset_coefficient_with,
@@ -66,12 +65,6 @@ def simplified_response(contact, coefs, velocity, normal_force, dt):
 
 
 @compiled
-def faded_coefficient(coefs, velocity, deflection_u, normal_force):
-    """Return mu of Eq (12), faded to zero at very low `velocity` (m/s); u in m, normal force in N."""
-    return fade_weight(velocity) * dynamic_coefficient(coefs, velocity, deflection_u, normal_force)
-
-
-@compiled
 def speed_terms(coefs, velocity):
     """Return what depends on the size of `velocity` (m/s) alone: the weight that fades mu, the logarithm."""
     return fade_weight(velocity), speed_logarithm(coefs, velocity)
@@ -87,7 +80,7 @@ def fade_weight(velocity):
 def normal_force_for(of_speed, coefs, desired_force, velocity, deflection_u, start):
     """Return (normal force, coefficient) that give the magnitude of `desired_force` (N) at `velocity`.
 
-    The inverse of `faded_coefficient`: mu depends on F_N, so F_N = F / mu(F_N) is solved by fixed-point
+    The inverse of the faded coefficient: mu depends on F_N, so F_N = F / mu(F_N) is solved by fixed-point
     steps from `start` (the last value, N). mu counts at least `LOWEST_COEFFICIENT`. u in m; `of_speed` are
     the `speed_terms` of the velocity.
     """

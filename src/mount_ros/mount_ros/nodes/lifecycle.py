@@ -106,16 +106,6 @@ class SafeLifecycleNode(ParameterNode):
         self.data_path, self._publisher_watch = path, path.publisher_watch
         return path
 
-    def report_publisher_conflict(self) -> None:
-        """Call `on_publisher_conflict` with what holds now: for a node that has just begun to work."""
-        if self._publisher_watch is not None:
-            self._publisher_watch.report()
-
-    def wait_for_sole_publishers(self) -> None:
-        """Return when topics have their own writers alone, or raise `PublisherConflictError`."""
-        if self._publisher_watch is not None:
-            self._publisher_watch.wait_for_sole(self.ending)
-
     def report_failure(self, sentence: str) -> None:
         """Report that a thread of the node has ended by itself; the process ends the node then."""
         self.get_logger().fatal(sentence)

@@ -55,10 +55,7 @@ def declare(node: Node, defaults: NamedTuple, prefix: str = '', only: Collection
 def read(node: Node, defaults: P, prefix: str = '') -> P:
     """Return the declared parameter set with the node's present values, or raise `ParameterError`."""
     values = {name: node.get_parameter(name).value for name in flattened(defaults, prefix)}
-    try:
-        return with_flattened(defaults, values, prefix)
-    except ParameterError as error:
-        raise ParameterError(f'{node.get_name()}: {error}') from None
+    return with_flattened(defaults, values, prefix)
 
 
 class SpecimenValues:

@@ -97,24 +97,6 @@ def environment_of_children(priority: int) -> dict[str, str]:
     return {_STARTER: str(os.getpid()), _PRIORITY: str(priority)}
 
 
-_TIED = """
-import ctypes, os, signal, sys
-ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
-if os.getppid() != int(sys.argv[1]):  # it ended before
-    sys.exit(1)
-os.execvp(sys.argv[2], sys.argv[2:])
-"""
-
-
-def tied(command: Sequence[str]) -> list[str]:
-    """Return the command that runs `command`, a foreign program, and is killed when this process ends.
-
-    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
-    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
-    """
-    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]
-
-
 # Nodes in a process that also does other work.
 
 
@@ -149,10 +131,6 @@ def _created(creates: Sequence[Create]) -> list[SafeLifecycleNode]:
         get_logger(Path(sys.argv[0]).name).fatal(str(error))
         rclpy.try_shutdown()
         sys.exit(1)
-
-
-def _wake() -> None:
-    """Something that an executor can do."""
 
 
 def _freeze() -> None:
@@ -199,7 +177,7 @@ class _Ending:
         os.set_blocking(self._write, False)
         self.starter = Starter()
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU):
+        for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: None)
 
     def end(self) -> None:
@@ -213,15 +191,10 @@ class _Ending:
     def wait(self, real_time: RealTime, warn: Callable[[str], object]) -> None:
         """Look after the priority of the process until it shall end; `warn` takes why it was given back."""
         period = WATCH_PERIOD if real_time.priority else None
-        while not self.starter.ended:
-            ready, _, _ = select.select([self._read, *self.starter.descriptors], [], [], period)
-            # The numbers of the signals that came, 46 of what is no signal; nothing after a period.
-            signals = os.read(self._read, 4096) if self._read in ready else b''
-            if any(number != signal.SIGXCPU for number in signals):
-                return
-            if signals and (sentence := real_time.ran_without_sleep()):
+        descriptors = [self._read, *self.starter.descriptors]
+        while not self.starter.ended and self._read not in select.select(descriptors, [], [], period)[0]:
+            if sentence := real_time.check():
                 warn(sentence)
-            real_time.check()
 
 
 def _start_service(node: SafeLifecycleNode, ending: _Ending) -> Callable[[], None]:
@@ -245,7 +218,7 @@ def _start_service(node: SafeLifecycleNode, ending: _Ending) -> Callable[[], Non
             ending.end()
 
     def end() -> None:
-        executor.create_task(_wake)  # `wake` alone lets its `spin_once` check and sleep on
+        executor.create_task(lambda: None)  # `wake` alone lets its `spin_once` check and sleep on
         thread.join()
         executor.remove_node(node)
         executor.shutdown()

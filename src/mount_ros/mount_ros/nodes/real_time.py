@@ -7,11 +7,8 @@ threads wanted to run on two cores; the loop came up to 140 ms late beside an or
 place from its start on (`scheduling`).
 
 A watch gives the priority back, for all of them until an activation after 30 s or more, when
-
-- an ordinary thread of the process wanted to run and could not (the loops of all graphs take the machine);
-- a thread ran for 1 s without a sleep, as the system reports.
-
-The watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
+one of them used more than its share of a core: a loop that spins, or more work than the machine carries. The
+watch runs above them and sleeps. It is Python and needs the interpreter: where a thread in C keeps that,
 or threads in C spin on all cores while another one has it, the system's own bound (RLIMIT_RTTIME) ends the
 process; the electronics then go to 0 A by their own watch.
 """
@@ -28,8 +25,9 @@ from mount_ros.nodes.scheduling import Threads, limit_without_sleep
 HIGHEST = 98  # of SCHED_FIFO's 99, for the watch runs above
 WATCH_PERIOD = 0.2  # s, chosen
 _REST = 30.0  # s, chosen: no activation takes it again meanwhile, else restarts keep the machine busy
-_WITHOUT_SLEEP = 1.0  # s of processor time between two sleeps, chosen; after a stall of 2 s it is 0.6 s
-_LAST = 3.0  # s, chosen: the same, until the process is killed
+_WINDOW = 1.0  # s, chosen
+_SHARE = 0.8  # of a core, chosen: the simulator, the largest, takes 0.3 at 1 kHz
+_LAST = 3.0  # s of processor time between two sleeps, chosen: then the process is killed
 # Threads of Fast DDS that take data and call its readers. By the rule of RTPS for ports (7400 + 250 domain
 # + 11 + 2 participant) theirs are odd, those of discovery even.
 _MIDDLEWARE = re.compile(r'dds\.udp\.\d*[13579]')
@@ -50,8 +48,7 @@ class RealTime:
         self, priority: int, threads: Threads | None = None, clock: Callable[[], float] = time.monotonic
     ):
         self.priority = min(priority, HIGHEST)
-        """Of SCHED_FIFO; 0: none is ever taken."""
-        self.permitted = True
+        """Of SCHED_FIFO; 0: none is ever taken, or the system does not permit it."""
         self.given_back = ''
         """Why the priority was given back since the last activation, with value, limit and remedy."""
         self.memory_locked = False
@@ -63,6 +60,8 @@ class RealTime:
         self._ordinary_until = -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
         self._guard = threading.RLock()
+        self._used: tuple[float, dict[int, float]] = (-math.inf, {})
+        """When the processor time of each thread with the priority was taken, and what it was, s."""
 
     @property
     def held(self) -> int:
@@ -77,7 +76,7 @@ class RealTime:
             self._loops.append(loop)
             if self._clock() >= self._ordinary_until:
                 self.given_back = ''
-            limit_without_sleep(_WITHOUT_SLEEP, _LAST)
+            limit_without_sleep(_LAST)
             self._give()
 
     def end(self, loop: Any) -> None:
@@ -87,39 +86,41 @@ class RealTime:
                 self._loops.remove(loop)
                 self._give()
 
-    def check(self) -> None:
-        """Let new threads have the priority too, once per `WATCH_PERIOD`."""
-        with self._guard:
-            if self._loops and not self.given_back:
-                self._give()
-
-    def ran_without_sleep(self) -> str:
-        """Give the priority back since the system has reported (SIGXCPU) a thread that does not sleep.
-
-        Return why, empty where there was none to give back.
-        """
+    def check(self) -> str:
+        """Look after the priority, once per `WATCH_PERIOD`; return why it was just given back, if it was."""
         with self._guard:
             if not self._loops or self.given_back:
                 return ''
-            limit = f'{_WITHOUT_SLEEP:g} s'
-            self._ordinary_until = self._clock() + _REST
-            self.given_back = (
-                f'real-time priority {self.priority} given back: a thread of the loop has used the processor '
-                f'for {limit} without a sleep (limit {limit}); lower the load of this machine or the number '
-                f'of graphs on it, then activate again, not before {_REST:g} s'
-            )
             self._give()
-            limit_without_sleep(_WITHOUT_SLEEP, _LAST)  # the system adds a second each time
-            return self.given_back
+            now, (begin, before) = self._clock(), self._used
+            if now - begin < _WINDOW:
+                return ''
+            used = {number: self._threads.processor_time(number) for number in self._held}
+            self._used = now, used
+            for number in before.keys() & used.keys():
+                share = (used[number] - before[number]) / (now - begin)
+                if share > _SHARE:
+                    return self._give_back(self._threads.names().get(number, str(number)), share)
+            return ''
+
+    def _give_back(self, thread: str, share: float) -> str:
+        self._ordinary_until = self._clock() + _REST
+        self.given_back = (
+            f'real-time priority {self.priority} given back: thread {thread} used {share:.2f} of a core in '
+            f'{_WINDOW:g} s (limit {_SHARE:g}); lower the load of this machine or the number of its graphs, '
+            f'then activate again, not before {_REST:g} s'
+        )
+        self._give()
+        return self.given_back
 
     def _give(self) -> None:
         """Let the threads of the loops, and no others, have the priority."""
-        wanted = self._wanted() if self._loops and self.permitted and not self.given_back else {}
+        wanted = self._wanted() if self._loops and not self.given_back else {}
         try:
             for number, priority in wanted.items() - self._held.items():
                 self._threads.run(number, priority)
         except PermissionError:
-            self.permitted, wanted = False, {}
+            self.priority, wanted = 0, {}
         for number in self._held.keys() - wanted.keys():
             self._threads.run(number, 0)
         self._held = wanted

@@ -5,7 +5,7 @@ import select
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from mount_driver.bus import Frame, Reception, may_have_frames
 from mount_driver.can_library import can
@@ -23,8 +23,7 @@ _CREDIBLE_AGE = 10.0  # s, chosen: a frame's time stamp that is farther from now
 _OFF = Setpoint(0.0, _COUNTER_MASK, enable=False)
 
 
-@dataclass(frozen=True)
-class ReceivedSetpoint:
+class ReceivedSetpoint(NamedTuple):
     """A setpoint with the time of its arrival by the system clock (s), NaN where the bus does not tell it."""
 
     setpoint: Setpoint

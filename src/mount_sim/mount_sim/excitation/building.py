@@ -54,12 +54,11 @@ def read_excitation(file: str, seat: Seat) -> StreamedSeries:
             f'the excitation {file} is no array of at least one {field}, each {1e6 * STEP_TIME:g} us: '
             + _REMEDY
         )
-    for first in range(0, values.size, _BLOCK):
-        finite = np.isfinite(values[first : first + _BLOCK])
-        if not finite.all():
-            raise ParameterError(
-                f'the excitation {file} is not finite at number {first + int(finite.argmin())}: make it again'
-            )
+    finite = np.isfinite(values)
+    if not finite.all():
+        raise ParameterError(
+            f'the excitation {file} is not finite at number {int(finite.argmin())}: make it again'
+        )
     return series_of(values)
 
 

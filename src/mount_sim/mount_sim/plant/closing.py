@@ -100,7 +100,10 @@ def _gap_from_open(mechanics, actuator, current, gap):
         return _gap_above(mechanics, actuator, current, gap)
     for _ in range(60):
         if slope <= 0.0 or gap - pull / slope <= mechanics.contact_gap:
-            return _gap_at_contact(mechanics, actuator, current)
+            contact = mechanics.contact_gap
+            if _pull(mechanics, actuator, current, contact)[0] < 0.0:
+                return _gap_above(mechanics, actuator, current, contact)
+            return contact
         step = pull / slope
         gap -= step
         if abs(step) < _GAP_RESOLUTION:
@@ -109,14 +112,6 @@ def _gap_from_open(mechanics, actuator, current, gap):
         if pull < 0.0:
             return _gap_above(mechanics, actuator, current, gap)
     return gap
-
-
-@compiled
-def _gap_at_contact(mechanics, actuator, current):
-    """Return the contact gap, or the equilibrium above it where the spring wins there."""
-    if _pull(mechanics, actuator, current, mechanics.contact_gap)[0] < 0.0:
-        return _gap_above(mechanics, actuator, current, mechanics.contact_gap)
-    return mechanics.contact_gap
 
 
 @compiled

@@ -93,7 +93,7 @@ def car_step(vehicle, quarters, engine, supports, body, states, road_height, eng
     carriers = 0.0
     for k in range(len(supports)):
         chassis, state = supports[k].vehicle, states[k]
-        _note_force(supports[k], state, beside[k])
+        state.mount_force = elastomer_force(chassis.elastomer, state.displacement, state) + beside[k]
         carrier = chassis.chassis_stiffness * (
             body.body_height - state.chassis_height
         ) + chassis.chassis_damping * (body.body_velocity - state.chassis_velocity)
@@ -106,11 +106,6 @@ def car_step(vehicle, quarters, engine, supports, body, states, road_height, eng
     body.wheel_height += dt * body.wheel_velocity
     body.body_height += dt * body.body_velocity
     _move_engine(engine, supports, body, states, engine_force, dt)
-
-
-@compiled
-def _note_force(support, state, beside):
-    state.mount_force = elastomer_force(support.vehicle.elastomer, state.displacement, state) + beside
 
 
 @compiled

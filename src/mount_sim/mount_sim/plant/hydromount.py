@@ -76,7 +76,9 @@ def hydromount_force(hydromount, state):
 @compiled
 def hydromount_step(hydromount, state, displacement_change, dt):
     """Advance `state`, a record of `HYDROMOUNT_STATE`, by `dt` seconds with `displacement_change` in m."""
-    pressure = upper_pressure(hydromount, state.upper_volume) - lower_pressure(hydromount, state)
+    pressure = (
+        upper_pressure(hydromount, state.upper_volume) - state.lower_volume / hydromount.lower_compliance
+    )
     track_resistance = hydromount.track_resistance + hydromount.track_turbulence * abs(state.track_flow)
     state.track_flow = _flow_after(
         hydromount.track_inertance, track_resistance, state.track_flow, pressure, dt
@@ -110,12 +112,6 @@ def upper_pressure(hydromount, volume):
         return -limit + (volume - empty) / (rest * (1.0 + asymmetry))
     # root of C_10 (P - a P^2 / (2 P_a)) = V in the form that holds for a = 0 too
     return 2.0 * volume / (rest * (1.0 + math.sqrt(1.0 - 2.0 * asymmetry * volume / (rest * limit))))
-
-
-@compiled
-def lower_pressure(hydromount, state):
-    """Return P_2 (Pa)."""
-    return state.lower_volume / hydromount.lower_compliance
 
 
 @compiled

@@ -188,21 +188,13 @@ def advance_magnet(law, now, dt):
 def force_beside_elastomer(law, now, displacement, dt):
     """Return the force (N) of what acts in the mount at `displacement` (m) beside its elastomer."""
     if law.mount.contents == _PADS:
-        _rub(law, now, displacement, dt)
+        now.friction_force, now.slider_position, now.deflection, _ = full_step(
+            law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
+        )
         return now.friction_force
     if law.mount.contents == _FLUID:
         return hydromount_force(law.hydromount, now.hydromount)
     return 0.0
-
-
-@compiled
-def _rub(law, now, displacement, dt):
-    force, slider, deflection, _ = full_step(
-        law.contact, law.friction, now.slider_position, now.deflection, displacement, now.normal_force, dt
-    )
-    now.friction_force = force
-    now.slider_position = slider
-    now.deflection = deflection
 
 
 @compiled

@@ -44,8 +44,7 @@ class BeyondRange:
         self.samples += 1
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """Length of a simulated run in samples, where the excitation begins in it, and their rate in Hz."""
 
     samples: int
@@ -89,13 +88,14 @@ class SimulatedMount:
         self._shaking, self._move, self._noise = shaking, move, noise
         self.run = Run(shaking.samples, shaking.start, shaking.sample_rate)
         self._sound_plant, self._plant = plant, simulation
+        self.electronics = plant.electronics
         self.truth = simulation.truth
         """What no sensor saw at the last `measure`."""
         self.sample_rate = shaking.sample_rate
         """Hz"""
         self.sample_time = sample_time_ns(self.sample_rate)
         """ns"""
-        self.patience = round(plant.electronics.setpoint_timeout * self.sample_rate)
+        self.patience = round(self.electronics.setpoint_timeout * self.sample_rate)
         """Samples without a setpoint after which the current goes to 0 A."""
         self.sample = 0
         self.beyond_range = BeyondRange()
