@@ -1,35 +1,23 @@
 """A recorded drive under all three mounts: made up, and the real one where it lies."""
 
 import json
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from engine_mount.experiments import recorded_drive
 from engine_mount.experiments.harness.experiment import ExperimentError
-from engine_mount.experiments.harness.measures import rms_in_bands
 from engine_mount.experiments.recorded_drive import (
-    BANDS,
     ELASTOMER,
     FRICTION,
     HYDRO,
     rms_in_bands_within,
 )
 from engine_mount.experiments.registry import experiment
-from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from engine_mount.signals.sources.source import SourceError
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario
 
 pytestmark = pytest.mark.slow
-
-REPOSITORY = Path(__file__).resolve().parents[4]
-I280 = REPOSITORY.parent / 'shared' / 'data' / 'motorway_i280'
-needs_i280 = pytest.mark.skipif(
-    not I280.is_dir(), reason='the recorded I-280 drive is not committed (../shared/data)'
-)
 
 
 @pytest.fixture(scope='module')
@@ -87,12 +75,3 @@ def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SourceError, match='no such file'):
         experiment(recorded_drive.NAME, out=out, file=file)
     assert not out.exists()
-
-
-@needs_i280
-def test_the_committed_page_tells_of_this_recording():
-    signal = recorded_signal(RecordedScenario(str(I280), 'accelerometer.2', scale=-1.0))
-    values = acceleration_at(signal, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
-    text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
-    told = re.findall(r'([\d.]+) m/s\^2 from', text)
-    assert [float(number) for number in told] == pytest.approx(rms_in_bands(values, BANDS), abs=0.001)
