@@ -21,7 +21,6 @@ from mount_recorder.folders import snapshot_folder
 from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
 from mount_ros.environment import loopback_refusal
-from mount_ros.nodes.lifecycle import wake
 from mount_ros.nodes.process import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
 
@@ -83,7 +82,7 @@ def record(
         finally:
             if thread.is_alive():
                 ending.set()
-                wake(executor)
+                executor.wake()
                 thread.join()
                 node.trigger_deactivate()
                 figures = _figures(node)
