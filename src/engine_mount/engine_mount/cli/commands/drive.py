@@ -181,6 +181,8 @@ def drive(
         from engine_mount import road as read_road
         from engine_mount.drives.external_excitation import measured_road
 
+        if not speed:
+            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s)')
         if len(column or []) > 1:
             raise typer.BadParameter('--column is given once for a road: the column of its height')
         height = ''.join(column or [])
