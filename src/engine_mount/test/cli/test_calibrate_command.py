@@ -135,7 +135,7 @@ def test_what_contradicts_the_other_recordings_is_refused_and_named(files, tmp_p
     assert f'{cold[4].name}: by the' in said
     assert 'is the gap of this file right?' in said
     said = refused('calibrate', 'inductance', *cold, '--crossing-inductance', 32)
-    assert 'crossing_inductance (32.0 mH) must be one whose' in said
+    assert 'the crossing current must rise or fall steadily with the gap' in said
     copy = tmp_path / 'copy.csv'
     copy.write_bytes(files[0].read_bytes())
     assert 'are the same to the bit' in refused('calibrate', 'actuator', files[0], copy)

@@ -64,7 +64,7 @@ def test_ls_lists_this_machine_alone(refused):
     assert 'hunter2' not in said
 
 
-@pytest.mark.parametrize('words', ['audit', 'info', 'view', 'merge --out m', 'report'])
+@pytest.mark.parametrize('words', ['audit', 'info', 'view', 'report'])
 def test_a_uri_with_a_password_is_refused_without_telling_it(words, refused):
     said = refused(*words.split(), 'sftp://driver:hunter2@host/a')
     assert 'sftp://driver@host/a holds a password' in said

@@ -11,14 +11,6 @@ if TYPE_CHECKING:
     from engine_mount.signals.mapping import Mapping
 
 
-def orders_of(text: str) -> Any:
-    """Return the numbers of coefficients of a1 .. a5 from `4,4,4,2,4`; raises `typer.BadParameter`."""
-    parts = text.replace(' ', '').split(',')
-    if len(parts) != 5 or not all(part.isdigit() for part in parts):
-        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
-    return tuple(map(int, parts))
-
-
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
     from engine_mount.identification.rack import RACK
