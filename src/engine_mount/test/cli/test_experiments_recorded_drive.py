@@ -11,11 +11,9 @@ from engine_mount.experiments.recorded_drive import (
     ELASTOMER,
     FRICTION,
     HYDRO,
-    rms_in_bands_within,
 )
 from engine_mount.experiments.registry import experiment
 from engine_mount.signals.sources.source import SourceError
-from mount_models.sampling import SAMPLE_TIME
 
 pytestmark = pytest.mark.slow
 
@@ -58,14 +56,6 @@ def test_the_chassis_moves_as_recorded_and_damping_works_in_the_burst_alone(driv
     forces = {name: each['force_band_rms_else_n'][2] for name, each in runs.items()}
     assert forces[FRICTION] == pytest.approx(forces[ELASTOMER], rel=0.02)  # swinging out
     assert forces[HYDRO] > 1.1 * forces[ELASTOMER]
-
-
-def test_a_part_of_the_time_has_the_rms_of_that_part():
-    time = np.arange(20000) * SAMPLE_TIME
-    values = np.where(time < 10.0, 1.0, 3.0) * np.sin(2 * np.pi * 8.0 * time)
-    assert rms_in_bands_within(values, time > 11.0)[1] == pytest.approx(3.0 / np.sqrt(2), rel=0.03)
-    assert rms_in_bands_within(values, time < 9.0)[1] == pytest.approx(1.0 / np.sqrt(2), rel=0.03)
-    assert rms_in_bands_within(values, np.zeros(len(values), bool)) is None
 
 
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
