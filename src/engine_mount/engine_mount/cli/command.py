@@ -20,7 +20,6 @@ from engine_mount.cli.commands import (
     identify,
     import_files,
     ls,
-    merge,
     record,
     recover,
     replay,
@@ -64,7 +63,7 @@ def _top(
 
 def prepare() -> None:
     """Compile the laws for this machine, for drives and workers of a fleet; done by the set-up."""
-    from engine_mount.fleet.prepare import prepare
+    from engine_mount.fleet.example import prepare
 
     with terminal().status('compiling the laws for this machine (once, about half a minute)'):
         prepare()
@@ -88,7 +87,6 @@ _COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
     'Change recordings': (
         (import_files.import_file, import_files.EPILOG),
         (cut.cut, cut.EPILOG),
-        (merge.merge, merge.EPILOG),
         (recover.recover, recover.EPILOG),
     ),
     _MOUNT: ((experiment.experiment, experiment.EPILOG),),

@@ -7,7 +7,7 @@ from engine_mount.drives.inputs.input import measured_gaps
 from engine_mount.recordings.place import open_run
 from engine_mount.settings.chosen import Parameters, chosen_specimen
 from mount_init.parameters import InitParameters
-from mount_models.force_table import contact_force, current_force_table, offset_current
+from mount_models.actuator import contact_force, current_force_table, offset_current
 from mount_models.quantity import with_flattened
 from mount_ros.messages.force_table import ForceTable
 from mount_sim.plant.closing import ClosingMechanics
