@@ -49,7 +49,6 @@ ALLOWED = {
     ('engine_mount.recordings.times', 'np.cumsum'): 'whole numbers',
     ('engine_mount.recordings.times', 'np.interp'): 'times told to people',
     ('engine_mount.signals.selection', 'np.interp'): 'rows of racks and rigs, no number of a run',
-    ('engine_mount.recordings.times', '**'): 'rates of topics, for the eye',
     ('engine_mount.recordings.times', 'np.mean'): 'rates of topics, for the eye',
     ('mount_driver.watches.ripple_sweep', 'np.interp'): 'limits of a watch, no number of a sound run',
     ('mount_ros.timing', 'np.cumsum'): 'whole numbers',

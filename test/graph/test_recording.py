@@ -101,20 +101,11 @@ def test_record_ends_with_code_1_where_samples_are_missing(domain_source, comman
     assert 'Lost: 2 of ' in output
 
 
-def test_a_snapshot_without_an_event_saves_nothing_and_says_so(domain_source, command):
-    process, _ = start_record(command, domain_source, '--snapshot', '5s')
-    code, output = end_record(process)
-    assert code == 0, output
-    assert 'no event came, so no snapshot was saved' in output
-    assert not (command.folder / 'bag').exists()
-
-
-def test_a_key_press_marks_and_sets_a_snapshot_off(domain_source, command):
+def test_a_key_press_marks(domain_source, command):
     keys, terminal = pty.openpty()
-    process, publishers = start_record(command, domain_source, '--snapshot', '60s', stdin=terminal)
+    process, publishers = start_record(command, domain_source, stdin=terminal)
     samples(publishers, range(10))
     os.write(keys, b'xm')
-    wait_until(lambda: (command.folder / 'bag').exists(), 'the snapshot')
     code, output = end_record(process)
     os.close(keys)
     os.close(terminal)
@@ -128,11 +119,9 @@ def test_a_key_press_marks_and_sets_a_snapshot_off(domain_source, command):
     ('arguments', 'words'),
     [
         (('record', 'no_such_topic'), "'no_such_topic' is no topic"),
-        (('record', '--split', '60'), 'no size and no duration'),
+        (('record', '--split', '60s'), 'no size such as 500MB'),
         (('record', '--split', '10kB'), 'at least 1000000 bytes'),
-        (('drive', '--split', '60s', '--split', '2min'), 'second limit of its kind'),
-        (('drive', '--snapshot', 'long'), 'no duration such as 30s'),
-        (('drive', '--set', 'mount_recorder.split_duration=0.1'), 'at least 1 s'),
+        (('drive', '--set', 'mount_recorder.split_size=100'), 'at least 1000000 bytes'),
     ],
 )
 def test_impossible_orders_leave_nothing_behind(tmp_path, monkeypatch, arguments, words):

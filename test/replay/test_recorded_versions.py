@@ -1,4 +1,4 @@
-"""A replay tells with which versions and on which processor the recording was made."""
+"""A replay tells with which versions and on which kind of machine the recording was made."""
 
 import pytest
 
@@ -13,8 +13,8 @@ SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
 @pytest.mark.parametrize(
     ('others', 'sentence'),
     [
-        ({}, 'made with the same versions on the same kind of processor'),
-        ({'processor': 'Z80'}, f'others than here: processor Z80 (here {versions()["processor"]})'),
+        ({}, 'made with the same versions on the same kind of machine'),
+        ({'machine': 'z80'}, f'others than here: machine z80 (here {versions()["machine"]})'),
     ],
 )
 @pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])

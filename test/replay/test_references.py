@@ -11,7 +11,7 @@ from engine_mount.drives.inputs.input import parameters_of, session_of
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.events import switching_times
 from engine_mount.recordings.recording import open_recording
-from engine_mount.recordings.reference import ACCEPTED_NAME, LARGEST_TOTAL
+from engine_mount.recordings.reference import ACCEPTED_NAME
 from engine_mount.recordings.session import (
     recorded_session,
     session_content,
@@ -65,4 +65,4 @@ def test_all_kinds_of_drives_are_there_with_a_reason_and_small():
     assert [folder.name for folder in REFERENCES] == ['fault', 'gap', 'initialisation', 'opening', 'rough']
     assert all('reason:' in (folder / ACCEPTED_NAME).read_text() for folder in REFERENCES)
     size = sum(path.stat().st_size for folder in REFERENCES for path in folder.iterdir())
-    assert size < LARGEST_TOTAL
+    assert size < 5_000_000

@@ -20,8 +20,6 @@ class MarkKind(Enum):
 
     SWITCH_ON = 'switch_on'
     FAULT = 'fault'
-    LOST_SAMPLE = 'lost_sample'
-    UNANSWERED = 'unanswered'
     RECORDING_LOSS = 'recording_loss'
 
 

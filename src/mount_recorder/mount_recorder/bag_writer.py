@@ -3,24 +3,19 @@
 import errno
 import os
 import shutil
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from mount_models.quantity import ParameterError
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 from mount_recorder.mcap_writer import CHUNK_SIZE, McapWriter
 from mount_recorder.metadata import (
     METADATA_NAME,
-    FileEntry,
-    OfferedQos,
+    Offers,
     TopicEntry,
     bag_description,
     embedded_record,
@@ -29,58 +24,25 @@ from mount_recorder.metadata import (
 )
 from mount_recorder.record_file import RecordFile
 from mount_recorder.schemas import schema_text, type_hash
-from mount_recorder.topic_groups import topic_group
 
 LIBRARY = 'engine-mount mount_recorder 0.1.0'
-PIECE_RECORD = 'engine_mount_piece'
-"""Name of the writer's note in every file but the first: which latched topics it repeats there."""
-LEAST_SIZE = 1_000_000  # bytes, chosen: below, a file is mostly head and end
-LEAST_DURATION = 1_000_000_000  # ns, chosen
-_NEVER = 1 << 64  # ns, later than every log time
 _NO_SPACE = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG))
 
-Offers = Callable[[], Sequence[OfferedQos]]
+FindOffers = Callable[[], Offers]
 
 
 class RecordingError(ValueError):
     """A recording cannot be made or continued; the text says why and what stands on the disk."""
 
 
-class SplitRule(NamedTuple):
-    """The limits of a file: bytes of `size`, ns of log time in `duration`; 0 is no limit."""
-
-    size: int = 0
-    duration: int = 0
-
-
-WHOLE = SplitRule()
-"""One file, however long it becomes."""
-
-
-def checked_rule(rule: SplitRule) -> SplitRule:
-    """Return `rule` if its limits are large enough to make sense; raises `ParameterError`."""
-    if rule.size and rule.size < LEAST_SIZE:
-        raise ParameterError(
-            f'split size ({rule.size} bytes) must be at least {LEAST_SIZE} bytes, or 0 for none'
-        )
-    if rule.duration and rule.duration < LEAST_DURATION:
-        raise ParameterError(
-            f'split duration ({rule.duration / 1e9:g} s) must be at least 1 s, or 0 for none'
-        )
-    return rule
-
-
 @dataclass
 class _Topic:
     name: str
     type: str
-    hash: str
-    offers: Offers
-    latched: bool
+    find_offers: FindOffers
     details: Mapping[str, str]
     channel: int = 0  # the same in all files; 0 until the first message: only then is its publisher known
-    offered_qos: Sequence[OfferedQos] = ()
-    last: tuple[bytes, int] | None = None  # message and publish time, of a latched one
+    offers: Offers = ()
 
 
 class BagWriter:
@@ -90,17 +52,16 @@ class BagWriter:
     being filled. On a full disk the last complete chunk stands, the file is closed with its summary,
     and `RecordingError` is raised by the call that met the end and by every later `write`.
 
-    With a `split` rule the recording goes on in a next file, which begins with the last message of each
-    latched topic, so that it can be read alone. `close` forces all files to the disk.
+    With a `split_size` (bytes) the recording goes on in a next file before one becomes larger. `close` forces
+    all files to the disk.
     """
 
     def __init__(
         self,
         folder: str | os.PathLike[str],
         *,
-        split: SplitRule = WHOLE,
+        split_size: int = 0,
         chunk_size: int = CHUNK_SIZE,
-        custom_data: Mapping[str, str] | None = None,
         open_file: type[RecordFile] = RecordFile,
     ):
         self.folder = Path(folder)
@@ -108,17 +69,13 @@ class BagWriter:
         self.closed = False
         self.receptions: Mapping[str, Reception] | None = None
         """The counts of the recorder, from which the end of the recording states the losses."""
-        self.excerpt = False
-        """Whether the recording holds a part of what was received, on purpose."""
-        self._split = split
-        self._custom_data = dict(custom_data or {})
-        self._create_file = partial(McapWriter, library=LIBRARY, chunk_size=chunk_size, open_file=open_file)
+        self._create_file = partial(
+            McapWriter, library=LIBRARY, chunk_size=chunk_size, open_file=open_file, size_limit=split_size
+        )
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[str, int] = {}  # by type, the same in all files
         self._channels: dict[str, int] = {}  # of the topics for which `write` has nothing else to do
         self._files: list[McapWriter] = []
-        self._repeated = Counter[int]()  # by channel: messages that an earlier file has too
-        self._due = 0 if split.duration else _NEVER  # log time from which a message may begin a file
         create_folder(self.folder)
         try:
             self._open_file()
@@ -128,12 +85,12 @@ class BagWriter:
 
     @property
     def kept(self) -> int:
-        """How many messages stand in complete chunks, repetitions not counted."""
-        return sum(writer.message_counts.total() for writer in self._files) - self._repeated.total()
+        """How many messages stand in complete chunks."""
+        return sum(writer.message_counts.total() for writer in self._files)
 
     @property
     def pending(self) -> int:
-        """How many messages wait in the chunks that are being filled."""
+        """How many messages wait in the chunk that is being filled."""
         return self._file.pending
 
     @property
@@ -145,23 +102,19 @@ class BagWriter:
         self,
         name: str,
         type_name: str,
-        offered_qos: Sequence[OfferedQos] | Offers = (),
-        *,
-        latched: bool = False,
+        find_offers: FindOffers = tuple,
         details: Mapping[str, str] | None = None,
     ) -> None:
         """Announce a topic by its full name; raises `SchemaError` if its type is not installed.
 
-        `offered_qos` may be a function: it is called at the first message, when publishers are known.
-        The last message of a `latched` topic is repeated at the head of each file. `details` are further
+        `find_offers` is called at the first message, when publishers are known. `details` are further
         metadata of the channel.
         """
         if name in self._topics:
             raise RecordingError(f'topic {name} is already part of the recording {self.folder}')
         if type_name not in self._schemas:
             self._schemas[type_name] = _add_schema(self._file, type_name)
-        offers = offered_qos if callable(offered_qos) else partial(tuple, offered_qos)
-        self._topics[name] = _Topic(name, type_name, type_hash(type_name), offers, latched, details or {})
+        self._topics[name] = _Topic(name, type_name, find_offers, details or {})
 
     def write(self, topic: str, raw: bytes, receive_time: int, publish_time: int | None = None) -> None:
         """Add one serialised message; times in ns, the publish time is the receive time where unknown.
@@ -170,11 +123,11 @@ class BagWriter:
         """
         if publish_time is None:
             publish_time = receive_time
+        channel = self._channels.get(topic) or self._first_channel(topic)
         try:
-            if receive_time >= self._due:
-                self._begin_file(receive_time)
-            channel = self._channels.get(topic) or self._checked_channel(topic, raw, publish_time)
-            self._add_message(channel, raw, receive_time, publish_time)
+            if self._file.full:
+                self._begin_next_file()
+            self._file.add_message(channel, raw, receive_time, publish_time)
         except OSError as error:
             self._end_early(error)
 
@@ -190,7 +143,7 @@ class BagWriter:
                 self.write(topic, rows[place].tobytes(), time)
 
     def flush(self) -> None:
-        """Complete the chunks that are being filled; raises `RecordingError` when the disk is full."""
+        """Complete the chunk that is being filled; raises `RecordingError` when the disk is full."""
         if not self.closed:
             try:
                 self._file.flush()
@@ -219,21 +172,30 @@ class BagWriter:
             writer.file.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _checked_channel(self, name: str, raw: bytes, publish_time: int) -> int:
-        """Return the channel of a topic for its first message, and for each of a latched topic."""
+    # Files.
+
+    def _first_channel(self, name: str) -> int:
+        """Return the channel of a topic for its first message."""
         if self.closed:
             raise RecordingError(self.failure or f'recording {self.folder} is closed; nothing can be added')
         if name not in self._topics:
             raise RecordingError(f'topic {name} is not announced; call add_topic before write')
-        topic = self._topics[name]
-        self._open_channel(topic)
-        if topic.latched:
-            topic.last = raw, publish_time
-        else:
-            self._channels[name] = topic.channel
-        return topic.channel
+        self._open_channel(self._topics[name])
+        self._channels[name] = self._topics[name].channel
+        return self._channels[name]
 
-    # Files.
+    def _open_channel(self, topic: _Topic) -> None:
+        if not topic.channel:
+            topic.offers = topic.find_offers()
+            topic.channel = self._add_channel(self._file, topic)
+
+    def _add_channel(self, writer: McapWriter, topic: _Topic) -> int:
+        details = {
+            'offered_qos_profiles': qos_text(topic.offers),
+            'topic_type_hash': type_hash(topic.type),
+            **topic.details,
+        }
+        return writer.add_channel(topic.name, 'cdr', self._schemas[topic.type], details)
 
     def _open_file(self) -> None:
         writer = self._create_file(self.folder / f'{self.folder.name}_{len(self._files)}.mcap')
@@ -243,53 +205,13 @@ class BagWriter:
         for topic in sorted(self._topics.values(), key=lambda topic: topic.channel):
             if topic.channel:
                 self._add_channel(writer, topic)
-        writer.after_chunk = self._note_size
         self._files.append(writer)
-        self._file, self._add_message = writer, writer.add_message
+        self._file = writer
 
-    def _add_channel(self, writer: McapWriter, topic: _Topic) -> int:
-        details = {
-            'offered_qos_profiles': qos_text(topic.offered_qos),
-            'topic_type_hash': topic.hash,
-            **topic.details,
-        }
-        group = topic_group(topic.name, topic.type)
-        return writer.add_channel(topic.name, 'cdr', self._schemas[topic.type], details, group)
-
-    def _open_channel(self, topic: _Topic) -> None:
-        if not topic.channel:
-            topic.offered_qos = tuple(topic.offers())
-            topic.channel = self._add_channel(self._file, topic)
-
-    def _note_size(self) -> None:
-        if self._split.size and self._file.size_at_end > self._split.size:
-            self._due = 0  # with the next message, so that no file is empty
-
-    def _begin_file(self, time: int) -> None:
-        """Begin a file with the message of log time `time` (ns), unless the present one is still empty."""
+    def _begin_next_file(self) -> None:
         full = self._file
-        if full.pending or full.message_counts:
-            full.flush()
-            self._open_file()
-            full.finish(embedded_record(self._description([full])))
-            self._due = _NEVER
-            self._repeat_latched(time)
-        self._due = time + self._split.duration if self._split.duration else _NEVER
-
-    def _repeat_latched(self, time: int) -> None:
-        """Write the latched messages with log time `time` (ns) and their own publish times.
-
-        A metadata record before them names their topics: a reader of all files counts each once.
-        """
-        repeated = [(topic, *topic.last) for topic in self._topics.values() if topic.last is not None]
-        names = yaml.safe_dump([topic.name for topic, *_ in repeated], default_flow_style=True)
-        self._file.add_metadata(PIECE_RECORD, {'number': str(len(self._files) - 1), 'repeated': names})
-        try:
-            for topic, raw, publish_time in repeated:
-                self._file.add_message(topic.channel, raw, time, publish_time)
-            self._file.flush()
-        finally:
-            self._repeated.update(self._file.message_counts)
+        self._open_file()
+        full.finish(embedded_record(self._description([full])))
 
     # The end.
 
@@ -304,10 +226,13 @@ class BagWriter:
     def _fail_at_end(self, error: OSError, cut: str) -> None:
         """Raise what `error` says and which files have no end; `cut` where none of the MCAP files has not."""
         cut = ', '.join(writer.file.path.name for writer in self._files if not writer.finished) or cut
-        state = 'the file is closed and readable'
-        if cut:
-            state = f'{cut} ends without its summary but with whole chunks'
-        self._fail(f'{_reason_of(error)}; {state}')
+        state = (
+            f'{cut} ends without its summary but with whole chunks'
+            if cut
+            else 'the file is closed and readable'
+        )
+        reason = 'no space left on the disk' if error.errno in _NO_SPACE else 'the disk refused to write'
+        self._fail(f'{reason} ({error.strerror}); {state}')
 
     def _fail(self, why: str) -> None:
         self._refuse_writes()
@@ -318,7 +243,6 @@ class BagWriter:
         """Lead `write` to its checks, which it does not make for each message."""
         self.closed = True
         self._channels.clear()
-        self._due = _NEVER
 
     def _finish(self) -> None:
         """Write the end of the last file and `metadata.yaml`; whatever fails, whole records stand."""
@@ -327,11 +251,8 @@ class BagWriter:
             self._open_channel(topic)
         records: dict[str, Mapping[str, str]] = {**embedded_record(self._description([self._file]))}
         if self.receptions is not None:
-            kept = {
-                topic.name: _count(self._files, topic) - self._repeated[topic.channel]
-                for topic in self._topics.values()
-            }
-            records[RECORDER_RECORD] = loss_statement(self.receptions, kept, excerpt=self.excerpt)
+            kept = {topic.name: _count(self._files, topic) for topic in self._topics.values()}
+            records[RECORDER_RECORD] = loss_statement(self.receptions, kept)
         try:
             self._file.finish(records)
         finally:
@@ -343,11 +264,10 @@ class BagWriter:
 
     def _description(self, files: Sequence[McapWriter]) -> dict[str, object]:
         topics = [
-            TopicEntry(topic.name, topic.type, _count(files, topic), topic.offered_qos, topic.hash)
+            TopicEntry(topic.name, topic.type, _count(files, topic), topic.offers, type_hash(topic.type))
             for topic in self._topics.values()
         ]
-        entries = [file_entry(writer.file.path.name, writer) for writer in files]
-        return bag_description(topics, entries, self._custom_data, os.environ.get('ROS_DISTRO', 'jazzy'))
+        return bag_description(topics, files, os.environ.get('ROS_DISTRO', 'jazzy'))
 
 
 def create_folder(folder: Path) -> None:
@@ -365,20 +285,9 @@ def create_folder(folder: Path) -> None:
         raise RecordingError(f'folder {folder} cannot be created: {error.strerror}') from None
 
 
-def file_entry(name: str, writer: McapWriter) -> FileEntry:
-    """Return what `metadata.yaml` says of a file: what is physically there."""
-    return FileEntry(name, writer.start_time, writer.end_time, writer.message_counts.total())
-
-
 def _add_schema(writer: McapWriter, type_name: str) -> int:
     return writer.add_schema(type_name, 'ros2msg', schema_text(type_name).encode())
 
 
 def _count(files: Sequence[McapWriter], topic: _Topic) -> int:
     return sum(writer.message_counts[topic.channel] for writer in files)
-
-
-def _reason_of(error: OSError) -> str:
-    if error.errno in _NO_SPACE:
-        return f'no space left on the disk ({error.strerror})'
-    return f'the disk refused to write ({error.strerror})'

@@ -5,10 +5,8 @@ taking it does. A batch every few milliseconds loses nothing, and brings what a 
 message was sent and when it arrived.
 """
 
-import contextlib
 import operator
 import threading
-import time
 import traceback
 from collections.abc import Callable
 
@@ -17,7 +15,6 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from mount_ros.data_path import io_node
-from mount_ros.data_thread import DataThread, DataThreadEndedError, Poll
 from mount_ros.messages.cdr import message_class
 from mount_ros.private_rclpy import Taken, raw_taker
 from mount_ros.qos import publisher_qos
@@ -27,22 +24,18 @@ Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns), both of the system clock."""
 
 _PERIOD = 0.004  # s, chosen: four samples a batch; the queues hold five seconds
-_SHARED_PERIOD = 0.02  # s, chosen: the same where the recording is not watched while it grows
 
 
 class Collector:
     """Raw subscriptions of a node, emptied by one thread from `start` to `stop`, oldest arrival first.
 
-    The thread is its own, or (`thread`) the one that also serves the publishers: two that take turns in one
-    process cost more than the work. `on_failure` takes the sentence on the exception that has ended a thread
-    of its own, which takes a batch each `period` s.
+    It takes a batch each `period` s. `on_failure` receives the sentence on the exception that has ended it.
     """
 
     def __init__(
         self,
         owner: Node,
         *,
-        thread: DataThread | None = None,
         period: float = _PERIOD,
         on_failure: Callable[[str], None] = lambda sentence: None,
     ):
@@ -50,25 +43,18 @@ class Collector:
         self.refused = 0
         """Messages whose receiver raised an exception; `refusal` says what the last one was."""
         self.refusal = ''
-        self._shared_thread = thread
+        self.failure = ''
+        """Why the thread has ended by itself; empty while it serves."""
         self._period = period
         self._on_failure = on_failure
-        self._failure = ''
-        self._taken_at = 0.0
-        self._polls: list[Poll] = []
         self._receivers: list[tuple[Subscription, Callable[[], Taken | None], Receive]] = []
-        self._thread: threading.Thread | None = None
+        self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
         self._ending = threading.Event()
 
     @property
     def name(self) -> str:
         """The full name of the node that has the topics."""
         return self.node.get_fully_qualified_name()
-
-    @property
-    def failure(self) -> str:
-        """Why the thread that takes the messages has ended by itself; empty while it serves."""
-        return self._failure if self._shared_thread is None else self._shared_thread.failure
 
     def collect(self, topic: Topic, receive: Receive, qos: QoSProfile | None = None) -> Subscription:
         """Hand every message of `topic` to `receive`; with another `qos`, those that it brings."""
@@ -86,28 +72,17 @@ class Collector:
         """Return the names of the topics that no publisher has been found for yet."""
         return sorted(s.topic_name for s, *_ in self._receivers if s.get_publisher_count() == 0)
 
-    def start(self, *polls: Poll) -> None:
-        """Begin to take messages; a shared thread calls the `polls`, which must not raise, beside them."""
-        if self._shared_thread is None:
-            self._thread = threading.Thread(target=self._serve, name=self.node.get_name(), daemon=True)
-            self._thread.start()
-        else:
-            self._polls = [self._take_when_due, *polls]
-            for poll in self._polls:
-                self._shared_thread.add_poll(poll)
+    def start(self) -> None:
+        """Begin to take messages."""
+        self._thread.start()
 
     def stop(self) -> None:
         """Take what is there, end the thread and destroy the node; safe to call twice."""
         if self._ending.is_set():
             return
         self._ending.set()
-        if self._thread is not None:
+        if self._thread.is_alive():
             self._thread.join()
-        if self._shared_thread is not None and self._polls:
-            with contextlib.suppress(DataThreadEndedError):
-                self._shared_thread.change(self._take_batch)
-            for poll in self._polls:
-                self._shared_thread.remove_poll(poll)
         self.node.destroy_node()
 
     def _serve(self) -> None:
@@ -118,14 +93,8 @@ class Collector:
         except BaseException as error:
             # The border of the thread: unreported, its end would leave a recording without its messages.
             traceback.print_exc()
-            self._failure = f'the thread that takes the messages has ended: {type(error).__name__}: {error}'
-            self._on_failure(self._failure)
-
-    def _take_when_due(self) -> bool:
-        if time.monotonic() - self._taken_at > _SHARED_PERIOD:
-            self._taken_at = time.monotonic()
-            self._take_batch()
-        return False
+            self.failure = f'the thread that takes the messages has ended: {type(error).__name__}: {error}'
+            self._on_failure(self.failure)
 
     def _take_batch(self) -> None:
         batch: list[tuple[int, int, bytes, Receive]] = []

@@ -29,7 +29,6 @@ def judge(
     *,
     failure: str = '',
     on_full: OnFull = OnFull.STOP,
-    recording: bool = True,
 ) -> Verdict:
     """Return level, sentence and figures of an active recorder.
 
@@ -37,8 +36,7 @@ def judge(
     """
     fatal = bool(failure) and on_full is OnFull.STOP
     publishers = [count for key, count in figures.items() if key.startswith('publishers.')]
-    activity = 'recording' if recording else 'waiting for an event'
-    well = f'{activity}; {sum(map(bool, publishers))} of {len(publishers)} topics have a publisher'
+    well = f'recording; {sum(map(bool, publishers))} of {len(publishers)} topics have a publisher'
     if fatal:
         findings = [Finding(Level.ERROR, failure, f'{failure}; free some space and start again')]
     elif failure:
@@ -60,6 +58,7 @@ def _table(
         _growth(figures, earlier, key) for key in ('malformed.', 'missing.', 'misdated.')
     )
     free, rate = figures['free_bytes'], figures['bytes_per_second']
+    last = [f'{topic} {count} (the last of {unobserved[topic].last})' for topic, count in malformed.items()]
     return [
         (
             'lost',
@@ -70,7 +69,8 @@ def _table(
         (
             f'unobserved {", ".join(malformed)}',
             malformed,
-            f'{unobserved_sentence(unobserved, malformed)} ({none}); who else publishes there?',
+            f'malformed messages, recorded but neither watched nor marked: {", ".join(last)} ({none}); '
+            'who else publishes there?',
         ),
         (
             f'missing {", ".join(missing)}',
@@ -100,12 +100,3 @@ def _growth(figures: Figures, earlier: Figures, prefix: str) -> dict[str, int]:
 
 def _counts(counts: Mapping[str, int]) -> str:
     return ', '.join(f'{topic} {count}' for topic, count in counts.items())
-
-
-def unobserved_sentence(unobserved: Mapping[str, Unobserved], counts: Mapping[str, int]) -> str:
-    """Return what the recorder could write but not read: `counts` by topic, and what the last was."""
-    entries = (
-        f'{topic} {count} (the last of {unobserved[topic].size} bytes; {unobserved[topic].why})'
-        for topic, count in counts.items()
-    )
-    return f'malformed messages, recorded but neither watched nor marked: {", ".join(entries)}'

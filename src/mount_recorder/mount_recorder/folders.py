@@ -1,24 +1,12 @@
-"""Folders of further recordings of one run: snapshots, and what a restarted recorder makes."""
+"""Folders of the recordings of one run: a restarted recorder makes a further one."""
 
 from itertools import count, takewhile
 from pathlib import Path
 
 
-def snapshot_folder(first: Path, number: int) -> Path:
-    """Return the folder of a snapshot, numbered from 1: `first`, `first`_2, `first`_3, ..."""
-    return first if number == 1 else first.with_name(f'{first.name}_{number}')
-
-
-def saved_snapshots(first: Path) -> list[Path]:
-    """Return the folders of the snapshots that a recorder with the folder `first` has saved."""
-    folders = (snapshot_folder(first, number) for number in count(1))
-    return list(takewhile(Path.exists, folders))
-
-
 def recordings_of(first: Path) -> list[Path]:
     """Return the recordings of a run: `first`, and one for each time that the recorder was started again."""
-    places = (_recording(first, number) for number in count(1))
-    return list(takewhile(Path.exists, places))
+    return list(takewhile(Path.exists, (_recording(first, number) for number in count(1))))
 
 
 def next_recording(first: Path) -> Path:

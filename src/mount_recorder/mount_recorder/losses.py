@@ -23,7 +23,7 @@ def loss_statement(
 ) -> dict[str, str]:
     """Return the record of a recording that ought to hold every message received; counts are per topic.
 
-    A snapshot is an `excerpt`: it lost no more than did not fit into the queue.
+    An `excerpt` of a recording lost no more than did not fit into the queue.
     """
     topics = {
         name: {

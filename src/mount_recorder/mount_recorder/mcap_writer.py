@@ -2,19 +2,14 @@
 
 The records around the messages are those of the `mcap` package. The messages themselves and their
 indexes are packed here: `mcap.writer.Writer` makes an object of each, which limits it to a quarter of the
-messages per second (measured).
-
-Each channel belongs to a group, and the messages of a group stand in chunks of their own: a reader that
-wants one group alone does not unpack the others. When the chunk of one group is full, those of all groups
-go to the file, so that the slow ones lose no more time in a crash than the fast one, and chunks overlap in
-time only with those that were written with them. They and their indexes reach the file in one write, so
-every state of the file ends with a whole record.
+messages per second (measured). A chunk and its indexes reach the file in one write, so every state of the
+file ends with a whole record.
 """
 
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import zstandard
@@ -38,7 +33,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from mount_recorder.record_file import RecordFile
 
-CHUNK_SIZE = 64 * 1024  # bytes before compression, chosen: what a crash may cost of each group
+CHUNK_SIZE = 64 * 1024  # bytes before compression, chosen: what a crash may cost
 LONG_CHUNK_SIZE = 4 * CHUNK_SIZE
 """The same where what is written can be made again, chosen: it is read faster, and 4 % smaller (measured)."""
 MESSAGE = struct.Struct('<BQHIQQ')  # opcode, length, channel, sequence, log time, publish time
@@ -58,23 +53,29 @@ class McapWriter:
     """One MCAP file, from its creation to `finish`; every `OSError` leaves whole records behind."""
 
     def __init__(
-        self, path: Path, library: str, chunk_size: int = CHUNK_SIZE, open_file: type[RecordFile] = RecordFile
+        self,
+        path: Path,
+        library: str,
+        chunk_size: int = CHUNK_SIZE,
+        open_file: type[RecordFile] = RecordFile,
+        size_limit: int = 0,
     ):
-        """Write the head of the file and hold back room for its end."""
+        """Write the head of the file and hold back room for its end; `size_limit` in bytes, 0 for none."""
         self.message_counts = Counter[int]()  # by channel, of the chunks that are in the file
-        self.after_chunk: Callable[[], object] | None = None  # called when chunks have reached the file
-        self._chunk_size = chunk_size
+        self.full = False
+        """Whether one more chunk might make the file larger than its limit."""
+        self.finished = False
+        """Whether the file has its summary and end."""
+        self._chunk_size, self._size_limit = chunk_size, size_limit
         self._compress = zstandard.ZstdCompressor(level=_COMPRESSION_LEVEL).compress
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._chunk_indexes: list[ChunkIndex] = []
         self._metadata_indexes: list[MetadataIndex] = []
-        self._groups: dict[int, _FillingChunk] = {}
-        self._chunk_of: dict[int, _FillingChunk] = {}  # by channel
+        self._declared: set[tuple[type, int]] = set()
         self._data_crc = 0
         self._room = _ROOM_AT_LEAST
-        self.finished = False
-        """Whether the file has its summary and end."""
+        self._begin_chunk()
         self.file = open_file(path)
         try:
             self._append(MCAP0_MAGIC + _packed(Header('ros2', library)))
@@ -86,8 +87,8 @@ class McapWriter:
 
     @property
     def pending(self) -> int:
-        """How many messages wait in the chunks that are being filled."""
-        return sum(len(numbers) for chunk in self._groups.values() for numbers in chunk.entries.values()) // 2
+        """How many messages wait in the chunk that is being filled."""
+        return sum(map(len, self._entries.values())) // 2
 
     @property
     def start_time(self) -> int | None:
@@ -99,11 +100,6 @@ class McapWriter:
         """The latest log time in the file, ns."""
         return max((index.message_end_time for index in self._chunk_indexes), default=None)
 
-    @property
-    def size_at_end(self) -> int:
-        """How many bytes the file has after one more chunk of each group and its end, from above."""
-        return self.file.size + self._chunk_size * len(self._groups) + self._room
-
     def add_schema(self, name: str, encoding: str, text: bytes) -> int:
         """Declare a schema and return its id; it is written with the first message that needs it."""
         schema = Schema(id=len(self._schemas) + 1, data=text, encoding=encoding, name=name)
@@ -111,57 +107,47 @@ class McapWriter:
         self._room += 2 * len(_packed(schema))
         return schema.id
 
-    def add_channel(
-        self, topic: str, encoding: str, schema_id: int, metadata: Mapping[str, str], group: int = 0
-    ) -> int:
-        """Declare a channel of a group and return its id; it is written with its first message."""
+    def add_channel(self, topic: str, encoding: str, schema_id: int, metadata: Mapping[str, str]) -> int:
+        """Declare a channel and return its id; it is written with its first message."""
         number = len(self._channels) + 1
         channel = Channel(
             id=number, topic=topic, message_encoding=encoding, metadata=dict(metadata), schema_id=schema_id
         )
         self._channels.append(channel)
-        self._chunk_of[number] = self._groups.setdefault(group, _FillingChunk())
         self._room += 4 * len(_packed(channel))
         return number
 
     def add_message(
         self, channel: int, raw: bytes, log_time: int, publish_time: int, sequence: int = 0
     ) -> None:
-        """Add one serialised message; times in ns. When its chunk is full, all go to the file at once."""
-        chunk = self._chunk_of[channel]
-        entries = chunk.entries.get(channel)
+        """Add one serialised message; times in ns. A full chunk goes to the file."""
+        entries = self._entries.get(channel)
         if entries is None:
-            self._declare(chunk, self._channels[channel - 1])
-            entries = chunk.entries[channel] = []
+            self._declare(self._channels[channel - 1])
+            entries = self._entries[channel] = []
         length = len(raw)
-        entries += (log_time, chunk.size)
-        chunk.parts += (
+        entries += (log_time, self._size)
+        self._parts += (
             MESSAGE.pack(_MESSAGE_OPCODE, length + _MESSAGE_HEAD, channel, sequence, log_time, publish_time),
             raw,
         )
-        chunk.size += length + MESSAGE.size
-        if chunk.size >= self._chunk_size:
+        self._size += length + MESSAGE.size
+        if self._size >= self._chunk_size:
             self.flush()
 
     def flush(self) -> None:
-        """Write the chunks that are being filled, of each group that has a message."""
-        filled = [chunk for _, chunk in sorted(self._groups.items()) if chunk.entries]
-        if not filled:
+        """Write the chunk that is being filled, unless it is empty."""
+        if not self._entries:
             return
-        data, indexes, counts = b'', [], Counter[int]()
-        for chunk in filled:
-            counts.update({channel: len(numbers) // 2 for channel, numbers in chunk.entries.items()})
-            records, index = self._packed_chunk(chunk, self.file.size + len(data))
-            data += records
-            indexes.append(index)
-            chunk.clear()  # whatever becomes of the write, its messages are no longer pending
-        self._room += sum(_ROOM_PER_CHUNK + 10 * len(index.message_index_offsets) for index in indexes)
+        counts = {channel: len(numbers) // 2 for channel, numbers in self._entries.items()}
+        data, index = self._packed_chunk(self.file.size)
+        self._begin_chunk()  # whatever becomes of the write, its messages are no longer pending
+        self._room += _ROOM_PER_CHUNK + 10 * len(counts)
         self.file.keep_room(self._room)
         self._append(data)
-        self._chunk_indexes += indexes
+        self._chunk_indexes.append(index)
         self.message_counts.update(counts)
-        if self.after_chunk is not None:
-            self.after_chunk()
+        self.full = 0 < self._size_limit < self.file.size + self._chunk_size + self._room
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record behind what is already in the file."""
@@ -186,17 +172,22 @@ class McapWriter:
         self.file.append(data)
         self._data_crc = zlib.crc32(data, self._data_crc)
 
-    def _declare(self, chunk: '_FillingChunk', channel: Channel) -> None:
-        for record in (self._schemas[channel.schema_id - 1], channel):
-            if (known := (type(record), record.id)) not in chunk.declared:
-                chunk.declared.add(known)
-                chunk.parts.append(_packed(record))
-                chunk.size += len(chunk.parts[-1])
+    def _begin_chunk(self) -> None:
+        self._parts: list[bytes] = []
+        self._entries: dict[int, list[int]] = {}  # by channel: log time (ns), offset, log time, offset, ...
+        self._size = 0
 
-    def _packed_chunk(self, chunk: '_FillingChunk', begin: int) -> tuple[bytes, ChunkIndex]:
-        """Return a chunk that will stand at `begin`, with the indexes of its messages, and its own index."""
-        data = b''.join(chunk.parts)
-        times = [time for numbers in chunk.entries.values() for time in numbers[::2]]
+    def _declare(self, channel: Channel) -> None:
+        for record in (self._schemas[channel.schema_id - 1], channel):
+            if (known := (type(record), record.id)) not in self._declared:
+                self._declared.add(known)
+                self._parts.append(_packed(record))
+                self._size += len(self._parts[-1])
+
+    def _packed_chunk(self, begin: int) -> tuple[bytes, ChunkIndex]:
+        """Return the chunk, which will stand at `begin`, with the indexes of its messages; its own index."""
+        data = b''.join(self._parts)
+        times = [time for numbers in self._entries.values() for time in numbers[::2]]
         packed = Chunk(
             compression='zstd',
             data=self._compress(data),
@@ -207,7 +198,7 @@ class McapWriter:
         )
         records = _packed(packed)
         length, offsets = len(records), {}
-        for channel, numbers in chunk.entries.items():
+        for channel, numbers in self._entries.items():
             offsets[channel] = begin + len(records)
             size = 8 * len(numbers)
             head = _INDEX.pack(Opcode.MESSAGE_INDEX, size + 6, channel, size)
@@ -255,19 +246,6 @@ class McapWriter:
             struct.pack('<BQQQ', Opcode.FOOTER, 8 + 8 + 4, start, offset_start), zlib.crc32(data)
         )
         return data + _packed(Footer(start, offset_start, crc)) + MCAP0_MAGIC
-
-
-class _FillingChunk:
-    """Records in their order; `entries` say of which messages, `size` is their length in bytes."""
-
-    def __init__(self) -> None:
-        self.declared: set[tuple[type, int]] = set()  # here or in a chunk before
-        self.clear()
-
-    def clear(self) -> None:
-        self.parts: list[bytes] = []
-        self.entries: dict[int, list[int]] = {}  # by channel: log time (ns), offset, log time, offset, ...
-        self.size = 0
 
 
 def _packed(record: McapRecord) -> bytes:

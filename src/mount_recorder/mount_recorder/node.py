@@ -2,11 +2,13 @@
 
 import time
 from dataclasses import replace
+from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from std_srvs.srv import Trigger
@@ -15,11 +17,11 @@ from mount_recorder.automatic_marks import AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.collector import Collector
 from mount_recorder.diagnosis import Figures, OnFull, judge
-from mount_recorder.event_window import EventWindow
-from mount_recorder.metadata import OfferedQos
-from mount_recorder.parameters import RecorderParameters, split_of
+from mount_recorder.metadata import Offers
+from mount_recorder.parameters import RecorderParameters, check_split
 from mount_recorder.recorder import Recorder, free_space
-from mount_recorder.watching import FaultWatch, SampleWatch
+from mount_recorder.stamp_watch import StampWatch
+from mount_recorder.watching import FaultWatch, SwitchWatch
 from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import BY_HAND, Mark, mark_text
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
@@ -40,7 +42,10 @@ from mount_ros.topics import (
 
 NAME = 'mount_recorder'
 _HOUR = 3_600_000_000_000  # ns
-_FAMILY = 'mount_record'  # all recorders are called so or something longer
+_POLICIES = (
+    *('history', 'depth', 'reliability', 'durability', 'deadline', 'lifespan', 'liveliness'),
+    *('liveliness_lease_duration', 'avoid_ros_namespace_conventions'),
+)
 _PLACES = {
     'uri': ('', 'folder that the recording creates; it must not exist'),
     'mounts': ('', 'namespaces of the mounts to record, as in left,right; empty: one mount in its own'),
@@ -72,20 +77,15 @@ class MountRecorder(SafeLifecycleNode):
         if not uri:
             raise RecordingError('parameter uri is empty; name the folder that the recording shall create')
         self._on_full = _on_full(parameters.on_full)
-        self._marks = AutomaticMarks(self._publish_automatic, mark_kinds(parameters.automatic_marks))
-        thread = self.data_thread if self.lockstep else None
-        data_path = Collector(self, thread=thread, on_failure=self.report_failure)
+        self._marks = AutomaticMarks(self._publish, mark_kinds(parameters.automatic_marks))
+        data_path = Collector(self, on_failure=self.report_failure)
         self.data_path = self._collector = data_path
         self._event = data_path.node.resolve_topic_name(EVENT.name)
         self._send_event = data_path.sender(EVENT)
-        if parameters.snapshot and EVENT not in topics:
-            raise RecordingError(f'a snapshot is set off by the topic {EVENT.name}; name it among the topics')
-        around = parameters.snapshot, parameters.snapshot_after, parameters.snapshot_memory
+        check_split(parameters.split_size)
         self._recorder = Recorder(
             Path(uri).expanduser().absolute(),
-            open_writer=partial(BagWriter, split=split_of(parameters)),
-            window=EventWindow(self._event, *around) if parameters.snapshot else None,
-            threaded=not self.lockstep,
+            open_writer=partial(BagWriter, split_size=parameters.split_size),
             free_reserve=parameters.free_reserve,
             on_loss=self._mark_loss,
         )
@@ -97,7 +97,7 @@ class MountRecorder(SafeLifecycleNode):
                 self._record(entry, mount)
         if mounts != [''] and EVENT in topics:
             self._record(EVENT, '')  # marks of the recorder itself, which concern all mounts
-        data_path.start(*[self._recorder.poll] if self.lockstep else [])
+        data_path.start()
 
     def activate(self) -> None:
         self._core.begin()
@@ -111,11 +111,9 @@ class MountRecorder(SafeLifecycleNode):
             return
         recorder.end()
         figures = recorder.figures()
-        places = ', '.join(str(writer.folder) for writer in recorder.writers)
         self.get_logger().info(
             f'recorded {figures["kept"]} messages, {figures["file_bytes"]} bytes, '
-            f'to {places or "nowhere, for lack of an event"}; '
-            f'{figures["lost"]} lost'
+            f'to {recorder.folder}; {figures["lost"]} lost'
         )
 
     def cleanup(self) -> None:
@@ -138,7 +136,6 @@ class MountRecorder(SafeLifecycleNode):
             recorder.unobserved,
             failure=recorder.failure,
             on_full=self._on_full,
-            recording=recorder.window is None or recorder.window.running,
         )
 
     def mark(self, text: str = '', kind: str = BY_HAND) -> Mark:
@@ -181,13 +178,14 @@ class MountRecorder(SafeLifecycleNode):
         # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
         elif entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
             rate = entry.rate_at(self._settings.sample_rate)
-            watch = SampleWatch(self._marks, name, rate, trace=entry is CONTROL_TRACE, mount=mount)
-            recorder.watches[name], recorder.observers[name] = watch.stamps, watch.observe
+            stamps = recorder.watches[name] = StampWatch(rate)
+            watch = SwitchWatch(self._marks, stamps, mount) if entry is CONTROL_TRACE else stamps
+            recorder.observers[name] = watch.observe
 
     def _figures(self, recorder: Recorder) -> dict[str, Any]:
         figures: dict[str, Any] = {'folder': str(recorder.folder), **recorder.figures()}
         elapsed = time.monotonic() - self._began_at
-        receptions, window = recorder.receptions, recorder.window
+        receptions = recorder.receptions
         figures |= {
             'free_bytes': free_space(recorder.folder),
             'bytes_per_second': round(figures['file_bytes'] / elapsed) if elapsed > 1.0 else 0,
@@ -195,9 +193,6 @@ class MountRecorder(SafeLifecycleNode):
             'marks': self._marks.sent,
             'events': receptions[self._event].received if self._event in receptions else 0,
         }
-        if window is not None:
-            figures |= {'snapshots': len(recorder.writers), 'held_bytes': window.held_bytes}
-            figures['held_s'] = round(window.held, 3)
         for name, subscription in self._subscriptions_by_topic.items():
             figures[f'publishers.{name}'] = subscription.get_publisher_count()
         return {**figures, **recorder.figures_by_topic()}
@@ -219,16 +214,6 @@ class MountRecorder(SafeLifecycleNode):
     def _publish(self, mark: Mark) -> None:
         self._send_event(string_message(mark_text(mark)))
 
-    def _publish_automatic(self, mark: Mark) -> None:
-        """Publish a mark unless another recorder of this namespace does: of several the first by name."""
-        try:
-            infos = self._collector.node.get_publishers_info_by_topic(EVENT.name)
-            names = [info.node_name for info in infos if info.node_name.startswith(_FAMILY)]
-            if min(names, default=self._collector.node.get_name()) >= self._collector.node.get_name():
-                self._publish(mark)
-        except RuntimeError:  # rclpy's errors of a context that is already shut down
-            return
-
 
 def main() -> None:
     """Run the recorder until SIGINT or SIGTERM."""
@@ -249,7 +234,7 @@ def _on_full(word: str) -> OnFull:
         raise RecordingError(f'on_full must be stop or continue; instead received {word!r}') from None
 
 
-def _offers(collector: Collector, topic_name: str) -> list[OfferedQos]:
+def _offers(collector: Collector, topic_name: str) -> Offers:
     try:
         return [
             _offer(entry.qos_profile) for entry in collector.node.get_publishers_info_by_topic(topic_name)
@@ -258,12 +243,13 @@ def _offers(collector: Collector, topic_name: str) -> list[OfferedQos]:
         return []
 
 
-def _offer(qos: QoSProfile) -> OfferedQos:
-    policies = ('history', 'reliability', 'durability', 'liveliness')
-    durations = ('deadline', 'lifespan', 'liveliness_lease_duration')
-    return OfferedQos(
-        depth=qos.depth,
-        avoid_ros_namespace_conventions=qos.avoid_ros_namespace_conventions,
-        **{name: getattr(qos, name).name.lower() for name in policies},
-        **{name: getattr(qos, name).nanoseconds for name in durations},
-    )
+def _offer(qos: QoSProfile) -> dict[str, Any]:
+    """Return the policies as rosbag2 writes them, in its order."""
+    return {name: _plain(getattr(qos, name)) for name in _POLICIES}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Duration):
+        seconds, rest = divmod(value.nanoseconds, 1_000_000_000)
+        return {'sec': seconds, 'nsec': rest}
+    return value.name.lower() if isinstance(value, Enum) else value

@@ -1,8 +1,7 @@
 """The core of the recorder: one thread receives, one writes, and a queue is between them.
 
 Receiving is one append. Whatever the disk does, publishers never wait: the queue grows up to a limit
-in bytes, and what does not fit is lost, counted and reported. In lock-step one thread does both, in turn:
-no time passes while it writes, and two that take turns in one process cost more than the work.
+in bytes, and what does not fit is lost, counted and reported.
 """
 
 import shutil
@@ -13,14 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from mount_recorder.bag_writer import BagWriter, Offers, RecordingError
-from mount_recorder.event_window import ITEM_OVERHEAD, EventWindow, Item
-from mount_recorder.folders import snapshot_folder
+from mount_recorder.bag_writer import BagWriter, FindOffers, RecordingError
 from mount_recorder.losses import Reception
-from mount_recorder.schemas import schema_text
 from mount_recorder.stamp_watch import StampWatch
 
 MEMORY_LIMIT = 128 << 20  # bytes, chosen: half a minute of a full drive with the simulator's truth
+ITEM_OVERHEAD = 288
+"""Bytes of memory per message besides its payload: tuples, numbers, head of the bytes (measured: 272)."""
 _DRAIN_PERIOD = 0.02  # s, chosen: what a crash may cost besides the chunk being filled
 _FLUSH_PERIOD = 0.08  # s, chosen: longest time that a chunk is filled; with the above a crash costs 0.12 s
 _SPACE_PERIOD = 0.2  # s, chosen: a tenth of the reserve at 100 MB/s
@@ -31,30 +29,25 @@ _SETTLE_LIMIT = 5.0  # s, chosen
 Receive = Callable[[bytes, int, int], None]
 """Takes (serialised message, time of arrival ns, time of sending ns)."""
 
-Observe = Callable[[bytes], None]
-"""Evaluates a serialised message."""
+Item = tuple[str, bytes, int, int]
+"""Topic, message, times of arrival and of sending in ns."""
 
 
 @dataclass(frozen=True)
 class Unobserved:
-    """Messages of a topic, all recorded, that its observer could not read: bytes of the last, and why."""
+    """Messages of a topic, all recorded, that its observer could not read: how many, what the last was."""
 
     count: int
-    size: int
-    why: str
+    last: str
 
 
 class Recorder:
     """Takes serialised messages and writes them into the recording `folder` from `begin` to `end`.
 
-    With a `window` it writes only around events: the first makes the recording `folder`, later ones
-    `folder`_2, `folder`_3, ... An event while a recording still runs makes it longer.
-
     The functions that `add_topic` returns are all called by one thread, `begin` and `end` by any other. The
-    writing is done by a thread of its own, or (`threaded` off) by whoever calls `poll`. The `observers`
-    are called there too, each with the messages of its topic, and so is `on_loss`, with the number of
-    messages for which the queue had no room since it was called last. A message on which an observer fails
-    is recorded all the same and counted in `unobserved`; so is a failure of `on_loss`.
+    thread that writes calls the `observers` too, each with the messages of its topic, and `on_loss`, with the
+    number of messages for which the queue had no room since it was called last. A message on which an
+    observer fails is recorded all the same and counted in `unobserved`; so is a failure of `on_loss`.
 
     The recording is closed before the disk has less than `free_reserve` bytes left.
     """
@@ -64,59 +57,44 @@ class Recorder:
         folder: Path,
         *,
         open_writer: Callable[[Path], BagWriter] = BagWriter,
-        window: EventWindow | None = None,
         memory_limit: int = MEMORY_LIMIT,
-        threaded: bool = True,
         free_reserve: int = 0,
         on_loss: Callable[[int], None] = lambda _: None,
     ):
         self.folder = folder
-        self.window = window
-        self.writers: list[BagWriter] = []
         self.receptions: dict[str, Reception] = {}
-        self.observers: dict[str, Observe] = {}
+        self.observers: dict[str, Callable[[bytes], None]] = {}
         self.watches: dict[str, StampWatch] = {}
         self.unobserved: dict[str, Unobserved] = {}
         self.failure = ''
         self.begun = False
-        self._new_writer = open_writer
         self._memory_limit = memory_limit
         self._free_reserve = free_reserve
         self._on_loss = on_loss
-        self._topics: list[tuple[str, str, Offers, bool]] = []
         self._queue: deque[Item] = deque()
         self._queued_bytes = 0
         self._latched: dict[str, Item] = {}
-        self._wanted = 0  # messages that a window has selected
         self._open = False
         self._gate = threading.Lock()  # of the queue, for a moment each
-        self._writing = threading.Lock()
-        self._turn_end = self._changed = self._space_checked = 0.0  # steady times, s
+        self._changed = self._space_checked = 0.0  # steady times, s
         self._kept_before = self._lost_before = 0
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._work, name='recorder', daemon=True) if threaded else None
+        self._thread = threading.Thread(target=self._work, name='recorder', daemon=True)
         if shortage := self._shortage():
             raise RecordingError(f'recording {folder} cannot be started: {shortage}')
-        if folder.exists():
-            raise RecordingError(f'{folder} exists already; a recording is never written over')
-        if window is None:
-            self._open_writer()
+        self._writer = open_writer(folder)
+        self._writer.receptions = self.receptions
 
     def add_topic(
-        self, name: str, type_name: str, offers: Offers = tuple, *, latched: bool = False
+        self, name: str, type_name: str, find_offers: FindOffers = tuple, *, latched: bool = False
     ) -> Receive:
         """Announce a topic and return the function that takes its messages.
 
         Before `begin` it drops them, but keeps the last one of a `latched` topic for it. Raises `SchemaError`
         for a type that is not installed.
         """
-        schema_text(type_name)
-        self._topics.append((name, type_name, offers, latched))
+        self._writer.add_topic(name, type_name, find_offers)
         self.receptions[name] = Reception()
-        if self.window is None:
-            self.writers[0].add_topic(name, type_name, offers, latched=latched)
-        elif latched:
-            self.window.latched.add(name)
 
         def receive(raw: bytes, received: int, sent: int) -> None:
             with self._gate:
@@ -136,16 +114,7 @@ class Recorder:
             for item in sorted(self._latched.values(), key=lambda item: item[2]):
                 self._put(item)
             self._changed = self._space_checked = time.monotonic()
-        if self._thread is not None:
-            self._thread.start()
-
-    def poll(self) -> bool:
-        """Write what is queued, a few times per 0.1 s; for a recorder without a thread. Returns False."""
-        if self._open and time.monotonic() - self._turn_end > _DRAIN_PERIOD:
-            with self._writing:
-                if self._open:
-                    self._take_turn()
-        return False
+        self._thread.start()
 
     def end(self) -> None:
         """Wait until no message is under way, write what is queued and close; safe to call twice.
@@ -157,22 +126,18 @@ class Recorder:
             with self._gate:
                 self._open = False
             self._ending.set()
-            if self._thread is not None:
-                self._thread.join()
-            with self._writing:
-                self._guarded(self._write_queued)
+            self._thread.join()
+            self._guarded(self._write_queued)
         self._note_missing()
         try:
-            if self._writer is not None:
-                self._writer.close()
+            self._writer.close()
         except RecordingError as error:
             self.failure = str(error)
             raise
 
     def discard(self) -> None:
         """Remove the recording of a recorder that never began."""
-        for writer in self.writers:
-            writer.discard()
+        self._writer.discard()
 
     def figures(self) -> dict[str, int]:
         """Return what was done so far, by the keys of the diagnostics; sizes in bytes.
@@ -180,16 +145,14 @@ class Recorder:
         `kept` is in complete chunks on the disk; `lost` did not fit into the queue, or came after a failure.
         """
         received = sum(entry.received for entry in self.receptions.values())
-        overflowed = sum(entry.overflowed for entry in self.receptions.values())
-        kept = self._kept
-        wanted = received - overflowed if self.window is None else self._wanted
+        kept = self._writer.kept
         return {
             'received': received,
             'kept': kept,
-            'file_bytes': sum(writer.size for writer in self.writers),
+            'file_bytes': self._writer.size,
             'queued': len(self._queue),
             'queued_bytes': self._queued_bytes,
-            'lost': overflowed + (wanted - kept if self.failure else 0),
+            'lost': received - kept if self.failure else self._overflowed,
         }
 
     def figures_by_topic(self) -> dict[str, int]:
@@ -207,13 +170,8 @@ class Recorder:
         return max((watch.last_stamp for watch in self.watches.values()), default=0)
 
     @property
-    def _kept(self) -> int:
-        return sum(writer.kept for writer in self.writers)
-
-    @property
-    def _writer(self) -> BagWriter | None:
-        """The recording that is being made."""
-        return self.writers[-1] if self.writers and not self.writers[-1].closed else None
+    def _overflowed(self) -> int:
+        return sum(entry.overflowed for entry in self.receptions.values())
 
     def _put(self, item: Item) -> None:
         reception = self.receptions[item[0]]
@@ -241,27 +199,18 @@ class Recorder:
 
     def _work(self) -> None:
         while not self._ending.wait(_DRAIN_PERIOD):
-            self._take_turn()
-
-    def _take_turn(self) -> None:
-        self._guarded(self._write_queued)
-        now, writer, kept = time.monotonic(), self._writer, self._kept
-        self._turn_end = now
-        if writer is None or not writer.pending or kept != self._kept_before:
-            self._kept_before, self._changed = kept, now
-        elif now - self._changed > _FLUSH_PERIOD:
-            self._guarded(writer.flush)
-        if now - self._space_checked > _SPACE_PERIOD:
-            self._space_checked = now
-            self._guarded(self._check_space)
-        overflowed = sum(entry.overflowed for entry in self.receptions.values())
-        if lost := overflowed - self._lost_before:
-            self._lost_before = overflowed
-            try:
-                self._on_loss(lost)
-            except Exception as error:
-                # The border of the thread: what cannot be reported of a loss costs no more messages.
-                self._note_unobserved('marks of losses', b'', error)
+            self._guarded(self._write_queued)
+            now, writer = time.monotonic(), self._writer
+            if not writer.pending or writer.kept != self._kept_before:
+                self._kept_before, self._changed = writer.kept, now
+            elif now - self._changed > _FLUSH_PERIOD:
+                self._guarded(writer.flush)
+            if now - self._space_checked > _SPACE_PERIOD:
+                self._space_checked = now
+                self._guarded(self._check_space)
+            if lost := self._overflowed - self._lost_before:
+                self._lost_before += lost
+                self._observe('marks of losses', b'', lambda _: self._on_loss(lost))
 
     def _write_queued(self) -> None:
         queue = self._queue
@@ -269,52 +218,27 @@ class Recorder:
             batch = [queue.popleft() for _ in range(min(len(queue), _BATCH))]
             try:
                 for item in batch:
-                    self._store(item)
+                    self._writer.write(*item)
                     if item[0] in self.observers:
-                        self._observe(item[0], item[1])
+                        self._observe(item[0], item[1], self.observers[item[0]])
             finally:
                 with self._gate:
                     self._queued_bytes -= sum(len(item[1]) + ITEM_OVERHEAD for item in batch)
 
-    def _store(self, item: Item) -> None:
-        """Write a message, or what the window selects: nothing without an event, then all it holds."""
-        if self.window is None:
-            self.writers[0].write(*item)
-            return
-        begins, items = self.window.add(item)
-        if (begins or not items) and self._writer is not None:
-            self._writer.close()
-        if begins:
-            self._open_writer()
-        for each in items:
-            self._wanted += 1
-            self.writers[-1].write(*each)
-
-    def _open_writer(self) -> None:
-        writer = self._new_writer(snapshot_folder(self.folder, len(self.writers) + 1))
-        writer.receptions, writer.excerpt = self.receptions, self.window is not None
-        for name, type_name, offers, latched in self._topics:
-            writer.add_topic(name, type_name, offers, latched=latched)
-        self.writers.append(writer)
-
-    def _observe(self, topic: str, raw: bytes) -> None:
+    def _observe(self, what: str, raw: bytes, observe: Callable[[bytes], None]) -> None:
         try:
-            self.observers[topic](raw)
+            observe(raw)
         except Exception as error:
-            # Anybody may publish anything: what is wrong with one message ends no recording.
-            self._note_unobserved(topic, raw, error)
-
-    def _note_unobserved(self, topic: str, raw: bytes, error: Exception) -> None:
-        count = self.unobserved[topic].count + 1 if topic in self.unobserved else 1
-        why = f'{type(error).__name__}: {error}'.splitlines()[0]
-        self.unobserved[topic] = Unobserved(count, len(raw), why)
+            # Anybody may publish anything, and what is wrong with one message ends no recording. Nor does
+            # a loss that cannot be reported.
+            count = self.unobserved[what].count + 1 if what in self.unobserved else 1
+            why = f'{type(error).__name__}: {error}'.splitlines()[0]
+            self.unobserved[what] = Unobserved(count, f'{len(raw)} bytes; {why}')
 
     def _check_space(self) -> None:
         if shortage := self._shortage():
             self._note_missing()
-            if self._writer is not None:
-                self._writer.stop(shortage)
-            raise RecordingError(f'recording {self.folder} stopped: {shortage}')
+            self._writer.stop(shortage)
 
     def _shortage(self) -> str:
         """Return what is wrong where the disk has less than the reserve, empty while there is enough."""

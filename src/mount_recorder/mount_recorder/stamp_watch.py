@@ -1,5 +1,7 @@
 """The stamps of a topic with a fixed rate, watched while its samples arrive."""
 
+from mount_ros.messages.scalars import stamp_of
+
 FARTHEST = 10_000_000_000
 """ns, chosen: a stamp farther from the samples that came around it is misdated."""
 LONGEST_PAUSE = 3_600_000_000_000
@@ -18,6 +20,10 @@ class StampWatch:
         self.last_stamp = 0  # ns, the latest so far
         self._doubtful: int | None = None  # a stamp far off, until the next tells what it was
         self._period = 1e9 / rate
+
+    def observe(self, raw: bytes) -> None:
+        """Count a serialised sample."""
+        self.add(stamp_of(raw))
 
     def add(self, stamp: int) -> None:
         """Count the sample of time `stamp` (ns)."""

@@ -1,55 +1,34 @@
-"""Watches of what the recorder writes: missing samples, the switching of damping, faults of nodes."""
+"""Watches of what the recorder writes: the switching of damping, faults of nodes."""
 
 import math
 from collections.abc import Callable
 
 from mount_recorder.automatic_marks import PAUSE, AutomaticMarks, MarkKind, of_mount
 from mount_recorder.stamp_watch import StampWatch
-from mount_ros.messages.scalars import ScalarsReader, stamp_of
+from mount_ros.messages.scalars import ScalarsReader
 from mount_ros.messages.verdicts import Level, verdicts_of
 
 
-class SampleWatch:
-    """Counts the samples of a topic of fixed rate and marks where some are missing.
+class SwitchWatch:
+    """Marks where `damping_active` of `control_trace` leaves 0 after a pause that is long enough to be one.
 
-    Of `control_trace` those were never sent, as control did not answer; there it also marks where
-    `damping_active` leaves 0 after a pause that is long enough to be one. `mount`: the one of several.
+    `stamps` counts the samples of the trace; `mount`: the one of several.
     """
 
-    def __init__(self, marks: AutomaticMarks, topic: str, rate: float, *, trace: bool, mount: str = ''):
-        self.stamps = StampWatch(rate)
-        self._marks = marks
-        self._topic = topic
-        self._mount = mount
-        self._kind, self._absence = (
-            (MarkKind.UNANSWERED, 'without a control step') if trace else (MarkKind.LOST_SAMPLE, 'missing')
-        )
-        self._reader = ScalarsReader(('damping_active', 'magnitude')) if trace else None
+    def __init__(self, marks: AutomaticMarks, stamps: StampWatch, mount: str = ''):
+        self._marks, self._stamps, self._mount = marks, stamps, mount
+        self._reader = ScalarsReader(('damping_active', 'magnitude'))
         self._damped: int | None = None  # stamp of the last step with damping on
 
     def observe(self, raw: bytes) -> None:
-        """Evaluate a serialised sample."""
-        if self._reader is None:
-            self._add(stamp_of(raw))
-        else:
-            stamp, (active, magnitude) = self._reader.read(raw)
-            self._add(stamp)
-            if active > 0.0:
-                self._add_damped(stamp, magnitude)
-
-    def _add(self, stamp: int) -> None:
-        before = self.stamps.lost
-        self.stamps.add(stamp)
-        if (count := self.stamps.lost - before) > 0:
-            noun = 'sample' if count == 1 else 'samples'
-            self._marks.mark(self._kind, stamp, f'{self._topic}: {count} {noun} {self._absence}')
-
-    def _add_damped(self, stamp: int, magnitude: float) -> None:
-        """Take a step with damping on; `magnitude` is the band displacement that decided, m, NaN for none."""
-        if self._damped is None or not 0 <= stamp - self._damped <= PAUSE * 1e9:
-            level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
-            self._marks.mark(MarkKind.SWITCH_ON, stamp, f'{of_mount(self._mount)}damping on{level}')
-        self._damped = stamp
+        """Evaluate a serialised trace; its magnitude is the band displacement that decided, m, or NaN."""
+        stamp, (active, magnitude) = self._reader.read(raw)
+        self._stamps.add(stamp)
+        if active > 0.0:
+            if self._damped is None or not 0 <= stamp - self._damped <= PAUSE * 1e9:
+                level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
+                self._marks.mark(MarkKind.SWITCH_ON, stamp, f'{of_mount(self._mount)}damping on{level}')
+            self._damped = stamp
 
 
 class FaultWatch:

@@ -10,17 +10,17 @@ import time
 from functools import partial
 from pathlib import Path
 
-from mount_recorder.bag_writer import BagWriter, SplitRule
+from mount_recorder.bag_writer import BagWriter
 from mount_recorder.recorder import Recorder
 
 TOPICS = ('/one', '/two', '/three', '/four')
-SPLIT = SplitRule(duration=250_000_000)
+SPLIT = 200_000  # bytes
 
 
 def main(folder, progress_file):
     with open(progress_file, 'r+b') as file:
         progress = mmap.mmap(file.fileno(), 8)
-    recorder = Recorder(Path(folder), open_writer=partial(BagWriter, split=SPLIT))
+    recorder = Recorder(Path(folder), open_writer=partial(BagWriter, split_size=SPLIT))
     session = recorder.add_topic('/session', 'std_msgs/msg/String', latched=True)
     receivers = [recorder.add_topic(topic, 'sensor_msgs/msg/JointState') for topic in TOPICS]
     session(b'\0\1\0\0\2\0\0\0s\0', time.time_ns(), time.time_ns())

@@ -46,26 +46,20 @@ def whole_records(data: bytes) -> bytes:
     return data if data[end:] == MCAP0_MAGIC else data[:end] if len(data) >= end else b''
 
 
-def messages_in(path: Path, *, repeated: bool = True) -> list[Kept]:
-    """Return the messages of a file, or those that no file before has."""
-    channels, found, again = {}, [], set()
+def messages_in(path: Path) -> list[Kept]:
+    """Return the messages of a file."""
+    channels, found = {}, []
     for record in records_of(path):
         if isinstance(record, Channel):
             channels[record.id] = record.topic
-        elif isinstance(record, Metadata) and record.name == 'engine_mount_piece' and not repeated:
-            again = set(yaml.safe_load(record.metadata['repeated']))
         elif isinstance(record, Message):
-            topic = channels[record.channel_id]
-            if topic in again:
-                again.remove(topic)
-            else:
-                found.append(Kept(topic, record.data, record.log_time, record.publish_time))
+            found.append(Kept(channels[record.channel_id], record.data, record.log_time, record.publish_time))
     return found
 
 
 def read_back(folder: Path, topic: str | None = None) -> list[Kept]:
-    """Return the messages of a whole recording, each once, of all topics or of one."""
-    found = [kept for path in pieces_of(folder) for kept in messages_in(path, repeated=False)]
+    """Return the messages of a whole recording, of all topics or of one."""
+    found = [kept for path in pieces_of(folder) for kept in messages_in(path)]
     return found if topic is None else [kept for kept in found if kept.topic == topic]
 
 

@@ -8,15 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from read_back import read_back
 from ros_testing import serialised
-from samples import PERIOD, START, sample
+from samples import PERIOD, START
 
 from mount_models.quantity import ParameterError
 from mount_recorder.automatic_marks import BURST, REFILL, AutomaticMarks, MarkKind, mark_kinds
 from mount_recorder.recorder import Recorder
-from mount_recorder.watching import FaultWatch, SampleWatch
+from mount_recorder.stamp_watch import StampWatch
+from mount_recorder.watching import FaultWatch, SwitchWatch
 from mount_ros.messages.event import BY_HAND, Mark, mark_text, read_mark
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, DISPLACEMENT, control_trace
+from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, control_trace
 
 
 class Clock:
@@ -87,7 +88,7 @@ def step(stamp, active, magnitude=math.nan):
 
 def observe_steps(marks, steps, mount=''):
     """Let a watch of `control_trace` see {index: damping_active}."""
-    watch = SampleWatch(marks, '/control_trace', 1000.0, trace=True, mount=mount)
+    watch = SwitchWatch(marks, StampWatch(1000.0), mount)
     for index, active in steps.items():
         watch.observe(step(START + index * PERIOD, active, 4.2e-4 if active == 1.0 else math.nan))
 
@@ -132,20 +133,10 @@ def test_fault_is_marked_once_until_it_is_over_and_only_that_of_the_own_mount(ma
     ]
 
 
-def test_lost_samples_are_marked_where_the_stamps_go_on(marks, sent):
-    watch = SampleWatch(marks, '/displacement', 1000.0, trace=False)
-    for index in (0, 1, 2, 5, 6, 8):
-        watch.observe(sample(DISPLACEMENT, index))
-    assert sent == [
-        Mark(START + 5 * PERIOD, 'lost_sample', '/displacement: 2 samples missing'),
-        Mark(START + 8 * PERIOD, 'lost_sample', '/displacement: 1 sample missing'),
-    ]
-
-
 def test_broken_stream_does_not_flood_and_kinds_have_rations_of_their_own(marks, sent, clock):
     for index in range(10_000):
         clock.now = 2e-3 * index  # for 20 s
-        marks.mark(MarkKind.LOST_SAMPLE, 0, 'gap')
+        marks.mark(MarkKind.SWITCH_ON, 0, 'gap')
     assert BURST < len(sent) <= BURST + 20.0 / REFILL
     assert sent[BURST].text == 'gap; 991 more since the mark before'
     marks.mark(MarkKind.FAULT, 0, '')
@@ -154,24 +145,24 @@ def test_broken_stream_does_not_flood_and_kinds_have_rations_of_their_own(marks,
 
 
 def test_kinds_that_are_not_wanted_are_not_marked_and_unknown_ones_are_refused(sent):
-    AutomaticMarks(sent.append, mark_kinds('fault, switch_on')).mark(MarkKind.LOST_SAMPLE, 0, '')
+    AutomaticMarks(sent.append, mark_kinds('fault, recording_loss')).mark(MarkKind.SWITCH_ON, 0, '')
     assert sent == []
     assert mark_kinds('') == ()
     with pytest.raises(ParameterError, match=r"some of switch_on, fault.*'fault earthquake'"):
         mark_kinds('fault earthquake')
 
 
-@pytest.mark.parametrize('threaded', [True, False])
 @pytest.mark.parametrize(
     ('topic', 'malformed'),
     [(CONTROL_TRACE, b'\0\1\0\0' + bytes(13)), (CONTROL_TRACE, b''), (DIAGNOSTICS, b'\0\1\0\0\xff')],
 )
 def test_malformed_message_costs_its_observation_and_not_the_recording(
-    tmp_path, marks, sent, topic, malformed, threaded
+    tmp_path, marks, sent, topic, malformed
 ):
-    recorder = Recorder(tmp_path / 'bag', threaded=threaded)
+    recorder = Recorder(tmp_path / 'bag')
     receivers = {entry: recorder.add_topic(entry.name, entry.type) for entry in (CONTROL_TRACE, DIAGNOSTICS)}
-    recorder.observers[CONTROL_TRACE.name] = SampleWatch(marks, 'trace', 1000.0, trace=True).observe
+    watch = recorder.watches[CONTROL_TRACE.name] = StampWatch(1000.0)
+    recorder.observers[CONTROL_TRACE.name] = SwitchWatch(marks, watch).observe
     recorder.observers[DIAGNOSTICS.name] = FaultWatch(marks, '/', lambda: 77).observe
     recorder.begin()
     for index in range(4):
@@ -183,6 +174,7 @@ def test_malformed_message_costs_its_observation_and_not_the_recording(
     figures = recorder.figures()
     assert (figures['received'], figures['kept'], figures['lost'], recorder.failure) == (10, 10, 0, '')
     assert len(read_back(tmp_path / 'bag')) == 10
-    assert [mark.kind for mark in sent] == ['unanswered', 'fault']
-    assert recorder.figures_by_topic() == {f'malformed.{topic.name}': 4}
-    assert recorder.unobserved[topic.name].size == len(malformed)
+    assert [mark.kind for mark in sent] == ['fault']
+    assert watch.lost == 1
+    assert recorder.figures_by_topic()[f'malformed.{topic.name}'] == 4
+    assert f'{len(malformed)} bytes; ' in recorder.unobserved[topic.name].last

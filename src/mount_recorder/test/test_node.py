@@ -20,8 +20,9 @@ from std_srvs.srv import Trigger
 
 from mount_recorder.node import MountRecorder
 from mount_ros.messages.event import read_mark
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.qos import publisher_qos
-from mount_ros.topics import COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
+from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 STREAMS = (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT)
 COUNT = 2000
@@ -120,7 +121,6 @@ def test_latched_topic_received_before_activation_is_recorded(make_recorder, sou
         ({'on_full': 'explode'}, 'stop or continue'),
         ({'split_size': 1000}, 'at least 1000000'),
         ({'automatic_marks': 'earthquake'}, 'earthquake'),
-        ({'snapshot': 5.0}, 'topic event'),
         ({'free_reserve': 10**15}, 'cannot be started'),
     ],
 )
@@ -179,14 +179,13 @@ def marks_of(folder):
 
 
 def test_marks_by_service_by_others_and_by_itself_are_recorded(make_recorder, source, context, tmp_path):
-    publisher = source.publisher(DISPLACEMENT)
     others = source.node.create_publisher(String, EVENT.name, publisher_qos(EVENT))
-    recorder = make_recorder(topics=['displacement', 'event'], mark_text='a dent')
+    recorder = make_recorder(topics=['control_trace', 'event'], mark_text='a dent')
     recorder.trigger_configure()
     recorder.trigger_activate()
     assert recorder.set_parameters([Parameter('mark_text', value='a bump')])[0].successful
     assert not recorder.set_parameters([Parameter('uri', value='elsewhere')])[0].successful
-    wait_until(lambda: publisher.get_subscription_count() and others.get_subscription_count(), 'matched')
+    wait_until(others.get_subscription_count, 'matched')
     wait_until(lambda: recorder.judge().figures['publishers./event'] == 2, 'matched by recorder')
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(recorder)
@@ -198,20 +197,24 @@ def test_marks_by_service_by_others_and_by_itself_are_recorded(make_recorder, so
     assert answer.result().success
     assert 'marked at' in answer.result().message
     others.publish(String(data='a sentence'))
-    for index in (0, 1, 4):
-        publisher.publish(sample(DISPLACEMENT, index))
-    wait_until(lambda: recorder.judge().figures['received'] == 6, 'all received')
-    assert recorder.judge().figures['marks'] == 1
+    steps = source.publisher(CONTROL_TRACE)
+    wait_until(
+        lambda: steps.get_subscription_count() and recorder.judge().figures['publishers./control_trace'],
+        'trace',
+    )
+    values = [float(name == 'damping_active') for name in CONTROL_TRACE.names]
+    steps.publish(ScalarsLayout(CONTROL_TRACE).pack(START, values))
     wait_until(lambda: recorder.judge().figures['events'] == 3, 'the automatic mark')
+    assert recorder.judge().figures['marks'] == 1
     executor.shutdown()
     recorder.trigger_deactivate()
     marks = marks_of(tmp_path / 'bag')
     assert sorted((mark.kind, mark.text) for mark in marks) == [
-        ('lost_sample', '/displacement: 2 samples missing'),
         ('mark', 'a bump'),
         ('mark', 'a sentence'),
+        ('switch_on', 'damping on'),
     ]
-    assert START + 4 * PERIOD in [mark.time for mark in marks]
+    assert START in [mark.time for mark in marks]
 
 
 def test_mark_of_an_inactive_recorder_is_refused(make_recorder):
@@ -220,44 +223,6 @@ def test_mark_of_an_inactive_recorder_is_refused(make_recorder):
     response = recorder._on_mark(Trigger.Request(), Trigger.Response())
     assert not response.success
     assert 'not active' in response.message
-
-
-def test_of_two_recorders_one_marks(make_recorder, source, tmp_path):
-    publisher = source.publisher(DISPLACEMENT)
-    names = ('mount_recorder', 'mount_recorder_2')
-    recorders = [
-        make_recorder(name, topics=['displacement', 'event'], uri=str(tmp_path / name)) for name in names
-    ]
-    for recorder in recorders:
-        recorder.trigger_configure()
-        recorder.trigger_activate()
-    wait_until(lambda: publisher.get_subscription_count() == 2, 'matched')
-    for recorder in recorders:
-        wait_until(lambda end=recorder: end.judge().figures['publishers./event'] == 2, 'matched by recorder')
-    for index in (0, 4):
-        publisher.publish(sample(DISPLACEMENT, index))
-    for recorder in recorders:
-        wait_until(lambda end=recorder: end.judge().figures['received'] == 3, 'the mark')
-        recorder.trigger_deactivate()
-        assert [mark.kind for mark in marks_of(tmp_path / recorder.get_name())] == ['lost_sample']
-
-
-def test_snapshot_holds_what_came_before_the_mark(make_recorder, source, tmp_path):
-    publisher = source.publisher(DISPLACEMENT)
-    recorder = make_recorder(topics=['displacement', 'event'], snapshot=60.0, snapshot_after=0.0)
-    recorder.trigger_configure()
-    recorder.trigger_activate()
-    wait_until(publisher.get_subscription_count, 'matched')
-    wait_until(lambda: 'waiting for an event; 2 of 2' in recorder.judge().sentence, 'matched by recorder')
-    for index in range(50):
-        publisher.publish(sample(DISPLACEMENT, index))
-    wait_until(lambda: recorder.judge().figures['received'] == 50, 'all received')
-    assert not (tmp_path / 'bag').exists()
-    recorder.mark('now')
-    wait_until(lambda: recorder.judge().figures['snapshots'] == 1, 'snapshot')
-    recorder.trigger_deactivate()
-    assert len(read_back(tmp_path / 'bag', '/displacement')) == 50
-    assert [mark.text for mark in marks_of(tmp_path / 'bag')] == ['now']
 
 
 # The process of the node, which takes itself through its transitions as a supervisor would.

@@ -16,9 +16,8 @@ from small_disk import small_disk
 from mount_recorder import recorder as recording
 from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.diagnosis import OnFull, judge
-from mount_recorder.event_window import ITEM_OVERHEAD
-from mount_recorder.recorder import Recorder, Unobserved, free_space
-from mount_recorder.watching import SampleWatch
+from mount_recorder.recorder import ITEM_OVERHEAD, Recorder, Unobserved
+from mount_recorder.stamp_watch import StampWatch
 from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
 from mount_ros.topics import DISPLACEMENT
 
@@ -57,8 +56,8 @@ def make(tmp_path):
 
         receive = clocked(recorder.add_topic('/displacement', DISPLACEMENT.type))
         latched = clocked(recorder.add_topic('/latched', STRING, latched=True))
-        watch = SampleWatch(SimpleNamespace(mark=lambda *_: None), '/displacement', 1000.0, trace=False)
-        recorder.watches['/displacement'], recorder.observers['/displacement'] = watch.stamps, watch.observe
+        watch = recorder.watches['/displacement'] = StampWatch(1000.0)
+        recorder.observers['/displacement'] = watch.observe
         return recorder, receive, latched
 
     return made
@@ -162,16 +161,16 @@ def test_a_loss_that_cannot_be_reported_ends_no_recording(make, slow):
         receive(raw)
     slow.set()
     found = wait_until(lambda: recorder.unobserved.get('marks of losses'), 'the failure to be reported')
-    assert found == Unobserved(1, 0, 'ValueError: no node to report it')
+    assert found == Unobserved(1, '0 bytes; ValueError: no node to report it')
     before = recorder.figures()['kept']
     receive(sample(DISPLACEMENT, 100))
     wait_until(lambda: recorder.figures()['kept'] > before, 'the next message on the disk')
     recorder.end()
 
 
-def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alone(make):
+def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alone(make, slow):
     limit = 1 << 20
-    recorder, *_ = make(memory_limit=limit, threaded=False)
+    recorder, *_ = make(SlowDisk, memory_limit=limit)
     receive = recorder.add_topic('/other', STRING)
     recorder.begin()
     tracemalloc.start()
@@ -180,21 +179,8 @@ def test_the_limit_of_the_queue_holds_for_the_memory_and_not_for_the_payload_alo
     held, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert 0.5 * limit < held < limit
-
-
-def test_recorder_without_a_thread_writes_when_it_is_polled(make, tmp_path):
-    recorder, receive, _ = make(threaded=False)
-    recorder.poll()
-    recorder.begin()
-    for raw in samples(*range(100)):
-        receive(raw)
-    assert recorder.figures()['queued'] == 100
-    assert recorder.poll() is False
-    assert recorder.figures()['queued'] == 0
-    receive(sample(DISPLACEMENT, 100))
+    slow.set()
     recorder.end()
-    recorder.poll()
-    assert [raw for _, raw, _ in messages_of(tmp_path / 'bag')] == samples(*range(101))
 
 
 def test_missing_samples_are_seen_while_they_are_recorded_and_stand_in_the_file(make, tmp_path):
@@ -209,16 +195,12 @@ def test_missing_samples_are_seen_while_they_are_recorded_and_stand_in_the_file(
     assert loss_statement(tmp_path / 'bag')['/displacement'] == row
 
 
-@pytest.mark.parametrize('threaded', [True, False])
-def test_full_disk_ends_the_recording_and_counts_what_is_lost(make, tmp_path, threaded):
+def test_full_disk_ends_the_recording_and_counts_what_is_lost(make, tmp_path):
     disk = partial(BagWriter, open_file=small_disk((1 << 20) + 100_000))
-    recorder, receive, _ = make(disk, threaded=threaded)
+    recorder, receive, _ = make(disk)
     recorder.begin()
     for index in itertools.count():
         receive(sample(DISPLACEMENT, index))
-        if not threaded and index % 1000 == 0:
-            recorder._turn_end = 0.0
-            recorder.poll()
         if recorder.failure:
             break
     recorder.end()
@@ -257,13 +239,6 @@ def test_recording_is_closed_before_the_disk_is_full(make, tmp_path, monkeypatch
         Recorder(tmp_path / 'another', free_reserve=200_000_000)
 
 
-def test_space_is_that_of_the_disk_on_which_the_folder_will_be(tmp_path, monkeypatch):
-    places = []
-    monkeypatch.setattr('shutil.disk_usage', lambda place: places.append(place) or SimpleNamespace(free=5))
-    assert free_space(tmp_path / 'not' / 'yet' / 'made') == 5
-    assert places == [tmp_path]
-
-
 # The verdict.
 
 
@@ -289,7 +264,7 @@ def test_failure_is_an_error_or_a_warning_as_wished(on_full, level):
     ],
 )
 def test_each_finding_is_a_warning_with_its_numbers_and_hides_no_other(figures, words):
-    verdict = judge({**QUIET, **figures}, {}, {'/displacement': Unobserved(1, 7, 'too short')})
+    verdict = judge({**QUIET, **figures}, {}, {'/displacement': Unobserved(1, '7 bytes; too short')})
     assert verdict.level is Level.WARN
     assert all(word in verdict.sentence for word in words)
 
@@ -298,7 +273,6 @@ def test_sound_recorder_says_how_many_topics_have_a_publisher():
     figures = {**QUIET, 'publishers./displacement': 1, 'publishers./latched': 0}
     verdict = judge(figures, {}, {})
     assert (verdict.level, verdict.sentence) == (Level.OK, 'recording; 1 of 2 topics have a publisher')
-    assert 'waiting for an event' in judge(figures, {}, {}, recording=False).sentence
 
 
 @pytest.mark.parametrize(
@@ -308,7 +282,7 @@ def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(
     window, standing, verdicts = SlidingWindow({}), ActiveFindings(), []
     for tenth in range(300):
         figures = {**QUIET, 'received': 100 * tenth, key: 7 * min(max(tenth - 49, 0), 5)}
-        unobserved = {'/displacement': Unobserved(1, 7, 'too short')}
+        unobserved = {'/displacement': Unobserved(1, '7 bytes; too short')}
         found = judge(figures, window.earlier(tenth / 10, figures), unobserved)
         found = standing.keep(found)
         verdicts.append((found.level, found.sentence))

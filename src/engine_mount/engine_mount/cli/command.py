@@ -20,7 +20,6 @@ from engine_mount.cli.commands import (
     identify,
     import_files,
     ls,
-    merge,
     record,
     recover,
     replay,
@@ -88,7 +87,6 @@ _COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
     'Change recordings': (
         (import_files.import_file, import_files.EPILOG),
         (cut.cut, cut.EPILOG),
-        (merge.merge, merge.EPILOG),
         (recover.recover, recover.EPILOG),
     ),
     _MOUNT: ((experiment.experiment, experiment.EPILOG),),

@@ -28,7 +28,7 @@ from mount_control.policy.registry import DEFAULT
 from mount_driver.parameters import DriverParameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_RATE
-from mount_recorder.parameters import RecorderParameters, split_of
+from mount_recorder.parameters import RecorderParameters
 from mount_recorder.session import new_session, session_text
 from mount_sim.electronics.faults import check_without_bus, told_faults
 from mount_sim.excitation.excitation import Excitation, steps_of_sample
@@ -146,8 +146,6 @@ def drive(
     if faults:
         sim['faults'] = [*sim.get('faults', []), *faults]
     values = with_control_of_mount(with_sample_rate(checked_settings(values), sample_rate))
-    if core and values.get('mount_recorder', {}).get('snapshot'):
-        raise CombinationError('--snapshot needs events, which only nodes report: not with --core')
     with tempfile.TemporaryDirectory() as scratch:
         checked = check_drive(_with_file(values, excitation, Path(scratch)), core=core)
     for remark in (*(excitation.notes if excitation else ()), *checked.notes):
@@ -251,7 +249,7 @@ def _drive_core(
             show,
             excitation=excitation,
             namespace=namespace,
-            split=split_of(recorder),
+            split_size=recorder.split_size,
         )
     return {
         'samples': outcome.samples,

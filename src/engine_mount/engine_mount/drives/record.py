@@ -17,15 +17,13 @@ from engine_mount.recordings.screen import Screen
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
 from mount_recorder.diagnosis import OnFull
-from mount_recorder.folders import snapshot_folder
 from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
 from mount_ros.environment import loopback_refusal
-from mount_ros.nodes.lifecycle import wake
 from mount_ros.nodes.process import ros_context, transition
 from mount_ros.topics import EVENT, TOPICS, topic
 
-# Several may run beside a graph; by the order of names the graph's own recorder sets the automatic marks.
+# Several may run beside a graph.
 _FAMILY = f'{NAME}_lone'
 _LINE_PERIOD = 0.5  # s, chosen: over it messages are counted for their rate
 _SERVICE_PERIOD = 0.2  # s, chosen
@@ -33,9 +31,8 @@ _SERVICE_PERIOD = 0.2  # s, chosen
 
 @dataclass(frozen=True)
 class Recorded:
-    """The recordings made, the messages that were received and are not in them, and why it failed, if so."""
+    """Messages that were received and are not in the recording, and why it failed, if so."""
 
-    folders: list[Path]
     lost: int
     failure: str
 
@@ -83,18 +80,15 @@ def record(
         finally:
             if thread.is_alive():
                 ending.set()
-                wake(executor)
+                executor.wake()
                 thread.join()
                 node.trigger_deactivate()
                 figures = _figures(node)
             executor.shutdown()
             node.close()
             node.destroy_node()
-    folders = [out] if figures else []
-    if parameters.snapshot:
-        folders = [snapshot_folder(out, number) for number in range(1, figures.get('snapshots', 0) + 1)]
     failure = str(figures['sentence']) if figures.get('failed') else ''
-    return Recorded(folders, figures.get('lost', 0), failure)
+    return Recorded(figures.get('lost', 0), failure)
 
 
 def chosen_topics(names: Sequence[str]) -> list[str]:
@@ -151,8 +145,6 @@ def _line(figures: Mapping[str, Any], elapsed: float, rate: float) -> str:
         f'{figures.get("lost", 0)} lost',
         f'{marks} mark{"" if marks == 1 else "s"}',
     ]
-    if 'snapshots' in figures:
-        parts.append(f'{figures["snapshots"]} saved, {figures["held_s"]} s in memory')
     if figures['failed']:
         parts.append('not recording any more')
     return '   '.join(parts)

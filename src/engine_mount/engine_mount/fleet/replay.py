@@ -36,7 +36,6 @@ REPLAYED, ANOTHER_POLICY, FAILED = 'replayed', 'another policy', 'failed'
 """What came of a recording; the change does not concern one whose policy lacks a changed parameter."""
 
 _OF_SEVERAL = (ANOTHER_POLICY, REPLAYED, FAILED)  # the last of these that a mount has is its recording's
-_OF_THE_MACHINE = ('processor', 'machine', 'c_library')  # no number of a row depends on them
 _OF_A_WORKER = ('mount_bringup', 'numpy', 'numba', 'python')
 
 
@@ -159,7 +158,7 @@ def _failure(place: Place, reason: str, common: Row) -> Rows:
 
 def _common(changes: Parameters, closed_loop: bool) -> Row:
     """Return the columns that are the same in all rows of an order."""
-    replayed_with = {name: value for name, value in versions().items() if name not in _OF_THE_MACHINE}
+    replayed_with = {name: value for name, value in versions().items() if name != 'machine'}
     return {
         'asked': DISPLACEMENT if closed_loop else SETPOINTS,
         'replayed_with': json.dumps(replayed_with, sort_keys=True),

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import SeriesError
 from engine_mount.recordings.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT
 
 Span = tuple[int, int]

@@ -37,7 +37,6 @@ from engine_mount.recordings.times import (
     misdated,
     missing_samples,
     redated,
-    stamp_jitter,
     stamp_statistics,
 )
 from mount_models.sampling import SAMPLE_RATE
@@ -73,8 +72,6 @@ class TopicAudit:
     misdated: int | None = None
     longest_gap_s: float = math.nan
     rate_hz: float = math.nan
-    jitter_s: float = math.nan  # rms
-    worst_jitter_s: float = math.nan
     lost_samples: int | None = None
     answers: Answers | None = None
     latency: Latency | None = None
@@ -185,13 +182,10 @@ def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
         why = f'{100 * share:.3g} % of the stamps are beside the rate (limit {100 * MOST_JITTER:g} %)'
     if why:
         return TopicAudit(None, present, None, remark=f'{why}: only counted')
-    jitter, worst = stamp_jitter(stamps, rate)
     entry = TopicAudit(
         **asdict(stamp_statistics(stamps, rate)),
         misdated=int(np.count_nonzero(wrong)) or None,
         rate_hz=rate,
-        jitter_s=jitter,
-        worst_jitter_s=worst,
         remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',
     )
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE):

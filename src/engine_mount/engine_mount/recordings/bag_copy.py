@@ -1,11 +1,7 @@
-"""A recording made of others: messages, schemas and channels as they were, and what their recorders lost.
-
-Each original recording is a source of losses of its own, told apart by the record of its recorder and by its
-times. So pieces of one recording that are put together count its losses once, those of different ones add up.
-"""
+"""A recording made of another: messages, schemas and channels as they were, and what its recorder lost."""
 
 import contextlib
-import hashlib
+import heapq
 import os
 import shutil
 from collections.abc import Mapping, Sequence
@@ -14,24 +10,16 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-import yaml
 
 from engine_mount.recordings.mcap_file import ACCOUNTS
 from engine_mount.recordings.mcap_records import StoredTopic
 from engine_mount.recordings.metadata import read_statement, readable_qos
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.series import Payloads
-from mount_models.plain_yaml import plain_yaml
-from mount_recorder.bag_writer import LIBRARY, create_folder, file_entry
+from mount_recorder.bag_writer import LIBRARY, create_folder
 from mount_recorder.losses import RECORDER_RECORD, Reception, loss_statement
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE, McapWriter
 from mount_recorder.metadata import METADATA_NAME, TopicEntry, bag_description, embedded_record, metadata_text
-from mount_recorder.topic_groups import topic_group
-
-_SOURCES = 'sources'  # key in the record of the recorder
-
-Sources = dict[str, dict[str, list[int]]]
-"""{source: {topic: counts of messages that were received, lost since, and missing before}}."""
 
 
 @dataclass(frozen=True)
@@ -65,21 +53,18 @@ def read_messages(recording: Recording, name: str) -> Messages | None:
 
 
 class BagCopy:
-    """One recording of one file, made of messages of others; types need not be installed.
+    """One recording of one file, made of messages of another; types need not be installed.
 
     A context that ends with an error leaves nothing behind. Raises `RecordingError` where the folder exists.
     """
 
     def __init__(self, folder: str | os.PathLike[str], chunk_size: int = LONG_CHUNK_SIZE):
         self.folder = Path(folder)
-        self._file_name = f'{self.folder.name}_0.mcap'
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, int], int] = {}
         self._topics: dict[int, StoredTopic] = {}  # by channel
-        self.notes: list[str] = []
-        """What was not copied, in sentences."""
         create_folder(self.folder)
-        self._file = McapWriter(self.folder / self._file_name, LIBRARY, chunk_size)
+        self._file = McapWriter(self.folder / f'{self.folder.name}_0.mcap', LIBRARY, chunk_size)
         self.write = self._file.add_message
         """Adds one message: channel, bytes, log time, publish time (ns), sequence."""
 
@@ -111,8 +96,7 @@ class BagCopy:
             self._schemas[definition] = self._file.add_schema(*definition)
         wanted = (topic.name, topic.encoding, self._schemas[definition])
         if wanted not in self._channels:
-            group = topic_group(topic.name, topic.type)
-            self._channels[wanted] = self._file.add_channel(*wanted, topic.details, group)
+            self._channels[wanted] = self._file.add_channel(*wanted, topic.details)
             self._topics[self._channels[wanted]] = topic
         return self._channels[wanted]
 
@@ -120,43 +104,33 @@ class BagCopy:
         """Add messages by their log times."""
         channels = [self.channel_of(part.topic) for part in parts]
         heads = [part.heads[['log_time', 'publish_time', 'sequence']].tolist() for part in parts]
-        numbers = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-        places = np.concatenate([np.arange(0), *(np.arange(len(part)) for part in parts)])
-        times = np.concatenate([np.zeros(0, np.int64), *(part.heads['log_time'] for part in parts)])
-        order = np.argsort(times, kind='stable')
-        for number, place in zip(numbers[order].tolist(), places[order].tolist(), strict=True):
+        streams = [
+            [(head[0], number, place) for place, head in enumerate(rows)] for number, rows in enumerate(heads)
+        ]
+        for _, number, place in heapq.merge(*streams):
             self.write(channels[number], parts[number].payloads[place], *heads[number][place])
 
     def complete(
         self,
-        recordings: Sequence[Recording],
-        read: Sequence[Mapping[str, int]] | None,
-        custom_data: Mapping[str, str],
+        recording: Recording | None = None,
+        custom_data: Mapping[str, str] | None = None,
+        read: Mapping[str, int] | None = None,
     ) -> None:
-        """Add the metadata of `recordings`, each once, and their losses; write the end.
+        """Add the metadata of `recording` and its losses; write the end.
 
-        `read` are how many messages of each topic could be read of each recording; None: all that were added.
+        `read` are how many messages of each topic could be read of it; None: all that were added.
         """
         self._file.flush()
-        copied: list[tuple[str, dict[str, str]]] = []
-        for file in (file for recording in recordings for file in recording.files):
-            for record in file.records:
-                if record[0] not in ACCOUNTS and record not in copied:
-                    copied.append(record)
-                    self._file.add_metadata(*record)
-            if file.attachments:
-                self.notes.append(
-                    f'{file.attachments} attachments are not copied: '
-                    f'mcap get attachment {file.path.name} has them'
-                )
         counts = {topic.name: 0 for topic in self._topics.values()}
         for number, topic in self._topics.items():
-            counts[topic.name] += self._file.message_counts.get(number, 0)
-        sources: Sources = {}
-        for recording, own in zip(recordings, read or [counts] * len(recordings), strict=True):
-            sources |= _sources_of(recording, own)
-        if sources:
-            self._file.add_metadata(RECORDER_RECORD, _inherited_statement(sources, counts))
+            counts[topic.name] += self._file.message_counts[number]
+        for file in recording.files if recording else ():
+            for name, values in file.records:
+                if name not in ACCOUNTS:
+                    self._file.add_metadata(name, values)
+            if statement := read_statement(file.metadata.get(RECORDER_RECORD, {})):
+                losses = _losses(statement, counts if read is None else read)
+                self._file.add_metadata(RECORDER_RECORD, loss_statement(losses, counts, excerpt=True))
         topics = {
             topic.name: TopicEntry(
                 name=topic.name,
@@ -168,49 +142,19 @@ class BagCopy:
             )
             for topic in self._topics.values()
         }
-        distros = [recording.information.ros_distro for recording in recordings if recording.information]
-        description = bag_description(
-            topics.values(),
-            [file_entry(self._file_name, self._file)],
-            custom_data,
-            next(filter(None, distros), 'jazzy'),
-        )
+        distro = recording.information.ros_distro if recording and recording.information else ''
+        description = bag_description(topics.values(), [self._file], distro or 'jazzy', custom_data)
         self._file.finish(embedded_record(description))
         (self.folder / METADATA_NAME).write_text(metadata_text(description), encoding='utf-8')
 
 
-# Losses that recorders stated.
-
-
-def _sources_of(recording: Recording, read: Mapping[str, int]) -> Sources:
-    """Return the sources of a recording of which `read` messages of each topic could be read."""
-    records = [file.metadata[RECORDER_RECORD] for file in recording.files if RECORDER_RECORD in file.metadata]
-    record = records[-1] if records else {}
-    inherited: Sources = {}
-    with contextlib.suppress(KeyError, TypeError, ValueError, AttributeError, OverflowError):
-        inherited = {
-            str(identity): {str(name): list(map(int, counts)) for name, counts in topics.items()}
-            for identity, topics in plain_yaml(record[_SOURCES]).items()
-        }
-    own = {}
-    for name, row in read_statement(record).items():
-        unread = max(0, row.get('kept', 0) - read.get(name, 0))
-        if not inherited:
-            own[name] = [row.get('received', 0), row.get('lost', 0) + unread, row.get('missing', 0)]
-        elif unread:
-            own[name] = [0, unread, 0]
-    identity = hashlib.sha256(f'{record.get("topics")} {recording.time_range}'.encode()).hexdigest()[:16]
-    return {**inherited, identity: own} if own else inherited
-
-
-def _inherited_statement(sources: Sources, kept: Mapping[str, int]) -> dict[str, str]:
-    """Return the recorder's record of a recording made of `sources` that holds `kept` messages by topic."""
-    total: dict[str, Reception] = {}
-    for topics in sources.values():
-        for name, (received, overflowed, missing) in topics.items():
-            entry = total.setdefault(name, Reception())
-            entry.received += received
-            entry.overflowed += overflowed
-            entry.missing += missing
-    statement = loss_statement(total, {name: kept.get(name, 0) for name in total}, excerpt=True)
-    return {**statement, _SOURCES: yaml.safe_dump(sources, sort_keys=False)}
+def _losses(statement: Mapping[str, Mapping[str, int]], read: Mapping[str, int]) -> dict[str, Reception]:
+    """Return what a recorder stated, and as lost what it kept and is not among the messages `read`."""
+    return {
+        name: Reception(
+            row.get('received', 0),
+            row.get('lost', 0) + max(0, row.get('kept', 0) - read.get(name, 0)),
+            row.get('missing', 0),
+        )
+        for name, row in statement.items()
+    }

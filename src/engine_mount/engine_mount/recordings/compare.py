@@ -1,6 +1,5 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
-from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +8,6 @@ from engine_mount.recordings.difference import SHOWN, SignalDifference, Toleranc
 from engine_mount.recordings.events import (
     SwitchingChange,
     paired_switchings,
-    recorded_marks,
     switching_times,
 )
 from engine_mount.recordings.matching import (
@@ -21,15 +19,21 @@ from engine_mount.recordings.matching import (
     align,
     alignment_sentence,
     mount_of,
-    paired_topics,
     registered_in,
 )
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sessions, session_differences
 from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION, Topic
 
-# Sessions and marks have words of their own; diagnostics hold clock time and load, which are never equal.
+# Sessions have words of their own; diagnostics hold clock time and load, which are never equal.
 _NOT_BY_SAMPLES = (SESSION, EVENT, DIAGNOSTICS)
+_LACKING = {
+    'samples missing in B': 'only_a',
+    'samples missing in A': 'only_b',
+    'samples of A before or behind those of B': 'outside_a',
+    'samples of B before or behind those of A': 'outside_b',
+    'messages that differ': 'differing_messages',
+}
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,6 @@ class Comparison:
     only_a: tuple[str, ...]  # topics
     only_b: tuple[str, ...]
     sessions: tuple[str, ...]  # differences in words
-    marks_a: tuple[str, ...]  # events that the other has not
-    marks_b: tuple[str, ...]
     switching: tuple[SwitchingChange, ...] | None  # None: not told by both
     switching_tolerance: float
     common_only: bool
@@ -73,16 +75,9 @@ class Comparison:
     @property
     def incomplete(self) -> dict[str, list[tuple[str, int]]]:
         """Topics of which one recording lacks samples, or whose messages differ: [(topic, count)] by what."""
-        fields = {
-            'samples missing in B': 'only_a',
-            'samples missing in A': 'only_b',
-            'samples of A before or behind those of B': 'outside_a',
-            'samples of B before or behind those of A': 'outside_b',
-            'messages that differ': 'differing_messages',
-        }
         counts = {
             what: [(topic.name, count) for topic in self.topics if (count := getattr(topic, field))]
-            for what, field in fields.items()
+            for what, field in _LACKING.items()
             if not (self.common_only and field.startswith('outside'))
         }
         return {what: found for what, found in counts.items() if found}
@@ -97,8 +92,6 @@ class Comparison:
         alone = {
             'topics only in A': self.only_a,
             'topics only in B': self.only_b,
-            'marks only in A': self.marks_a,
-            'marks only in B': self.marks_b,
         }
         return [
             *self.difference_sentences(),
@@ -134,8 +127,6 @@ class Comparison:
             'session': list(self.sessions),
             'only_in_a': list(self.only_a),
             'only_in_b': list(self.only_b),
-            'marks_only_in_a': list(self.marks_a),
-            'marks_only_in_b': list(self.marks_b),
             'switching': None if self.switching is None else [change.figures() for change in self.switching],
             'topics': {topic.name: topic.figures() for topic in self.topics},
         }
@@ -165,52 +156,38 @@ def compare(
     """Compare `b` with `a`; raises `ComparisonError` if no sample belongs to both, `ToleranceError`.
 
     `common_only` leaves samples before and behind the common time of a topic out of account; `topics` are
-    the only ones to compare.
+    the only ones to compare. What belongs to no mount is aligned as the first one.
     """
     tolerances = tolerances or Tolerances()
-    alignments, pairs = align(a, b), paired_topics(a, b)
-    matched = matched_topics(a, b, alignments, topics)
-    tolerances.check({(topic.mount, topic.topic, signal) for topic in matched for signal in topic.signals})
+    alignments = align(a, b)
+    first = next(iter(alignments.values()))
+    wanted, other = _wanted_topics(a, topics), _wanted_topics(b, topics)
+    matched = [
+        MatchedTopic(a[name], b[name], alignments.get(mount_of(name, registered_in(a, name)), first))
+        for name in wanted
+        if name in other and registered_in(a, name) not in _NOT_BY_SAMPLES
+    ]
+    tolerances.check({(topic.topic, signal) for topic in matched for signal in topic.signals})
     if not any(topic.samples for topic in matched):
         raise ComparisonError(f'no sample is in both {a.path} and {b.path}; {alignment_sentence(alignments)}')
     switched = [topic for topic in matched if topic.tells_switching]
-    changes = sorted(
-        (change for topic in switched for change in _switching(topic)), key=lambda change: change.time
-    )
-    marks_a, marks_b = _marks(a, {}), _marks(b, {other: name for name, other in pairs.items()})
+    changes = [change for topic in switched for change in _switching(topic)]
     return Comparison(
         name_a=a.short_name,
         name_b=b.short_name,
         alignments=alignments,
         topics=tuple(topic.compared(tolerances) for topic in matched),
-        only_a=_unpaired_topics(a, pairs, topics),
-        only_b=_unpaired_topics(b, pairs.values(), topics),
-        sessions=tuple(_sessions(a, b, pairs)),
-        marks_a=tuple((marks_a - marks_b).elements()),
-        marks_b=tuple((marks_b - marks_a).elements()),
-        switching=tuple(changes) if switched else None,
+        only_a=tuple(name for name in wanted if name not in other and a.topics[name].message_count),
+        only_b=tuple(name for name in other if name not in wanted and b.topics[name].message_count),
+        sessions=tuple(_sessions(a, b)),
+        switching=tuple(sorted(changes, key=lambda change: change.time)) if switched else None,
         switching_tolerance=tolerances.switching,
         common_only=common_only,
     )
 
 
-def matched_topics(
-    a: Recording,
-    b: Recording,
-    alignments: Mapping[str, Alignment],
-    topics: Collection[Topic] | None = None,
-) -> list[MatchedTopic]:
-    """Return the topics of both that are compared sample by sample; all, or those in `topics`.
-
-    What belongs to no mount is aligned as the first one.
-    """
-    first = next(iter(alignments.values()))
-    return [
-        MatchedTopic(a[name], b[other], alignments.get(mount_of(name, registered), first))
-        for name, other in paired_topics(a, b).items()
-        if (registered := registered_in(a, name)) not in _NOT_BY_SAMPLES
-        and (topics is None or registered in topics)
-    ]
+def _wanted_topics(recording: Recording, topics: Collection[Topic] | None) -> list[str]:
+    return [name for name in recording if topics is None or registered_in(recording, name) in topics]
 
 
 def _switching(topic: MatchedTopic) -> list[SwitchingChange]:
@@ -219,34 +196,12 @@ def _switching(topic: MatchedTopic) -> list[SwitchingChange]:
     return paired_switchings(times[0], times[1], topic.period, topic.mount)
 
 
-def _unpaired_topics(
-    recording: Recording, paired: Collection[str], topics: Collection[Topic] | None
-) -> tuple[str, ...]:
-    return tuple(
-        name
-        for name, topic in recording.topics.items()
-        if name not in paired
-        and topic.message_count
-        and (topics is None or registered_in(recording, name) in topics)
-    )
-
-
-def _sessions(a: Recording, b: Recording, pairs: Mapping[str, str]) -> list[str]:
+def _sessions(a: Recording, b: Recording) -> list[str]:
     """Return how the sessions differ, mount by mount."""
-    texts_a, texts_b = recorded_sessions(a), recorded_sessions(b)
+    others = recorded_sessions(b)
     return [
         mount_of(name, SESSION).replace('/', ': ') + difference
-        for name, other in pairs.items()
-        if texts_a.get(name) and texts_b.get(other)
-        for difference in session_differences(texts_a[name], texts_b[other])
+        for name, text in recorded_sessions(a).items()
+        if text and others.get(name)
+        for difference in session_differences(text, others[name])
     ]
-
-
-def _marks(recording: Recording, renamed: Mapping[str, str]) -> Counter[str]:
-    """Return the marks as text, each with its mount, of a topic in `renamed` with that of the other name."""
-    return Counter(
-        mount_of(renamed.get(name, name), EVENT).replace('/', ': ')
-        + ' '.join(filter(None, (mark.kind, mark.text)))
-        for name, marks in recorded_marks(recording).items()
-        for _, mark in marks
-    )

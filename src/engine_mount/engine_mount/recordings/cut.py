@@ -10,8 +10,8 @@ import numpy as np
 from engine_mount.recordings.bag_copy import BagCopy, read_messages
 from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, with_step
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.registry import registered_topic
 from mount_recorder.session import time_text
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import EVENT, Delivery
 
 
@@ -43,7 +43,7 @@ def cut(
 
     Times are in s on the time axis of `recording`, which the piece keeps; None is its beginning, or its end
     with the last message. Messages keep their bytes, log and publish times. Of latched topics and of `event`
-    the last message before `begin` comes with it, and so do attachments and metadata. What the recorder lost
+    the last message before `begin` comes with it, and so does metadata. What the recorder lost
     is told of the piece too: when that was is not known. `reason` and `made`, the time of the cut
     (by default now), go into the note of origin. Raises `CutError`.
     """
@@ -80,8 +80,8 @@ def cut(
     losses = [warning for warning in recording.warnings if warning not in known]
     with BagCopy(out) as bag:
         bag.add(parts)
-        bag.complete([recording], [read], with_step([recording.information], step))
-    return Cut(Path(out), begin, end, count, carried, (*losses, *bag.notes))
+        bag.complete(recording, with_step(recording.information, step), read)
+    return Cut(Path(out), begin, end, count, carried, tuple(losses))
 
 
 def _span(recording: Recording, begin: float | None, end: float | None) -> tuple[int, int]:
@@ -89,17 +89,15 @@ def _span(recording: Recording, begin: float | None, end: float | None) -> tuple
     axis, logged = recording.time_axis, recording.time_range
     if logged is None:
         raise CutError(f'{recording.path} has no message; there is nothing to cut')
-    for name, value in (('begin', begin), ('end', end)):
-        if value is not None and not math.isfinite(value):
-            raise CutError(f'the {name} of a cut must be a number of seconds; instead received {value}')
+    if not all(value is None or math.isfinite(value) for value in (begin, end)):
+        raise CutError(f'the ends of a cut must be numbers of seconds; instead received {begin}, {end}')
     first = logged[0] if begin is None else max(logged[0], axis.log_time(begin))
     behind = logged[1] + 1 if end is None else min(axis.log_time(end), logged[1] + 1)
-    if first > logged[1]:
-        ends = axis.of_log(logged[1])
-        raise CutError(f'the cut begins at {begin:g} s, but {recording.path} ends at {ends:.3f} s')
-    if behind <= first:
-        begins = axis.of_log(first) if begin is None else begin
-        raise CutError(f'the end of a cut ({end:g} s) must lie behind its begin ({begins:g} s)')
+    if behind <= first or first > logged[1]:
+        raise CutError(
+            f'the cut would end at {axis.of_log(behind):.3f} s and begin at {axis.of_log(first):.3f} s; '
+            f'{recording.path} ends at {axis.of_log(logged[1]):.3f} s'
+        )
     return first, behind
 
 
@@ -108,7 +106,7 @@ def _carried(topic: TopicInformation) -> slice:
     registered = registered_topic(topic.name, topic.type)
     if registered is not None and (registered is EVENT or registered.delivery is Delivery.LATCHED):
         return slice(-1, None)
-    if any(offer.durability == 'transient_local' for offer in topic.offered_qos):
+    if any(offer['durability'] == 'transient_local' for offer in topic.offered_qos):
         # Foreign ones may have several publishers that each say their part, as /tf_static does.
         return slice(None)
     return slice(0)

@@ -17,7 +17,7 @@ Places = NDArray[np.int64]
 
 SWITCHING = 'switching'
 _ALL = ''
-_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>[0-9.]+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
+_FORM = re.compile(r'(?:(?P<name>[^=\s]+)=)?(?P<value>\d*\.?\d+(?:[eE][-+]?\d+)?)(?P<percent>%?)')
 SHOWN = 6  # signals, switchings, session entries named one by one
 _ROWS = 10  # of the table
 _RANKS = {
@@ -52,33 +52,27 @@ class Tolerances:
     def __init__(self, texts: Iterable[str] = ()):
         """Read `NAME=0.01`, `NAME=1%` or, for all signals, `1%`; raises `ToleranceError`.
 
-        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), the same
-        of one mount (`mount_left/control_trace.current`), or `switching` for the times of switching in s.
+        NAME is a signal (`current`), a topic (`current_setpoint`), both (`control_trace.current`), or
+        `switching` for the times of switching in s.
         """
         self._by_name = dict(map(_read, texts))
 
-    def of(self, mount: str, topic: str, signal: str) -> Tolerance:
-        """Return the tolerance of a signal; the name that says most counts.
-
-        `mount` is what stands before the topic: `mount_left/`, or nothing.
-        """
-        for name in (f'{mount}{topic}.{signal}', f'{topic}.{signal}', signal, mount + topic, topic, _ALL):
-            if name in self._by_name:
-                return self._by_name[name]
-        return EXACT
+    def of(self, topic: str, signal: str) -> Tolerance:
+        """Return the tolerance of a signal; the name that says most counts."""
+        names = (f'{topic}.{signal}', signal, topic, _ALL)
+        return next((self._by_name[name] for name in names if name in self._by_name), EXACT)
 
     @property
     def switching(self) -> float:
         """By how much a switching may move, s."""
         return self._by_name.get(SWITCHING, EXACT).value
 
-    def check(self, known: Collection[tuple[str, str, str]]) -> None:
-        """Raise `ToleranceError` for a name that is none of `known` (mount, topic, signal)."""
+    def check(self, known: Collection[tuple[str, str]]) -> None:
+        """Raise `ToleranceError` for a name that is none of `known` (topic, signal)."""
         names = {SWITCHING, _ALL}
-        for mount, topic, signal in known:
-            names |= {signal, topic, mount + topic, f'{topic}.{signal}', f'{mount}{topic}.{signal}'}
-        unknown = next((name for name in self._by_name if name not in names), None)
-        if unknown is not None:
+        for topic, signal in known:
+            names |= {signal, topic, f'{topic}.{signal}'}
+        for unknown in self._by_name.keys() - names:
             raise ToleranceError(
                 f'tolerance for {unknown!r}: no such signal in both recordings; --json lists all signals'
             )
@@ -86,12 +80,9 @@ class Tolerances:
 
 def _read(text: str) -> tuple[str, Tolerance]:
     match = _FORM.fullmatch(text.strip())
-    try:
-        value = float(match['value']) if match else 0.0
-    except ValueError:
-        match = None
     if match is None:
         raise ToleranceError(f'tolerance {text!r}: write NAME=VALUE as current=0.01, or NAME=1%, or 1%')
+    value = float(match['value'])
     name, relative = match['name'] or _ALL, bool(match['percent'])
     if name == _ALL and not relative:
         raise ToleranceError(

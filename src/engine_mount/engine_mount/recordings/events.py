@@ -1,7 +1,5 @@
 """What happened in a recording: marks, the switching of damping, and what the nodes said of themselves."""
 
-import re
-import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +8,10 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.difference import quantity_text, time_text
 from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.times import TimeAxis
 from mount_recorder.automatic_marks import PAUSE
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.messages.event import Mark, read_mark
 from mount_ros.messages.verdicts import NodeVerdict, verdicts_in
 from mount_ros.topics import CONTROL_TRACE, DIAGNOSTICS, EVENT
@@ -24,10 +22,8 @@ Places = NDArray[np.intp]
 SWITCH_ON, SWITCH_OFF = 'switch_on', 'switch_off'
 CONTROL = 'mount_control'  # the node
 _ACTIVE = 'damping_active'
-_NUMBERED = re.compile(r'(.+?):(\d+)')
 _LISTED = 12  # events in a refusal
 _REACH = 0.5  # s, chosen: switchings further apart are not the same one moved
-_AT_ONCE = 256  # messages of diagnostics in memory, chosen
 _ERROR = 2  # diagnostic_msgs/DiagnosticStatus.ERROR
 
 
@@ -77,21 +73,16 @@ def read_marks(events: Series) -> list[Mark]:
 
 
 def find_event(recording: Recording, wanted: str) -> RecordedEvent:
-    """Return the event meant by `wanted`: its number from 1, its kind (the first one), or `kind:number`.
+    """Return the event meant by `wanted`: its number from 1, or its kind (the first one).
 
     In a kind `-` is as good as `_`. Raises `EventError` with the events that there are.
     """
     events = recorded_events(recording)
-    if wanted.isdigit():
-        fitting, number = events, int(wanted)
-    else:
-        match = _NUMBERED.fullmatch(wanted)
-        kind, number = (match[1], int(match[2])) if match else (wanted, 1)
-        kind = kind.replace('-', '_')
-        fitting = [event for event in events if event.kind.replace('-', '_') == kind]
-    if not 1 <= number <= len(fitting):
-        raise EventError(f'{recording.path} has no event {wanted!r}; {_listed(recording, events)}')
-    return fitting[number - 1]
+    names = [(str(number), event.kind.replace('_', '-')) for number, event in enumerate(events, 1)]
+    for event, known in zip(events, names, strict=True):
+        if wanted.replace('_', '-') in known:
+            return event
+    raise EventError(f'{recording.path} has no event {wanted!r}; {_listed(recording, events)}')
 
 
 def event_time(event: RecordedEvent, axis: TimeAxis) -> float:
@@ -253,7 +244,7 @@ def node_reports(recording: Recording) -> list[NodeReport]:
             return []
         reports = [
             _report(time, verdict)
-            for series in recording.parts([DIAGNOSTICS.name], _AT_ONCE)
+            for series in recording.parts([DIAGNOSTICS.name])
             for time, message in zip(series.receive_times.tolist(), series.messages(), strict=True)
             for verdict in verdicts_in(message)
         ]
@@ -264,6 +255,5 @@ def node_reports(recording: Recording) -> list[NodeReport]:
 
 def _report(log_time: int, verdict: NodeVerdict) -> NodeReport:
     namespace, _, node = verdict.node.rpartition('/')
-    texts = (namespace.strip('/'), node, verdict.sentence, verdict.figures.get('state', ''))
-    namespace, node, sentence, state = map(sys.intern, texts)  # very many are alike
-    return NodeReport(log_time, namespace, node, verdict.level, sentence, state)
+    state = verdict.figures.get('state', '')
+    return NodeReport(log_time, namespace.strip('/'), node, verdict.level, verdict.sentence, state)

@@ -76,10 +76,15 @@ class Numbers:
     dtype: np.dtype
     count: int
 
+    def bytes_at(self, place: int) -> range:
+        """Return which bytes of a message are number `place` of the run."""
+        begin = self.offset + place * self.dtype.itemsize
+        return range(begin, begin + self.dtype.itemsize)
+
     def column(self, messages: np.ndarray, place: int = 0) -> np.ndarray:
         """Return number `place` of the run from each row of `messages` (rows x bytes)."""
-        begin = self.offset + place * self.dtype.itemsize
-        return np.ascontiguousarray(messages[:, begin : begin + self.dtype.itemsize]).view(self.dtype)[:, 0]
+        own = self.bytes_at(place)
+        return np.ascontiguousarray(messages[:, own.start : own.stop]).view(self.dtype)[:, 0]
 
 
 @dataclass

@@ -200,14 +200,13 @@ def _sum(counts: Iterable[int | None]) -> int | None:
 
 _FIGURES = (
     *('expected', 'present', 'lost', 'duplicated', 'longest_gap_s', 'out_of_order', 'misdated'),
-    *('rate_hz', 'jitter_s', 'worst_jitter_s', 'remark'),
+    *('rate_hz', 'remark'),
 )
 _COLUMNS = (
     ('expected', 'expected', 1),
     ('present', 'present', 1),
     ('lost', 'lost', 1),
     ('gap ms', 'longest_gap_s', 1e3),
-    ('jitter µs', 'jitter_s', 1e6),
 )
 _TROUBLES = (('twice', 'duplicated', 1), ('late', 'out_of_order', 1), ('misdated', 'misdated', 1))
 

@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.difference import Column, Places, SignalDifference, Tolerances, signal_difference
 from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import STAMP, Series, SeriesError
-from engine_mount.recordings.session import recorded_sample_rate
 from engine_mount.recordings.times import TimeAxis, Times, distinct, is_in
-from mount_recorder.topic_groups import registered_topic
-from mount_ros.messages.force_table import ForceTable, from_message
-from mount_ros.messages.scalars import MessageError
 from mount_ros.topics import (
     CONTROL_TRACE,
     CURRENT_FORCE_TABLE,
@@ -28,7 +25,6 @@ from mount_ros.topics import (
 SWITCH = 'damping_active'
 _ANCHORS = (DISPLACEMENT, CURRENT_SETPOINT, CONTROL_TRACE)
 _SAME_CLOCK = 0.5  # chosen: this share of the stamps in the common span must be equal
-_TABLE = {'current': 'A', 'normal_force': 'N'}
 
 
 class ComparisonError(ValueError):
@@ -40,14 +36,13 @@ class Alignment:
     """How samples of A and B of one mount become one time axis.
 
     With `same_stamps` samples of equal stamp belong together, else samples of equal number, counted from the
-    first sample of the topic `anchor`. `firsts` are its first stamps in A and B (ns), `sample_rates` theirs
-    (Hz). Times are in s on the time axis of A.
+    first sample of the topic `anchor`. `firsts` are its first stamps in A and B (ns). Times are in s on the
+    time axis of A.
     """
 
     same_stamps: bool
     anchor: str
     firsts: tuple[int, int]
-    sample_rates: tuple[float, float]
     axis: TimeAxis
 
     @property
@@ -76,52 +71,28 @@ def registered_in(recording: Recording, name: str) -> Topic | None:
     return registered_topic(name, recording.topics[name].type)
 
 
-def paired_topics(a: Recording, b: Recording) -> dict[str, str]:
-    """Return {topic of A: topic of B}: of one name, and those of the only mount that is in A and B alone.
-
-    A mount is where there is a control loop; only where there is none, any other topic makes one.
-    """
-    pairs = {name: name for name in a if name in b.topics}
-    alone = []
-    for recording in (a, b):
-        mounts: dict[str, dict[str, str]] = {}
-        for name in recording:
-            registered = registered_in(recording, name)
-            if name not in pairs and registered is not None:
-                mounts.setdefault(mount_of(name, registered), {})[registered.name] = name
-        anchors = {topic.name for topic in _ANCHORS}
-        alone.append({mount: own for mount, own in mounts.items() if anchors & own.keys()} or mounts)
-    if all(len(mounts) == 1 for mounts in alone):
-        (of_a,), (of_b,) = (mounts.values() for mounts in alone)
-        pairs |= {name: of_b[topic] for topic, name in of_a.items() if topic in of_b}
-    return pairs
-
-
 def align(a: Recording, b: Recording) -> dict[str, Alignment]:
     """Return how to match the samples of `a` and `b`, by mount: each has a clock of its own.
 
     The anchor of a mount is the first of its topics with stamps in both; where there is no mount, a foreign
     topic. Raises `ComparisonError`.
     """
-    pairs = paired_topics(a, b)
-    if not pairs:
+    names = [name for name in a if name in b.topics]
+    if not names:
         raise ComparisonError(
             f'no topic is in both recordings: A has {", ".join(a) or "none"}; B has {", ".join(b) or "none"}'
         )
-    registered = {name: registered_in(a, name) for name in pairs}
 
     def rank(name: str) -> tuple[bool, int]:
-        topic = registered[name]
+        topic = registered_in(a, name)
         foreign = topic is None or topic.name.startswith('/')
         return foreign, _ANCHORS.index(topic) if topic in _ANCHORS else len(_ANCHORS)
 
     found: dict[str, Alignment] = {}
-    for name in sorted(pairs, key=rank):
-        mount = mount_of(name, registered[name])
-        if mount not in found and not (found and rank(name)[0]):
-            first, second = a[name], b[pairs[name]]
-            if _is_stamped(first) and _is_stamped(second):
-                found[mount] = _alignment(a, b, first, second)
+    for name in sorted(names, key=rank):
+        mount = mount_of(name, registered_in(a, name))
+        if mount not in found and not (found and rank(name)[0]) and is_stamped(a[name], b[name]):
+            found[mount] = _alignment(a[name], b[name], a.time_axis)
     if not found:
         raise ComparisonError('no topic with stamps has messages in both recordings; nothing can be matched')
     return found
@@ -137,38 +108,25 @@ def share_stamps(a: Recording, b: Recording) -> bool:
     return next(iter(align(a, b).values())).same_stamps
 
 
-def _is_stamped(series: Series) -> bool:
+def is_stamped(*all_series: Series) -> bool:
+    """Return whether each of the series has stamps."""
     try:
-        return len(series.stamps) > 0
+        return all(len(series.stamps) for series in all_series)
     except SeriesError:
         return False
 
 
-def _alignment(a: Recording, b: Recording, first: Series, second: Series) -> Alignment:
-    stamps = distinct(first.stamps), distinct(second.stamps)
+def _alignment(a: Series, b: Series, axis: TimeAxis) -> Alignment:
+    stamps = distinct(a.stamps), distinct(b.stamps)
     low, high = max(each[0] for each in stamps), min(each[-1] for each in stamps)
     inside = [each[(each >= low) & (each <= high)] for each in stamps]
     fewer = min(map(len, inside))
-    rates = (
-        recorded_sample_rate(recording, f'/{mount_of(series.topic, series.registered)}')
-        for recording, series in ((a, first), (b, second))
-    )
     return Alignment(
         same_stamps=bool(fewer and np.count_nonzero(is_in(*inside)) >= _SAME_CLOCK * fewer),
-        anchor=first.topic.lstrip('/'),
+        anchor=a.topic.lstrip('/'),
         firsts=(int(stamps[0][0]), int(stamps[1][0])),
-        sample_rates=(next(rates), next(rates)),
-        axis=a.time_axis,
+        axis=axis,
     )
-
-
-@dataclass(frozen=True)
-class _Samples:
-    """Samples of one topic in the order of their keys; equal keys belong together."""
-
-    keys: Times  # ns, or numbers of periods
-    order: Places  # where each stands in its series
-    period: float  # s
 
 
 @dataclass(frozen=True)
@@ -220,29 +178,29 @@ class MatchedTopic:
         self.topic = a.registered.name if a.registered else a.topic.lstrip('/')
         self.mount = mount_of(a.topic, a.registered)
         rated = a.registered is None or a.registered.rate > 0.0
-        streamed = rated and _is_stamped(a) and _is_stamped(b)
-        samples_of = _stamped_samples if streamed else _counted_samples
-        self._of_a, self._of_b = samples_of(a, alignment, 0), samples_of(b, alignment, 1)
-        keys = self._of_a.keys, self._of_b.keys
-        if any((each[1:] == each[:-1]).any() for each in keys):
-            keys = _numbered(keys[0]), _numbered(keys[1])
-        _, self._common, common_b = np.intersect1d(*keys, assume_unique=True, return_indices=True)
-        self._places_a, self._places_b = self._of_a.order[self._common], self._of_b.order[common_b]
+        samples_of = _stamped_samples if rated and is_stamped(a, b) else _counted_samples
+        keys_a, order_a, self.period = samples_of(a, alignment, 0)
+        keys_b, order_b, _ = samples_of(b, alignment, 1)
+        self._keys = keys_a, keys_b
+        _, common_a, common_b = np.intersect1d(
+            _numbered(keys_a), _numbered(keys_b), assume_unique=True, return_indices=True
+        )
+        self._places = order_a[common_a], order_b[common_b]
         self._axis = alignment.axis
-        self.samples, self.period = len(self._common), self._of_a.period
+        self.samples = len(common_a)
 
     @cached_property
     def time(self) -> NDArray[np.float64]:
         """Times of the matched samples in A, s."""
-        if _is_stamped(self.a):
-            return self._axis.of_stamps(self.a.stamps[self._places_a])
-        return self._axis.of_logs(self.a.receive_times[self._places_a])
+        if is_stamped(self.a):
+            return self._axis.of_stamps(self.a.stamps[self._places[0]])
+        return self._axis.of_logs(self.a.receive_times[self._places[0]])
 
     @cached_property
     def signals(self) -> dict[str, str]:
         """The signals of both as {name: unit}; a derivative is called `d(name)/dt`."""
         if self.a.registered is CURRENT_FORCE_TABLE:
-            return dict(_TABLE) if self._tables else {}
+            return {}
         signals: dict[str, str] = {}
         for name in self._names[0]:
             if name in self._names[1] and not name.startswith('header.'):
@@ -254,15 +212,10 @@ class MatchedTopic:
     def column(self, signal: str) -> Column:
         """Return the matched samples of one of the `signals`; raises `SeriesError`."""
         origin = self.mount, self.topic, signal, self.signals[signal]
-        if self._tables:
-            a, b = (getattr(table, signal) for table in self._tables)
-            return Column(*origin, np.full(len(a), self.time[-1]), a, b)
-        if signal.startswith('d(') and signal not in self.a.names:
-            name = signal.removeprefix('d(').removesuffix(')/dt')
-            a, b = self.a.derivative(name), self.b.derivative(name)
-        else:
-            a, b = self.a[signal], self.b[signal]
-        return Column(*origin, self.time, a[self._places_a], b[self._places_b])
+        derived = signal.startswith('d(') and signal not in self.a.names
+        name = signal.removeprefix('d(').removesuffix(')/dt') if derived else signal
+        a, b = (each.derivative(name) if derived else each[name] for each in (self.a, self.b))
+        return Column(*origin, self.time, a[self._places[0]], b[self._places[1]])
 
     @cached_property
     def tells_switching(self) -> bool:
@@ -275,15 +228,14 @@ class MatchedTopic:
         """Return how the topic differs; damping that is only on or off shows in the switching."""
         hidden = SWITCH if self.tells_switching and np.isin(self._switch, (0.0, 1.0)).all() else ''
         signals = [
-            signal_difference(self.column(name), tolerances.of(self.mount, self.topic, name))
+            signal_difference(self.column(name), tolerances.of(self.topic, name))
             for name in self.signals
             if name != hidden
         ]
-        keys = self._of_a.keys, self._of_b.keys
         within = [0, 0]
-        if all(map(len, keys)):
-            low, high = max(each[0] for each in keys), min(each[-1] for each in keys)
-            within = [int(np.count_nonzero((each >= low) & (each <= high))) for each in keys]
+        if all(map(len, self._keys)):
+            low, high = max(each[0] for each in self._keys), min(each[-1] for each in self._keys)
+            within = [int(np.count_nonzero((each >= low) & (each <= high))) for each in self._keys]
         return TopicComparison(
             mount=self.mount,
             topic=self.topic,
@@ -291,8 +243,8 @@ class MatchedTopic:
             signals=tuple(signals),
             only_a=within[0] - self.samples,
             only_b=within[1] - self.samples,
-            outside_a=len(keys[0]) - within[0],
-            outside_b=len(keys[1]) - within[1],
+            outside_a=len(self._keys[0]) - within[0],
+            outside_b=len(self._keys[1]) - within[1],
             differing_messages=self._differing_messages(),
             remark=self._remark,
         )
@@ -318,25 +270,26 @@ class MatchedTopic:
         """
         if self.a.type != self.b.type:
             return self.samples  # the same bytes mean something else
-        if self._tables or self._remark:
-            return 0  # the labels of tables name the activation, which is another one
+        if self._remark:
+            return 0
         a, b = self.a.layout, self.b.layout
-        rows_a, rows_b = self.a.payloads.rows, self.b.payloads.rows
-        if a is None or b is None or rows_a is None or rows_b is None:
-            pairs = zip(self._places_a.tolist(), self._places_b.tolist(), strict=True)
+        if a is None or b is None or self.a.registered is CURRENT_FORCE_TABLE:
+            pairs = zip(*(places.tolist() for places in self._places), strict=True)
             return sum(_content(self.a, i) != _content(self.b, k) for i, k in pairs)
         if a.numbers != b.numbers or a.strings != b.strings:
             return self.samples
-        different = np.zeros(self.samples, bool)
-        for path, numbers in a.numbers.items():
-            for place in range(numbers.count):
-                if not self._is_shown(path, place):
-                    one = numbers.column(rows_a, place)[self._places_a]
-                    other = numbers.column(rows_b, place)[self._places_b]
-                    bits = f'u{numbers.dtype.itemsize}'
-                    both_unknown = (one != one) & (other != other)
-                    different |= (one.view(bits) != other.view(bits)) & ~both_unknown
-        return int(np.count_nonzero(different))
+        unseen = [
+            byte
+            for path, numbers in a.numbers.items()
+            for place in range(numbers.count)
+            if not self._is_shown(path, place)
+            for byte in numbers.bytes_at(place)
+        ]
+        one, other = (
+            series.payloads.messages[places[:, None], unseen]
+            for series, places in zip((self.a, self.b), self._places, strict=True)
+        )
+        return int(np.count_nonzero((one != other).any(axis=1)))
 
     def _is_shown(self, path: str, place: int) -> bool:
         """Return whether a number of a message is part of a stamp or of a signal."""
@@ -354,41 +307,28 @@ class MatchedTopic:
         column = self.column(SWITCH)
         return np.concatenate([column.a, column.b])
 
-    @cached_property
-    def _tables(self) -> tuple[ForceTable, ForceTable] | None:
-        """The last current-force tables of both, None where there are none of one shape."""
-        if self.a.registered is not CURRENT_FORCE_TABLE or not self.samples:
-            return None
-        try:
-            a, b = (from_message(series.message(len(series) - 1)) for series in (self.a, self.b))
-        except (MessageError, SeriesError):
-            return None
-        return (a, b) if a.current.shape == b.current.shape else None
 
+def _stamped_samples(series: Series, alignment: Alignment, side: int) -> tuple[Times, Places, float]:
+    """Return keys (ns, or numbers of periods) of a stamped topic, their places, and the period (s).
 
-def _stamped_samples(series: Series, alignment: Alignment, side: int) -> _Samples:
-    """Return the samples of a stamped topic of A (`side` 0) or B (1).
-
-    Steps are rounded one by one, so that a clock that runs fast or slow does not add up.
+    `side` is 0 for A, 1 for B. Steps are rounded one by one, so that a clock that runs fast or slow does not
+    add up.
     """
     order = np.argsort(series.stamps, kind='stable')
     stamps = series.stamps[order]
     steps = np.diff(stamps)
-    if series.registered is not None and series.registered.rate:
-        period = 1.0 / series.registered.rate_at(alignment.sample_rates[side])
-    else:
-        rising = steps[steps > 0]
-        period = float(np.median(rising)) / 1e9 if len(rising) else 1.0
+    rising = steps[steps > 0]
+    period = float(np.median(rising)) / 1e9 if len(rising) else 1.0
     if alignment.same_stamps:
-        return _Samples(stamps, order, period)
+        return stamps, order, period
     begin = stamps[:1] - alignment.firsts[side]
     numbers = np.cumsum(np.rint(np.concatenate([begin, steps]) / (1e9 * period)).astype(np.int64))
-    return _Samples(numbers, order, period)
+    return numbers, order, period
 
 
-def _counted_samples(series: Series, alignment: Alignment, side: int) -> _Samples:
+def _counted_samples(series: Series, alignment: Alignment, side: int) -> tuple[Times, Places, float]:
     numbers = np.arange(len(series))
-    return _Samples(numbers, numbers, 1.0)
+    return numbers, numbers, 1.0
 
 
 def _numbered(keys: Times) -> NDArray[np.void]:
@@ -399,8 +339,16 @@ def _numbered(keys: Times) -> NDArray[np.void]:
 
 
 def _content(series: Series, index: int) -> bytes:
-    """Return the bytes of a message without its stamp and without the options of its encoding."""
+    """Return the bytes of a message without its stamp and without the options of its encoding.
+
+    Of a force table those of its numbers: its labels name the activation, which is another one.
+    """
     raw, layout = series.payloads[index], series.layout_at(index)
+    if layout and series.registered is CURRENT_FORCE_TABLE:
+        runs = [
+            range(run.bytes_at(0).start, run.bytes_at(run.count).start) for run in layout.numbers.values()
+        ]
+        return b''.join(raw[run.start : run.stop] for run in runs)
     seconds = layout.numbers.get(STAMP[0]) if layout else None
     place = len(raw) if seconds is None else seconds.offset
     return raw[:2] + raw[4:place] + raw[place + 8 :]

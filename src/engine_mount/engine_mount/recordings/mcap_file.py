@@ -36,10 +36,9 @@ from engine_mount.recordings.mcap_records import (
     scattered_chunks,
     unpacked,
 )
-from mount_recorder.bag_writer import PIECE_RECORD
 from mount_recorder.losses import RECORDER_RECORD
 
-ACCOUNTS = ('rosbag2', RECORDER_RECORD, PIECE_RECORD)
+ACCOUNTS = ('rosbag2', RECORDER_RECORD)
 """Metadata in which a recording describes itself; a recording made of it has its own."""
 _AT_ONCE = 1 << 20  # bytes of chunks that are unpacked together, chosen: they stay in the processor's cache
 _BEGIN = len(MCAP0_MAGIC)
@@ -62,8 +61,6 @@ class McapFile:
         """Bytes, from and to, that are neither a chunk nor a record that is understood."""
         self._damaged: set[int] = set()  # positions of chunks
         self._undeclared = 0  # messages whose topic is not known
-        self.attachments = 0
-        """How many there are: their content is not read."""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._data_end = 0  # where the messages end, by the file's own account; 0: the end is missing
@@ -105,12 +102,6 @@ class McapFile:
         """Whether messages are known to be lost or may be wrong inside of it, not only at a cut-off end."""
         doubtful = self._unprotected and self.data_proof is False
         return bool(self._undeclared or self._damaged or doubtful)
-
-    @property
-    def lost_bytes(self) -> int:
-        """How many bytes of it are not readable."""
-        damaged = sum(chunk.end - chunk.position for chunk in self.chunks if chunk.position in self._damaged)
-        return damaged + sum(end - begin for begin, end in self.unexplained)
 
     @cached_property
     def data_proof(self) -> bool | None:
@@ -180,11 +171,7 @@ class McapFile:
 
     def _leave_out(self, chunk: Chunk) -> None:
         self._damaged.add(chunk.position)
-        limit = (
-            f'claims {chunk.size} bytes (limit {chunk.limit} for its bytes in the file); write smaller chunks'
-        )
-        why = limit if chunk.size > chunk.limit else 'is damaged'
-        self._warn(f'the chunk at byte {chunk.position} is left out: it {why}')
+        self._warn(f'the chunk at byte {chunk.position} is left out: it is damaged')
 
     def _use_summary(self, summary: Summary) -> None:
         assert summary.statistics is not None
@@ -272,7 +259,6 @@ class McapFile:
                     self._warn(f'the metadata at byte {position} is not readable')
                 else:
                     self.records.append((metadata.name, dict(metadata.metadata)))
-            self.attachments += opcode == Opcode.ATTACHMENT
             position = end
         return position
 

@@ -44,15 +44,11 @@ _TAIL = struct.Struct('<Q')  # packed size, behind the compression's name
 CRC_PLACE = 33
 """Byte of a chunk record at which the checksum of its unpacked messages stands."""
 _INDEX = struct.Struct('<BQHI')  # record, channel, length of the entries
-_NEVER = -1  # no checksum is that
-_LARGEST_CHUNK = 1 << 32  # bytes; more is a damaged length
+_LARGEST_CHUNK = 1 << 28  # bytes unpacked, chosen: sixty times the usual chunk; more is a damaged length
 # Length and name of the compression.
 _TAG_PLACE = _CHUNK.size - 4
 _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
 FOOTER_LENGTH = 20  # bytes behind opcode and length
-# A few kilobytes of packed bytes can stand for gigabytes.
-_ALWAYS_UNPACKED = 64 << 20  # bytes, chosen: sixteen times the usual chunk
-_RATIO = 1000  # chosen: unpacked over packed beyond that; measured data reach some 100
 
 
 class StorageError(ValueError):
@@ -90,17 +86,12 @@ class StoredMessages:
     def of(self, topics: Collection[int]) -> 'StoredMessages':
         """Return the messages of these topics alone."""
         number = self.heads['topic']
-        wanted = np.logical_or.reduce([number == topic for topic in topics])
+        wanted = np.isin(number, list(topics))
         return self if np.all(wanted) else self.at(np.flatnonzero(wanted))
 
     def at(self, places: NDArray[np.int64] | slice) -> 'StoredMessages':
         """Return the messages at these places."""
         return StoredMessages(self.heads[places], self.data, self.begins[places], self.ends[places])
-
-    def message(self, place: int) -> tuple[bytes, int]:
-        """Return bytes and publish time (ns) of one message."""
-        raw = self.data[int(self.begins[place]) : int(self.ends[place])].tobytes()
-        return raw, int(self.heads[place]['publish_time'])
 
     def payloads(self) -> NDArray[np.uint8] | list[bytes]:
         """Return the bytes as rows if all messages have one length, else one by one."""
@@ -134,11 +125,6 @@ class Chunk:
     def holds(self, channels: Collection[int]) -> bool:
         """Return whether there may be messages of one of `channels`."""
         return self.indexes is None or not self.indexes.keys().isdisjoint(channels)
-
-    @property
-    def limit(self) -> int:
-        """To how many bytes it may unpack: 64 MiB, or 1000 times its packed bytes."""
-        return max(_ALWAYS_UNPACKED, _RATIO * (self.end - self.begin))
 
 
 @dataclass
@@ -231,7 +217,7 @@ def _indexed_chunk(data: mmap.mmap, index: ChunkIndex) -> Chunk | None:
         begin,
         end,
         index.uncompressed_size,
-        crc if data[position] == Opcode.CHUNK else _NEVER,  # as in the hole of an outline
+        crc,
         index.compression,
         index.message_start_time,
         index.message_end_time,
@@ -271,8 +257,6 @@ def scattered_chunks(data: mmap.mmap) -> Iterator[Chunk]:
 def unpacked(data: mmap.mmap, chunk: Chunk) -> bytes | None:
     """Return the unpacked bytes of a chunk, None if they are damaged or more than its limit."""
     packed, size = data[chunk.begin : chunk.end], chunk.size
-    if size > chunk.limit:
-        return None
     try:
         if chunk.compression == 'zstd':
             if zstandard.frame_content_size(packed) > size:

@@ -2,18 +2,19 @@
 
 import functools
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, TypeVar
 
 import yaml
+from pydantic import BaseModel, NonNegativeInt, ValidationError
 from rosbags.interfaces import QosTime
 from rosbags.rosbag2.metadata import parse_qos
 
 from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_recorder.metadata import NANOSECONDS, ROOT, VERSION, OfferedQos
+from mount_recorder.metadata import ROOT, Offers
 
 T = TypeVar('T')
 
@@ -30,107 +31,94 @@ class TopicInformation:
     type: str
     message_count: int = 0
     serialization_format: str = 'cdr'
-    offered_qos: tuple[OfferedQos, ...] = ()
+    offered_qos: Offers = ()
     type_hash: str = ''
     units: Mapping[str, str] = field(default_factory=dict)
     """By field, where the channel tells them."""
     stored: StoredTopic | None = None
     """As the files declare it."""
-    stored_count: int = 0
-    """Messages in the files, repetitions included; `message_count` is without these."""
     places: dict[Any, list[int]] = field(default_factory=dict)
     """The files that hold it, and its numbers in each."""
     other_types: set[str] = field(default_factory=set)
 
 
-@dataclass(frozen=True)
-class BagInformation:
-    """A whole recording."""
+class _Topic(BaseModel, strict=True):
+    name: str
+    type: str
+    serialization_format: str
+    offered_qos_profiles: Any = None
+    type_description_hash: str | None = None
 
-    topics: tuple[TopicInformation, ...]
-    files: tuple[str, ...]  # their names
-    message_count: int
-    ros_distro: str = ''
-    custom_data: Mapping[str, str] = field(default_factory=dict)
-    version: int = VERSION
-    storage: str = 'mcap'
-    compression_mode: str = ''
+
+class _Counted(BaseModel, strict=True):
+    topic_metadata: _Topic
+    message_count: NonNegativeInt
+
+
+class BagInformation(BaseModel, strict=True):
+    """A whole recording, by the names of rosbag2."""
+
+    version: int
+    storage_identifier: str
+    relative_file_paths: list[str]
+    message_count: NonNegativeInt
+    topics_with_message_count: list[_Counted] | None
+    compression_mode: str | None = None
+    ros_distro: str | None = None
+    custom_data: dict[str, Any] | None = None
+
+    @property
+    def topics(self) -> list[TopicInformation]:
+        """The topics that it lists."""
+        return [
+            TopicInformation(
+                name=topic.name,
+                type=topic.type,
+                message_count=entry.message_count,
+                serialization_format=topic.serialization_format,
+                offered_qos=readable_qos(topic.offered_qos_profiles),
+                type_hash=topic.type_description_hash or '',
+            )
+            for entry in self.topics_with_message_count or ()
+            for topic in [entry.topic_metadata]
+        ]
 
 
 def read_metadata(text: str) -> BagInformation:
     """Return what `metadata.yaml` or a metadata record says; raises `MetadataError`."""
     try:
         document = plain_yaml(text)
-        return _bag(document.get(ROOT, document))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = str(error) or type(error).__name__
-        raise MetadataError(f'description of the recording not understood: {reason}') from None
-
-
-def _bag(document: Any) -> BagInformation:
-    return BagInformation(
-        topics=tuple(_topic(entry) for entry in document['topics_with_message_count'] or ()),
-        files=tuple(_checked(path, str) for path in document['relative_file_paths']),
-        message_count=_count(document),
-        ros_distro=_checked(document.get('ros_distro') or '', str),
-        custom_data={name: str(value) for name, value in (document.get('custom_data') or {}).items()},
-        version=_checked(document['version'], int),
-        storage=_checked(document['storage_identifier'], str),
-        compression_mode=_checked(document.get('compression_mode') or '', str),
-    )
-
-
-def _topic(entry: Any) -> TopicInformation:
-    details = entry['topic_metadata']
-    return TopicInformation(
-        name=_checked(details['name'], str),
-        type=_checked(details['type'], str),
-        message_count=_count(entry),
-        serialization_format=_checked(details['serialization_format'], str),
-        offered_qos=readable_qos(details.get('offered_qos_profiles')),
-        type_hash=_checked(details.get('type_description_hash') or '', str),
-    )
-
-
-def _checked(value: T, kind: type[T]) -> T:
-    if type(value) is not kind:
-        wanted = 'a text' if kind is str else 'a whole number'
-        raise TypeError(f'{wanted} is wanted; instead received {value!r:.60}')
-    return value
-
-
-def _count(entry: Any) -> int:
-    count = _checked(entry['message_count'], int)
-    if count < 0:
-        raise ValueError(f'a count must be 0 or more; instead received {count}')
-    return count
+        return BagInformation.model_validate(document.get(ROOT, document))
+    except ValidationError as error:
+        first = error.errors()[0]
+        reason = (
+            f'{".".join(map(str, first["loc"]))}: {first["msg"]}; instead received {first["input"]!r:.60}'
+        )
+    except (ValueError, AttributeError) as error:
+        reason = str(error)
+    raise MetadataError(f'description of the recording not understood: {reason}')
 
 
 # The topics of a recording, and of many recordings, have the same few texts.
-@functools.lru_cache(maxsize=64)
-def _offers_in(text: str) -> tuple[OfferedQos, ...]:
-    return _offers(plain_yaml(text))
+_cached_yaml = functools.lru_cache(maxsize=64)(plain_yaml)
 
 
-def _offers(documents: Any) -> tuple[OfferedQos, ...]:
-    return tuple(OfferedQos(*map(_plain, offer)) for offer in parse_qos(documents or []))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Enum):
-        return value.name.lower()
-    return value.sec * NANOSECONDS + value.nsec if isinstance(value, QosTime) else value
-
-
-def readable_qos(source: Any) -> tuple[OfferedQos, ...]:
-    """Return the offers in `source`, YAML text or the list that it holds.
+def readable_qos(source: Any) -> Offers:
+    """Return the offers in `source`, YAML text or the list that it holds, as rosbag2 writes them now.
 
     None where they are not understood: no message needs them.
     """
     try:
-        return _offers_in(source) if isinstance(source, str) else _offers(source)
+        offers = parse_qos((_cached_yaml(source) if isinstance(source, str) else source) or [])
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError):
-        return ()
+        return []
+    return [{name: _plain(value) for name, value in offer._asdict().items()} for offer in offers]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, QosTime):
+        return value._asdict()
+    return value.name.lower() if isinstance(value, Enum) else value
 
 
 def read_statement(record: Mapping[str, str]) -> dict[str, dict[str, int]]:
@@ -150,24 +138,25 @@ ZERO_KEY = 'zero_ns'
 """Key of a step: the zero of the time axis, for a piece keeps the time of what it was cut from."""
 
 
+def custom_data(information: BagInformation | None) -> dict[str, str]:
+    """Return the notes of the writer; none where there is no description."""
+    found = information.custom_data if information else None
+    return {name: str(value) for name, value in (found or {}).items()}
+
+
 def origin(information: BagInformation | None) -> list[dict[str, Any]]:
     """Return the steps that led to a recording, oldest first; empty for an original."""
-    text = information.custom_data.get(_ORIGIN, '') if information else ''
     try:
-        steps = plain_yaml(text)
+        steps = plain_yaml(str(custom_data(information).get(_ORIGIN, '')))
     except YamlError:
         return []
     return [step for step in steps if isinstance(step, dict)] if isinstance(steps, list) else []
 
 
-def with_step(sources: Iterable[BagInformation | None], step: Mapping[str, Any]) -> dict[str, str]:
-    """Return the custom data of a recording made of others: theirs, with one more step."""
-    custom: dict[str, str] = {}
-    steps: list[dict[str, Any]] = []
-    for information in sources:
-        custom.update(information.custom_data if information else {})
-        steps += [earlier for earlier in origin(information) if earlier not in steps]
-    return {**custom, _ORIGIN: yaml.safe_dump([*steps, dict(step)], sort_keys=False)}
+def with_step(information: BagInformation | None, step: Mapping[str, Any]) -> dict[str, str]:
+    """Return the custom data of a recording made of another: its own, with one more step."""
+    steps = yaml.safe_dump([*origin(information), dict(step)], sort_keys=False)
+    return {**custom_data(information), _ORIGIN: steps}
 
 
 # Units of fields in the metadata of an MCAP channel, for topics that no registry knows. rosbag2 keeps that

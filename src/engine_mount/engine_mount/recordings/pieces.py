@@ -29,8 +29,7 @@ from engine_mount.recordings.metadata import (
     readable_qos,
     units_in,
 )
-from mount_models.plain_yaml import YamlError, plain_yaml, text_of_file
-from mount_recorder.bag_writer import PIECE_RECORD
+from mount_models.plain_yaml import YamlError, text_of_file
 from mount_recorder.metadata import METADATA_NAME
 
 _PIECE = re.compile(r'([^.].*?)(?:_(\d+))?\.(mcap|db3)')
@@ -64,16 +63,16 @@ def find_pieces(path: Path) -> Pieces:
             information, obstacle = None, f'{METADATA_NAME} is not readable ({error})'
     if information is None:
         if not present:
-            inner = path / 'recording'
-            hint = f'; the recording of this run is {inner}' if inner.is_dir() else ''
-            raise StorageError(f'{path} holds no MCAP file{hint}')
+            raise StorageError(f'{path} holds no MCAP file')
         complete = [numbers[file] for file in present] == list(range(len(present)))
         return Pieces(present, None, (f'{obstacle}; topics and times are those in the files',), complete)
-    if information.storage == 'sqlite3' or information.compression_mode.lower() not in ('', 'none'):
+    if information.storage_identifier == 'sqlite3' or (
+        (information.compression_mode or 'none').lower() != 'none'
+    ):
         return Pieces([path], information)
-    if information.storage != 'mcap':
-        raise StorageError(f'{path} is stored as {information.storage}; convert it to mcap')
-    listed = [path / Path(file).name for file in information.files]
+    if information.storage_identifier != 'mcap':
+        raise StorageError(f'{path} is stored as {information.storage_identifier}; convert it to mcap')
+    listed = [path / Path(file).name for file in information.relative_file_paths]
     missing = [file.name for file in listed if not file.is_file()]
     here = [file for file in listed if file.is_file()] or present
     if missing:
@@ -116,14 +115,12 @@ def open_piece(path: Path) -> McapFile:
 
 
 def declared_topics(
-    files: Sequence[McapFile], described: Iterable[TopicInformation]
+    files: Iterable[McapFile], described: Iterable[TopicInformation]
 ) -> dict[str, TopicInformation]:
     """Return the topics by name, those of the description first and in its order."""
     topics = {topic.name: replace(topic, message_count=0) for topic in described}
     for file in files:
-        repeated = set(repeated_topics(file)) if file is not files[0] else set()
         for number, stored in file.topics.items():
-            count = file.message_counts.get(number, 0)
             topic = topics.setdefault(stored.name, TopicInformation(stored.name, stored.type))
             if topic.stored is None:
                 topic.stored, topic.serialization_format = stored, stored.encoding
@@ -136,35 +133,21 @@ def declared_topics(
                 topic.other_types.add(stored.type)
                 continue
             topic.places.setdefault(file, []).append(number)
-            topic.stored_count += count
-            topic.message_count += count - (count > 0 and stored.name in repeated)
-            repeated -= {stored.name} if count else set()
+            topic.message_count += file.message_counts.get(number, 0)
     return topics
-
-
-def repeated_topics(file: McapFile) -> frozenset[str]:
-    """Return the topics of which a file repeats the last message of the file before it."""
-    try:
-        names = plain_yaml(file.metadata.get(PIECE_RECORD, {}).get('repeated', '[]'))
-        return frozenset(map(str, names))
-    except (YamlError, TypeError):
-        return frozenset()
 
 
 def definition_of(topic: TopicInformation) -> tuple[Definition | None, str]:
     """Return the definition of the messages, and a sentence where that of the recording is no use."""
     if topic.serialization_format != 'cdr':
         return None, f'its messages are encoded as {topic.serialization_format!r}, not as cdr'
-    text, obstacle = topic.stored.definition if topic.stored else b'', ''
+    text = topic.stored.definition if topic.stored else b''
     try:
-        if topic.stored and text.strip() and topic.stored.definition_encoding == 'ros2msg':
+        if text.strip() and topic.stored and topic.stored.definition_encoding == 'ros2msg':
             return text_definition(topic.type, text.decode()), ''
-        if text.strip():
-            obstacle = 'its definition is not written in ros2msg'
+        foreign = 'its definition is not written in ros2msg' if text.strip() else ''
+        return installed_definition(topic.type), foreign
     except (DefinitionError, UnicodeDecodeError) as error:
-        obstacle = f'the definition of {topic.type} in the recording is not readable ({error})'
-    try:
-        return installed_definition(topic.type), obstacle
+        return None, f'the definition of {topic.type} in the recording is not readable ({error})'
     except ValueError:
-        missing = f'type {topic.type!r} is not installed'
-        return None, f'{obstacle or "the recording does not define its type"}, and {missing}'
+        return None, f'the recording does not define its type, and type {topic.type!r} is not installed'

@@ -3,7 +3,7 @@
 import contextlib
 import copy
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from engine_mount.recordings.mcap_file import McapFile
-from engine_mount.recordings.mcap_records import HEAD, StorageError, StoredMessages
+from engine_mount.recordings.mcap_records import HEAD, StorageError
 from engine_mount.recordings.metadata import (
     ZERO_KEY,
     BagInformation,
@@ -25,15 +25,14 @@ from engine_mount.recordings.pieces import (
     definition_of,
     find_pieces,
     open_piece,
-    repeated_topics,
 )
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import Messages, Payloads, Series, SeriesError
-from engine_mount.recordings.times import TimeAxis, anchors
+from engine_mount.recordings.times import NO_TIMES, TimeAxis, anchors
 from mount_recorder.metadata import METADATA_NAME
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, JOINT_STATE
 
-# Names of times among columns: no field has such a name, behind the / is that of the property of a `Series`.
+# Times among columns: no field has such a name, behind the / is that of the property of a `Series`.
 _STAMPS, _RECEIVED, _SENT = '/stamps', '/receive_times', '/publish_times'
 
 
@@ -82,15 +81,14 @@ class Recording:
         self.missing: dict[str, int] = {}
         """How many messages of a topic are known to be missing."""
         self.described_count: int | None = None
-        """How many messages `metadata.yaml` lists, repetitions included, if it covers all files."""
-        if pieces.information is not None and len(pieces.information.files) >= len(self.files):
+        """How many messages `metadata.yaml` lists, if it covers all files."""
+        if pieces.information is not None and len(pieces.information.relative_file_paths) >= len(self.files):
             self.described_count = pieces.information.message_count
-            total = sum(topic.stored_count for topic in self.topics.values())
-            if self._complete and self.described_count != total:
+            if self._complete and self.described_count != self.message_count:
                 lists = f'{METADATA_NAME} lists {self.described_count} messages'
-                self.warnings.append(f'{lists}, the files hold {total}')
+                self.warnings.append(f'{lists}, the files hold {self.message_count}')
             for topic in () if self.proven else pieces.information.topics:
-                missing = topic.message_count - self.topics[topic.name].stored_count
+                missing = topic.message_count - self.topics[topic.name].message_count
                 self.missing |= {topic.name: missing} if missing > 0 else {}
         self._definitions = {name: definition_of(topic) for name, topic in self.topics.items()}
         for name, topic in self.topics.items():
@@ -137,8 +135,7 @@ class Recording:
         """Whether nothing is known to be missing; damage inside of a topic is known once that was read."""
         if self.missing or not self._complete or any(file.damaged for file in self.files):
             return False
-        held = sum(topic.stored_count for topic in self.topics.values())
-        return all(file.whole for file in self.files) or self.described_count == held
+        return all(file.whole for file in self.files) or self.described_count == self.message_count
 
     @property
     def proven(self) -> bool:
@@ -162,7 +159,7 @@ class Recording:
         """The time axis shown to users."""
         zeros = [zero for step in origin(self.information) if isinstance(zero := step.get(ZERO_KEY), int)]
         for name in anchors({name: topic.type for name, topic in self.topics.items() if topic.message_count}):
-            self._read_columns({name: (_STAMPS, _RECEIVED)})
+            self.load_columns({name: ()})
             with contextlib.suppress(SeriesError):  # of a foreign topic
                 series = self[name]
                 if len(series.stamps):
@@ -196,7 +193,7 @@ class Recording:
         What else is wanted of these topics later, such as a message or a column that is not in each of them,
         is read then.
         """
-        self._read_columns({topic: (_RECEIVED, _STAMPS, *names) for topic, names in columns.items()})
+        self._read_columns({topic: (_STAMPS, _RECEIVED, *names) for topic, names in columns.items()})
 
     def load_times(self) -> None:
         """Read the stamps of all topics in one pass, and of setpoints the other times."""
@@ -210,8 +207,8 @@ class Recording:
         """Forget what was read of the topics: it is read again where it is needed."""
         self._series = {}
 
-    def parts(self, names: Iterable[str], size: int = 0) -> Iterator[Series]:
-        """Yield the messages of topics in the order of the files, at most `size` (0: any number) at a time.
+    def parts(self, names: Iterable[str], most: int | None = None) -> Iterator[Series]:
+        """Yield the messages of topics in the order of the files: of some chunks at a time the first `most`.
 
         Only these are in memory. Raises `ReadingError`.
         """
@@ -220,16 +217,15 @@ class Recording:
             file: [n for name in counts for n in self.topics[name].places.get(file, ())]
             for file in self.files
         }
-        for file, block, _ in self.stored_blocks(places):
-            for name in counts:
-                numbers = self.topics[name].places.get(file)
-                if not numbers:
-                    continue
-                own = block.of(numbers)
-                counts[name] += len(own)
-                for begin in range(0, len(own), size or len(own) or 1):
-                    part = own.at(slice(begin, begin + size if size else None))
-                    yield self._make_series(name, (Payloads([part.payloads()]), part.heads))
+        for file in filter(places.get, self.files):
+            for block in file.blocks(places[file]):
+                for name in counts:
+                    part = block.of(self.topics[name].places.get(file, ()))
+                    if len(part):
+                        counts[name] += len(part)
+                        yield self._make_series(
+                            name, (Payloads([part.at(slice(most)).payloads()]), part.heads[:most])
+                        )
         for name, present in counts.items():
             expected = self.topics[name].message_count
             if self.missing.get(name, 0) < expected - present:
@@ -277,9 +273,10 @@ class Recording:
             series = self._series.setdefault(
                 name, self._make_series(name, lambda name=name: self._read([name])[name])
             )
-            if not series.loaded and not series.known >= set(names):
-                series.count, series.known = 0, series.known | set(names)
-                found[name] = {column: [] for column in names}
+            unread = [each for each in names if each.removeprefix('/') not in series.columns | vars(series)]
+            if unread and not series.loaded:
+                series.count = 0
+                found[name] = {column: [] for column in unread}
         for part in self.parts(found):
             series = self._series[part.topic]
             if not series.count and part.type == JOINT_STATE:
@@ -289,19 +286,14 @@ class Recording:
             for column, parts in tuple(found[part.topic].items()):
                 try:
                     parts.append(getattr(part, column[1:]) if column[0] == '/' else part[column])
-                except SeriesError as error:
+                except SeriesError:
                     del found[part.topic][column]
-                    if column == _STAMPS and series.count == len(part):  # else it counts from the part
-                        series.stamp_obstacle = str(error)
-        shared: list[np.ndarray] = []  # topics of a mount have the same stamps
         for name, columns in found.items():
             for column, parts in columns.items():
-                values = np.concatenate(parts) if parts else np.empty(0, np.int64)
                 if column[0] == '/':
-                    shared.append(next((each for each in shared if np.array_equal(each, values)), values))
-                    setattr(self._series[name], column[1:], shared[-1])
+                    setattr(self._series[name], column[1:], np.concatenate([NO_TIMES, *parts]))
                 elif parts:
-                    self._series[name].columns[column] = values
+                    self._series[name].columns[column] = np.concatenate(parts)
 
     def _read(self, names: Iterable[str]) -> dict[str, Messages]:
         """Return bytes and heads of all messages of topics."""
@@ -322,26 +314,3 @@ class Recording:
             zero=self.time_range[0] if self.time_range else 0,
             units=self.topics[name].units,
         )
-
-    def stored_blocks(
-        self, places: Mapping[McapFile, Sequence[int]]
-    ) -> Iterator[tuple[McapFile, StoredMessages, int]]:
-        """Yield the messages of topics, given by their numbers in each file, in the order of the files.
-
-        Messages that a file repeats of the one before are left out; how many stands beside each block.
-        """
-        last: dict[str, tuple[bytes, int]] = {}
-        watched = frozenset().union(*map(repeated_topics, self.files))
-        for file in filter(places.get, self.files):
-            repeated = set(repeated_topics(file))
-            for block in file.blocks(places[file]):
-                is_new = np.ones(len(block), bool)
-                for number in places[file]:
-                    name = file.topics[number].name
-                    own = np.flatnonzero((block.heads['topic'] == number) & (name in watched))
-                    if len(own):
-                        is_new[own[0]] = name not in repeated or block.message(own[0]) != last.get(name)
-                        repeated.discard(name)
-                        last[name] = block.message(own[-1])
-                left_out = int(np.count_nonzero(~is_new))
-                yield file, block.at(np.flatnonzero(is_new)) if left_out else block, left_out

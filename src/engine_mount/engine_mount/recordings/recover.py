@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from engine_mount.recordings.bag_copy import BagCopy
-from engine_mount.recordings.metadata import read_statement
+from engine_mount.recordings.metadata import custom_data
 from engine_mount.recordings.recording import open_recording
-from mount_recorder.losses import RECORDER_RECORD
 
 Progress = Callable[[int, int], None]  # messages done, messages in all
 
@@ -24,34 +23,22 @@ class RecoveryError(ValueError):
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was kept and what is lost.
-
-    `lost` messages are None where no summary or description counts them: then the `lost_bytes` of the file
-    that are not readable say how much it is. `lost_before` never reached the file: its recorder says so.
-    """
+    """What was kept and what is lost; `lost` is None where no summary or description counts the messages."""
 
     folder: Path
     kept: int
     lost: int | None
     kept_seconds: float  # from the first to the last message
-    kept_bytes: int
-    lost_bytes: int
     complete: bool  # nothing of the file is lost
-    lost_before: int
     notes: tuple[str, ...]
 
     def __str__(self) -> str:
-        kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s, {_size(self.kept_bytes)}'
-        lost = 'nothing of the file is missing' if self.complete else f'lost {self._lost_text()}'
-        if self.lost_before:
-            lost += f', but {self.lost_before} messages never reached it, as its recorder says'
-        return f'{kept}; {lost}'
-
-    def _lost_text(self) -> str:
-        unreadable = f'{_size(self.lost_bytes)} of the file not readable'
-        if self.lost is not None:
-            return f'{self.lost} messages, {unreadable}'
-        return f'{unreadable}, and what followed the last whole chunk: how much, the file cannot tell'
+        kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s'
+        if self.complete:
+            return f'{kept}; nothing of the file is missing'
+        if self.lost is None:
+            return f'{kept}; lost what followed the last whole chunk: how much, the file cannot tell'
+        return f'{kept}; lost {self.lost} messages'
 
 
 def recover(
@@ -68,40 +55,27 @@ def recover(
             for file in recording.files
             for number, topic in file.topics.items()
         }
-        stored = 0  # in the files, repetitions included
-        for file, block, repeated in recording.stored_blocks(
-            {file: list(file.topics) for file in recording.files}
-        ):
-            stored += len(block) + repeated
-            heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
-            for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
-                bag.write(channels[file, number], raw, *head)
-            if progress is not None:
-                progress(bag.added, recording.message_count)
+        for file in recording.files:
+            for block in file.blocks(file.topics):
+                heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
+                for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
+                    bag.write(channels[file, number], raw, *head)
+                if progress is not None:
+                    progress(bag.added, recording.message_count)
         if not bag.added:
             reasons = '; '.join(recording.warnings) or 'it is empty'
             raise RecoveryError(f'{path} holds no message that can be recovered: {reasons}')
-        custom = dict(recording.information.custom_data) if recording.information else {}
-        custom['recovered_from'] = f'{recording.path.name}: {stored} messages'
-        bag.complete([recording], None, custom)
+        origin = {'recovered_from': f'{recording.path.name}: {bag.added} messages'}
+        bag.complete(recording, {**custom_data(recording.information), **origin})
     expected = recording.described_count
     if recording.proven:
         expected = sum(sum(file.message_counts.values()) for file in recording.files)
-    complete = recording.whole and (expected is None or expected <= stored)
-    lost_bytes = sum(file.lost_bytes for file in recording.files)
-    statements = [read_statement(file.metadata.get(RECORDER_RECORD, {})) for file in recording.files]
+    complete = recording.whole and (expected is None or expected <= bag.added)
     return Recovery(
         folder=bag.folder,
         kept=bag.added,
-        lost=0 if complete else None if expected is None else max(0, expected - stored),
+        lost=0 if complete else None if expected is None else max(0, expected - bag.added),
         kept_seconds=bag.seconds,
-        kept_bytes=sum(file.path.stat().st_size for file in recording.files) - lost_bytes,
-        lost_bytes=lost_bytes,
         complete=complete,
-        lost_before=sum(row.get('lost', 0) for rows in statements for row in rows.values()),
-        notes=(*recording.warnings, *bag.notes),
+        notes=tuple(recording.warnings),
     )
-
-
-def _size(count: int) -> str:
-    return f'{count / 1e6:.3f} MB' if count >= 1e5 else f'{count / 1e3:.2f} kB'

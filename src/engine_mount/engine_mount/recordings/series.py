@@ -17,8 +17,8 @@ from engine_mount.recordings.layout import (
     installed_definition,
     layout_of,
 )
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.times import NO_TIMES, Times
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 
 Column = NDArray[np.float64]
@@ -91,12 +91,8 @@ class Series:
         self.type = type_name
         self.columns: dict[str, Column] = {}
         """Columns of all messages that were read without these."""
-        self.known: set[str] = set()
-        """The names of these columns, and of those that not every message has."""
         self.count: int | None = None
         """How many messages there are, where times or columns were read without these."""
-        self.stamp_obstacle = ''
-        """Why the messages have no stamps, where these were read without the messages."""
         self.first_names: tuple[str, ...] = ()
         """The names in the first messages of a `JointState`, likewise."""
         self.registered: Topic | None = registered_topic(topic, type_name)
@@ -141,12 +137,13 @@ class Series:
     @functools.cached_property
     def stamps(self) -> Times:
         """The stamps of the samples in ns; raises `SeriesError` for a type without a header."""
-        if self.stamp_obstacle:
-            raise SeriesError(self.stamp_obstacle)
+        absent = SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+        if 'header' not in dict(self._definition.types[self._definition.name]):
+            raise absent
         found = [NO_TIMES]
         for layout, rows in self._layouts:
             if not layout.numbers.keys() >= set(STAMP):
-                raise SeriesError(f'{self.topic}: {self.type} has no header with a stamp; use receive_times')
+                raise absent
             seconds, nanoseconds = (layout.numbers[path].column(rows).astype(np.int64) for path in STAMP)
             found.append(seconds * 1_000_000_000 + nanoseconds)
         return np.concatenate(found)

@@ -9,10 +9,10 @@ from datetime import datetime
 from typing import Any
 
 from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import SeriesError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import SESSION
 
 _OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to run and explains nothing
@@ -96,21 +96,22 @@ def told_session(recording: Recording) -> dict[str, Any]:
 
 def session_differences(a: str, b: str) -> list[str]:
     """Return a sentence for each difference of two sessions (YAML texts), changed values first."""
-    values = [
-        {name: value for name, value in session_values(text).items() if not _OF_THE_MOMENT.fullmatch(name)}
+    sessions = [
+        {
+            name: f'{value:g}' if isinstance(value, float) else str(value)
+            for name, value in session_values(text).items()
+            if not _OF_THE_MOMENT.fullmatch(name)
+        }
         for text in (a, b)
     ]
-    shown = [
-        {name: f'{value:g}' if isinstance(value, float) else str(value) for name, value in each.items()}
-        for each in values
-    ]
+    one, other = sessions
     found = [
-        f'{name} is {text} in A, {shown[1][name]} in B'
-        for name, text in shown[0].items()
-        if name in shown[1] and not _same(values[0][name], values[1][name])
+        f'{name} is {text} in A, {other[name]} in B'
+        for name, text in one.items()
+        if name in other and text != other[name]
     ]
-    for where, place in (('A', 0), ('B', 1)):
-        alone = [f'{name} ({text})' for name, text in shown[place].items() if name not in shown[1 - place]]
+    for where, here, there in (('A', one, other), ('B', other, one)):
+        alone = [f'{name} ({text})' for name, text in here.items() if name not in there]
         if alone:
             more = f' and {len(alone) - _LISTED} more' if len(alone) > _LISTED else ''
             found.append(f'only {where} tells {", ".join(alone[:_LISTED])}{more}')
@@ -160,9 +161,9 @@ def versions_sentence(differences: Mapping[str, str | None], here: Mapping[str, 
     others = [f'{name} {old} (here {here[name]})' for name, old in differences.items() if old is not None]
     missing = [name for name, old in differences.items() if old is None]
     if not differences:
-        return 'the recording was made with the same versions on the same kind of processor'
+        return 'the recording was made with the same versions on the same kind of machine'
     if len(missing) == len(here):
-        return 'the recording does not tell with which versions and on which processor it was made'
+        return 'the recording does not tell with which versions it was made'
     which = f'others than here: {", ".join(others)}' if others else 'the same versions as far as it tells'
     more = f'; it does not tell {", ".join(missing)}' if missing else ''
     return f'the recording was made with {which}{more}'
@@ -180,8 +181,3 @@ def _flat(content: Mapping[Any, Any], prefix: str = '') -> dict[str, Any]:
         root = '' if not prefix and key == 'parameters' else f'{prefix}.{key}' if prefix else str(key)
         flat |= _flat(value, root) if isinstance(value, Mapping) else {root or 'text': value}
     return flat
-
-
-def _same(one: Any, other: Any) -> bool:
-    both_unknown = isinstance(one, float) and isinstance(other, float) and one != one and other != other
-    return both_unknown or one == other

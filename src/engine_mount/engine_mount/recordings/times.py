@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.recordings.registry import registered_topic
 from mount_recorder.stamp_watch import FARTHEST, LONGEST_PAUSE
-from mount_recorder.topic_groups import registered_topic
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 
 Times = NDArray[np.int64]
@@ -141,41 +141,17 @@ def missing_samples(streams: Sequence[Times], rate: float) -> int:
     `streams` are stamps (ns) on one clock, of samples at `rate` in Hz. A stream is whole before its first and
     behind its last stamp; a sample that is missing in several counts once.
     """
-    known = {id(stamps): distinct(stamps) for stamps in streams if len(stamps)}
+    known = [distinct(stamps) for stamps in streams if len(stamps)]
     if not known:
         return 0
-    grid = distinct(np.concatenate(list(known.values()))) if len(known) > 1 else next(iter(known.values()))
+    grid = distinct(np.concatenate(known))
     numbers = np.cumsum(np.rint(np.diff(grid, prepend=grid[0]) * (rate / _NANOSECONDS)).astype(np.int64))
-    begins, ends = [NO_TIMES], [NO_TIMES]
-    for stamps in known.values():
-        own = numbers[np.searchsorted(grid, stamps)]
-        before_hole = np.flatnonzero(np.diff(own) > 1)
-        begins.append(own[before_hole] + 1)
-        ends.append(own[before_hole + 1])
-    return _covered(np.concatenate(begins), np.concatenate(ends))
-
-
-def _covered(begins: NDArray[np.int64], ends: NDArray[np.int64]) -> int:
-    """Return how many whole numbers lie in at least one interval, whose ends do not belong to it."""
-    order = np.argsort(begins)
-    begins, ends = begins[order], ends[order]
-    reached = np.concatenate([begins[:1], np.maximum.accumulate(ends)[:-1]])
-    return int(np.maximum(ends - np.maximum(begins, reached), 0).sum())
-
-
-def stamp_jitter(stamps: Times, rate: float) -> tuple[float, float]:
-    """Return how far steps between samples at `rate` (Hz) are from their median, in s: rms and at most.
-
-    Stamps are in ns. Gaps are no jitter; NaN without steps.
-    """
-    steps = np.diff(ordered(stamps))
-    steps = steps[np.rint(steps * (rate / _NANOSECONDS)) == 1]
-    if not steps.size:
-        return math.nan, math.nan
-    lengths, counts = np.unique(steps, return_counts=True)
-    deviation = (lengths - np.median(steps)) / _NANOSECONDS
-    square = math.fsum((counts * deviation**2).tolist()) / steps.size
-    return math.sqrt(square), float(np.abs(deviation).max())
+    seen = distinct(numbers)
+    lacking = np.zeros(len(seen), bool)
+    for stamps in known:
+        own = distinct(numbers[np.searchsorted(grid, stamps)])
+        lacking |= (seen >= own[0]) & (seen <= own[-1]) & ~is_in(seen, own)
+    return int(seen[-1] + 1 - len(seen) + np.count_nonzero(lacking))
 
 
 class TimeAxis:

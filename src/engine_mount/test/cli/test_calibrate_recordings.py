@@ -17,7 +17,7 @@ from mount_models.specimen import default_specimen, load_specimen
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import string_message, temperature, wrench
 from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
-from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE, Delivery
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, SESSION, SIM_CLAMP_FORCE
 from mount_sim.electronics.electronics import status_every
 from mount_sim.plant.reluctance import force as magnetic_force
 from mount_sim.rack import drawn_rack, record_ripple
@@ -41,7 +41,7 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     begin = time.time_ns()
     try:
         for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
-            writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
+            writer.add_topic(f'/{topic.name}', topic.type)
         writer.write(f'/{SESSION.name}', string_message('scenario: rack'), begin)
         ripples, temperatures = ScalarsLayout(COIL_RIPPLE), OneNumberLayout(temperature)
         forces = OneNumberLayout(wrench)

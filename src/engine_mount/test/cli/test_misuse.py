@@ -29,7 +29,6 @@ REFUSED = {
     'import': (MISSING, '--out', 'made'),
     'info': (MISSING,),
     'ls': (MISSING,),
-    'merge': (MISSING, '--out', MISSING),
     'recover': (MISSING,),
     'record': ('--split', MISSING),
     'replay': (MISSING,),
@@ -104,7 +103,6 @@ def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, refus
     command('drive', *DRIVE, '--out', folder)
     for words in (
         ('cut', folder, '--from', '0.5s', '--to', '1s', '--out', f'{folder}_cut'),
-        ('merge', folder, '--out', f'{folder}_merged'),
         ('recover', folder / 'recording', '--out', f'{folder}_recovered'),
         ('replay', folder, '--out', f'{folder}_replayed'),
         ('report', folder, '--out', f'{folder}.html'),

@@ -59,12 +59,7 @@ def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner, com
     assert not [path for path in (tmp_path / 'copies').rglob('*') if 'recovered' in path.name]
 
 
-def test_parts_by_uri_are_merged_and_become_a_reference(tmp_path, command):
-    command('cut', RUN, '--to', '3s', '--out', 'a')
-    fsspec.filesystem('memory').put(str(tmp_path / 'here' / 'a'), '/drives/a', recursive=True)
-    command('cut', RUN, '--from', '3s', '--out', 'b')
-    command('merge', f'{STORE}/a', 'b', '--out', 'whole')
-    assert 'everything is equal' in command('compare', 'whole', RUN)
+def test_a_run_by_uri_becomes_a_reference(tmp_path, command):
     shutil.copytree(REFERENCE, 'references/gap')
     words = ('--reference', 'new', '--reason', 'a test', '--folder', 'references')
     assert 'new reference' in command('accept', RUN, *words)
@@ -76,7 +71,7 @@ def test_ls_lists_this_machine_alone(refused):
     assert 'hunter2' not in said
 
 
-@pytest.mark.parametrize('words', ['audit', 'info', 'view', 'merge --out m', 'report'])
+@pytest.mark.parametrize('words', ['audit', 'info', 'view', 'report'])
 def test_a_uri_with_a_password_is_refused_without_telling_it(words, refused):
     said = refused(*words.split(), 'sftp://driver:hunter2@host/a')
     assert 'sftp://driver@host/a holds a password' in said

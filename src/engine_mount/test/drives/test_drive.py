@@ -76,7 +76,6 @@ def test_a_drive_in_core_needs_no_node_and_returns_figures_and_recording(tmp_pat
         ({'core': True, 'lockstep': True}, 'not both'),
         ({'apart': True}, '--apart goes with --lockstep'),
         ({'core': True, 'composed': True}, '--composed is for real time'),
-        ({'core': True, 'parameters': {'mount_recorder': {'snapshot': 3.0}}}, 'not with --core'),
     ],
 )
 def test_what_does_not_go_together_is_refused_and_no_folder_made(tmp_path, arguments, reason):

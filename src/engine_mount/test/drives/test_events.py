@@ -116,5 +116,5 @@ def test_a_warning_is_told_when_it_begins_and_not_with_each_count(events, told, 
 
 def test_marks_by_hand_are_left_to_the_answer_of_the_recorder(events, told):
     events.on_mark('left', Mark(8_000_000_000, BY_HAND))
-    events.on_mark('left', Mark(8_000_000_000, 'lost_sample', '/displacement: 1 sample missing'))
-    assert told == ['           left: /displacement: 1 sample missing']
+    events.on_mark('left', Mark(8_000_000_000, 'recording_loss', '5 messages not recorded'))
+    assert told == ['           left: 5 messages not recorded']

@@ -7,12 +7,16 @@ from recorded_drive import PERIOD, START, joint_state
 from rosbags.typesys import Stores, get_typestore
 
 from mount_recorder.bag_writer import BagWriter
-from mount_recorder.metadata import OfferedQos
 from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
 _STORE = get_typestore(Stores.ROS2_JAZZY)
 _DELAY = 200_000  # ns from stamp to reception
-_LATCHED = (OfferedQos(durability='transient_local'),)
+_TIME = {'sec': 9223372036, 'nsec': 854775807}
+LATCHED = {
+    **{'history': 'unknown', 'depth': 0, 'reliability': 'reliable', 'durability': 'transient_local'},
+    **{'deadline': _TIME, 'lifespan': _TIME, 'liveliness': 'automatic', 'liveliness_lease_duration': _TIME},
+    'avoid_ros_namespace_conventions': False,
+}
 
 
 def text(content: str) -> bytes:
@@ -34,8 +38,16 @@ def answers(count: int, *, on: int = 100, off: int = 300, phase: float = 0.0) ->
     }
 
 
-def write_answers(
-    folder: Path,
+def write_answers(folder: Path, signals: dict[str, np.ndarray], **options) -> Path:
+    """Write a recording of one drive."""
+    writer = BagWriter(folder)
+    add_answers(writer, signals, **options)
+    writer.close()
+    return folder
+
+
+def add_answers(
+    writer: BagWriter,
     signals: dict[str, np.ndarray],
     *,
     start: int = START,
@@ -44,12 +56,13 @@ def write_answers(
     marks: tuple[tuple[int, str], ...] = (),
     missing: range = range(0),
     namespace: str = '',
-) -> Path:
-    """Write a drive; `marks` are (sample, text), samples in `missing` are left out."""
-    writer = BagWriter(folder)
+) -> None:
+    """Add a drive; `marks` are (sample, text), samples in `missing` are left out."""
     latched = (SESSION, AIR_GAP)
     for topic in (*latched, EVENT, DISPLACEMENT, CURRENT_SETPOINT, CONTROL_TRACE):
-        writer.add_topic(f'{namespace}/{topic.name}', topic.type, _LATCHED if topic in latched else ())
+        writer.add_topic(
+            f'{namespace}/{topic.name}', topic.type, lambda topic=topic: [LATCHED] * (topic in latched)
+        )
     writer.write(f'{namespace}/{SESSION.name}', text(session), start)
     gap = joint_state(start, list(AIR_GAP.names), np.full(len(AIR_GAP.names), 4e-4), np.empty(0))
     writer.write(f'{namespace}/{AIR_GAP.name}', gap, start + 1, start)
@@ -62,8 +75,6 @@ def write_answers(
                 writer.write(f'{namespace}/{topic.name}', raw, stamp + _DELAY, stamp + _DELAY // 2)
         if index in marked:
             writer.write(f'{namespace}/{EVENT.name}', text(marked[index]), stamp + _DELAY)
-    writer.close()
-    return folder
 
 
 def _row(topic, signals: dict[str, np.ndarray], index: int) -> np.ndarray:

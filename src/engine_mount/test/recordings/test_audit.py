@@ -1,19 +1,14 @@
 """What the audit says of recordings with known losses."""
 
-import io
-import json
-
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, RECORDED, START, sample, write_drive
+from recorded_drive import PERIOD, START, write_drive
 
 import engine_mount
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.losses import as_json, as_table, losses
-from engine_mount.recordings.screen import Screen
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import DISPLACEMENT
 
 
 def test_sound_recording_has_nothing_to_tell(drive):
@@ -32,18 +27,6 @@ def test_lost_samples_are_counted_with_the_longest_gap(tmp_path):
     assert (entry.expected, entry.present, entry.lost, entry.duplicated) == (100, 93, 7, 0)
     assert entry.longest_gap_s == pytest.approx(8e-3)
     assert not entry.sound
-
-
-def test_displacement_without_its_setpoint_is_counted(tmp_path):
-    writer = BagWriter(tmp_path / 'bag')
-    for topic in RECORDED:
-        writer.add_topic(f'/{topic.name}', topic.type)
-    for index in range(100):
-        writer.write('/displacement', sample(DISPLACEMENT, index), START + index)
-        if 20 <= index < 80 and index not in (30, 31):
-            writer.write('/current_setpoint', sample(CURRENT_SETPOINT, index), START + index)
-    writer.close()
-    assert audit(engine_mount.open(tmp_path / 'bag'))['/displacement'].answers.unanswered == 2
 
 
 def test_topics_without_a_rate_have_no_expectation(tmp_path):
@@ -70,22 +53,3 @@ def test_a_few_late_stamps_are_no_losses_and_with_many_nothing_is_counted(tmp_pa
     entry = audit(engine_mount.open(tmp_path / 'bag'))['/displacement']
     assert (entry.expected, entry.lost, entry.duplicated) == figures
     assert (figures[0] is None) == ('beside the rate (limit 1 %): only counted' in entry.remark)
-
-
-def test_json_holds_the_figures_and_no_nan(tmp_path):
-    recording = engine_mount.open(write_drive(tmp_path / 'bag', 1))
-    audits = audit(recording)
-    text = json.dumps(as_json(audits, losses(recording, audits)), allow_nan=False)
-    entry = json.loads(text)['topics']['/displacement']
-    assert entry['longest_gap_s'] is None
-    assert {'expected', 'present', 'lost', 'duplicated', 'longest_gap_s'} <= entry.keys()
-    assert (entry['expected'], entry['present'], entry['lost'], entry['duplicated']) == (1, 1, 0, 0)
-
-
-def test_table_names_every_topic_and_its_losses(tmp_path):
-    shown = io.StringIO()
-    audits = audit(engine_mount.open(write_drive(tmp_path / 'bag', 100, skipped=range(40, 47))))
-    Screen(shown).table(as_table(audits))
-    text = shown.getvalue()
-    assert '/coil_ripple' in text
-    assert '8.0' in text

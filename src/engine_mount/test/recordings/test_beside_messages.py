@@ -1,6 +1,5 @@
-"""What recover, cut and merge keep besides messages: attachments, metadata, sequence numbers, losses."""
+"""What recover and cut keep besides messages: metadata, sequence numbers, losses."""
 
-import functools
 import itertools
 
 import pytest
@@ -12,7 +11,6 @@ import engine_mount
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.merge import merge
 from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
@@ -20,7 +18,6 @@ from mount_recorder.schemas import schema_text
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 200
-CALIBRATION = {'name': 'calibration.csv', 'media_type': 'text/csv', 'data': b'A,N\n0,0\n3,450\n' * 999}
 NOTES = ({'vehicle': 'B', 'track': 'north'}, {'vehicle': 'B', 'track': 'south'})
 
 
@@ -43,7 +40,6 @@ def by_others(folder, end=True):
         for index in range(COUNT):
             time = START + index * PERIOD
             writer.add_message(channel, time, sample(DISPLACEMENT, index), time, sequence=7 + 3 * index)
-        writer.add_attachment(START, START + 5, **CALIBRATION)
         writer.add_metadata('track', NOTES[1])
         if end:
             writer.finish()
@@ -57,21 +53,12 @@ def recovered(folder, out):
     return out
 
 
-def halves_merged(folder, out):
-    recording = engine_mount.open(folder)
-    parts = [out.with_name(f'{out.name}_{number}') for number in (1, 2)]
-    cut(recording, parts[0], None, 0.03)
-    cut(recording, parts[1], 0.03, None)
-    merge([engine_mount.open(part) for part in parts], out)
-    return out
-
-
 def all_cut(folder, out):
     cut(engine_mount.open(folder), out)
     return out
 
 
-COPIES = pytest.mark.parametrize('copy', [recovered, halves_merged, all_cut])
+COPIES = pytest.mark.parametrize('copy', [recovered, all_cut])
 
 
 def stored(folder):
@@ -90,16 +77,6 @@ def test_metadata_and_sequence_numbers_come_with_the_messages(place, copy, end):
     notes, sequences = stored(copy(folder, place()))
     assert notes == list(NOTES)
     assert sequences == [7 + 3 * index for index in range(len(engine_mount.open(folder)['displacement']))]
-
-
-def test_attachments_that_are_not_copied_are_named(place):
-    folder = by_others(place())
-    for said in (
-        recover(folder, place()).notes,
-        cut(engine_mount.open(folder), place()).losses,
-        merge([engine_mount.open(folder)], place()).losses,
-    ):
-        assert any('1 attachments are not copied: mcap get attachment other_0.mcap' in each for each in said)
 
 
 # What the recorder says of its losses.
@@ -134,28 +111,6 @@ def test_losses_of_the_recorder_stay_in_the_copy(place, copy):
     assert losses_of(copy(copied, place())) == {'/displacement': 40}
 
 
-def test_recovery_says_that_messages_never_reached_the_file(place):
-    result = recover(lossy(place()), place())
-    assert result.complete
-    assert 'but 40 messages never reached it, as its recorder says' in str(result)
-    assert 'never reached' not in str(recover(lossy(place(), lost=0), place()))
-
-
-def merged(folders, out):
-    merge([engine_mount.open(folder) for folder in folders], out, different_sessions=True)
-    return out
-
-
-def test_losses_of_different_recordings_add_up_in_any_order_and_each_counts_once(place):
-    parts = [lossy(place(), first) for first in (0, 60, 120)]
-    once = merged(parts, place())
-    assert losses_of(once) == {'/displacement': 120}
-    twice = functools.reduce(lambda left, right: merged([left, right], place()), [*parts, parts[0], once])
-    assert losses_of(twice) == {'/displacement': 120}
-    statement = engine_mount.open(twice).files[0].metadata['engine_mount_recorder']
-    assert (statement['received'], statement['kept'], statement['lost']) == ('303', '183', '120')
-
-
 def test_what_damage_took_is_counted_beside_what_the_recorder_lost(place):
     folder = lossy(place(), received=2000)
     file = folder / f'{folder.name}_0.mcap'
@@ -166,4 +121,3 @@ def test_what_damage_took_is_counted_beside_what_the_recorder_lost(place):
     assert gone
     result = recover(folder, place())
     assert losses_of(result.folder) == {'/displacement': 40 + gone}
-    assert losses_of(halves_merged(folder, place())) == {'/displacement': 40 + gone}

@@ -4,13 +4,13 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, joint_state, write_drive
+from recorded_drive import PERIOD, START, joint_state
 
 import engine_mount
 from engine_mount.recordings import SeriesError
 from engine_mount.recordings.mcap_file import McapFile
 from mount_recorder.bag_writer import BagWriter
-from mount_ros.topics import DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
+from mount_ros.topics import JOINT_STATE
 
 COUNT = 500
 
@@ -27,20 +27,6 @@ def test_columns_and_stamps_are_those_of_all_messages_in_one_pass(drive, monkeyp
             np.testing.assert_array_equal(getattr(some[topic], what), getattr(whole[topic], what))
         assert len(some[topic]) == COUNT
         assert not some[topic].loaded
-
-
-def test_what_else_is_asked_of_a_topic_is_read_then(drive):
-    some, whole = engine_mount.open(drive), engine_mount.open(drive)
-    some.load_columns({'coil_ripple': ['coil_current']})
-    series = some['coil_ripple']
-    assert not series.loaded
-    np.testing.assert_array_equal(series.publish_times, whole['coil_ripple'].publish_times)
-    assert series.names == ('coil_current', 'flux_density')
-    np.testing.assert_array_equal(series['flux_density'], whole['coil_ripple']['flux_density'])
-    np.testing.assert_array_equal(series.derivative('flux_density'), -series['flux_density'])
-    assert series.message(COUNT - 1).name == whole['coil_ripple'].message(COUNT - 1).name
-    with pytest.raises(SeriesError, match='it has coil_current, flux_density'):
-        series['nothing']
 
 
 @pytest.fixture
@@ -64,32 +50,6 @@ def test_a_column_that_not_every_message_has_is_that_of_all_messages(changing):
     assert np.isnan(some['displacement']['other']).sum() == 400
 
 
-def test_a_message_that_is_none_is_named_as_among_all_messages(tmp_path):
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/displacement', JOINT_STATE)
-    for index in range(COUNT):
-        good = joint_state(START + index * PERIOD, ['mount'], np.array([1.0]), np.empty(0))
-        writer.write('/displacement', good if index != 300 else good[:30], START + index * PERIOD)
-    writer.close()
-    recording = engine_mount.open(tmp_path / 'bag')
-    recording.load_columns({'displacement': ['mount']})
-    with pytest.raises(SeriesError, match='message 300 is no'):
-        recording['displacement']['mount']
-
-
-def test_a_damaged_chunk_is_told_as_when_all_messages_are_read(tmp_path):
-    folder = write_drive(tmp_path / 'bag', COUNT, chunk_size=5000)
-    content = bytearray((folder / 'bag_0.mcap').read_bytes())
-    content[engine_mount.open(folder).files[0].chunks[2].begin + 50] ^= 1
-    (folder / 'bag_0.mcap').write_bytes(content)
-    some, whole = engine_mount.open(folder), engine_mount.open(folder)
-    some.load_columns({'displacement': ['mount']})
-    np.testing.assert_array_equal(some['displacement']['mount'], whole['displacement']['mount'])
-    assert some.missing == whole.missing
-    assert some.warnings == whole.warnings
-    assert not some.whole
-
-
 def test_a_topic_without_stamps_has_its_columns(tmp_path):
     writer = BagWriter(tmp_path / 'bag')
     writer.add_topic('/number', 'std_msgs/msg/Float64')
@@ -101,19 +61,6 @@ def test_a_topic_without_stamps_has_its_columns(tmp_path):
     np.testing.assert_array_equal(recording['number']['data'], np.arange(COUNT))
     with pytest.raises(SeriesError, match='no header with a stamp'):
         recording['number'].stamps  # noqa: B018
-
-
-def test_an_empty_topic_has_empty_columns(tmp_path):
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/displacement', DISPLACEMENT.type)
-    writer.add_topic('/sim/mount_force', SIM_MOUNT_FORCE.type)
-    writer.close()
-    recording = engine_mount.open(tmp_path / 'bag')
-    recording.load_columns({'displacement': ['mount', 'nothing'], 'sim/mount_force': ['wrench.force.z']})
-    assert len(recording['displacement']) == len(recording['displacement']['mount']) == 0
-    assert len(recording['displacement'].stamps) == 0
-    with pytest.raises(SeriesError, match='it has mount'):
-        recording['displacement']['nothing']
 
 
 def peak_of_reading(folder, read):

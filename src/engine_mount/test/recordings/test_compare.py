@@ -173,12 +173,6 @@ def test_sessions_that_differ_are_told(compared):
     assert 'the sessions differ: mount_control.quality is 0.7 in A, 0.9 in B' in comparison.sentences()
 
 
-def test_marks_of_one_recording_are_told_and_no_difference(compared):
-    comparison = compared(marks=((100, '{kind: mark, text: rough}'),))
-    assert comparison.equal
-    assert 'marks only in B: mark rough' in comparison.sentences()
-
-
 def test_topics_of_one_recording_are_named(drive, tmp_path):
     other = write_answers(tmp_path / 'other', SIGNALS)
     comparison = compare(engine_mount.open(drive), engine_mount.open(other))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compared_drives import answers, write_answers
+from compared_drives import add_answers, answers
 from mcap.writer import Writer
 from recorded_drive import START
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -105,32 +105,6 @@ def test_what_no_signal_shows_is_compared_too(tolerances, tmp_path):
     assert f'messages that differ: {COUNT} of thing' in text.sentences()
 
 
-def test_unknown_in_both_is_equal_and_the_sign_of_zero_counts_in_arrays_too(tmp_path):
-    def values(zero):
-        ranges = np.array([np.nan, zero, 1, 2], np.float32)
-        return lambda index: {'value': float(index), 'ranges': ranges, 'text': ''}
-
-    assert compared(tmp_path, HIDDEN, values(0.0), values(0.0)).equal
-    assert not compared(tmp_path, HIDDEN, values(0.0), values(-0.0)).equal
-
-
-@pytest.mark.parametrize('part', ['position', 'velocity', 'effort'])
-def test_numbers_of_a_joint_state_that_no_column_shows_are_compared(part, tmp_path):
-    """Two names with three positions, velocities whose unit nobody knows, efforts."""
-    fields = 'std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort'
-    joint_state = 'sensor_msgs/msg/JointState'
-
-    def values(last):
-        empty = np.empty(0)
-        numbers = {'position': empty, 'velocity': empty, 'effort': empty, part: np.array([1.0, 2.0, last])}
-        return lambda index: {'name': ['one', 'two'], **numbers}
-
-    a = write_things(tmp_path / 'a.mcap', fields, values(3.0), name=joint_state)
-    b = write_things(tmp_path / 'b.mcap', fields, values(4.0), name=joint_state)
-    assert compare(engine_mount.open(a), engine_mount.open(a)).equal
-    assert not compare(engine_mount.open(a), engine_mount.open(b)).equal
-
-
 def test_a_topic_of_another_type_is_never_equal(tmp_path):
     def values(index):
         return {'value': index}
@@ -148,17 +122,15 @@ def test_a_topic_of_another_type_is_never_equal(tmp_path):
 
 @pytest.fixture
 def with_camera(tmp_path):
-    """Return a recording with a camera beside the mount whose topics are called like ours."""
-    from engine_mount.recordings.merge import merge
-
-    drive = write_answers(tmp_path / 'drive', answers(400), marks=((100, 'a bump'),))
-    writer = BagWriter(tmp_path / 'camera')
-    for name in ('event', 'session', 'displacement', 'control_trace'):
-        writer.add_topic(f'/camera/{name}', 'std_msgs/msg/Int32')
-        writer.write(f'/camera/{name}', b'\x00\x01\x00\x00\x07\x00\x00\x00', START)
-    writer.close()
-    parts = [engine_mount.open(drive), engine_mount.open(tmp_path / 'camera')]
-    merge(parts, tmp_path / 'both', different_sessions=True)
+    """Return recordings of a camera whose topics are called like ours, alone and beside the mount."""
+    for folder in ('both', 'camera'):
+        writer = BagWriter(tmp_path / folder)
+        if folder == 'both':
+            add_answers(writer, answers(400), marks=((100, 'a bump'),))
+        for name in ('event', 'session', 'displacement', 'control_trace'):
+            writer.add_topic(f'/camera/{name}', 'std_msgs/msg/Int32')
+            writer.write(f'/camera/{name}', b'\x00\x01\x00\x00\x07\x00\x00\x00', START)
+        writer.close()
     return tmp_path
 
 

@@ -1,17 +1,12 @@
 """Comparing recordings of several mounts: each by its own clock, under its own name."""
 
-import json
-
 import numpy as np
 import pytest
-from compared_drives import START, answers, text, write_answers
+from compared_drives import START, add_answers, answers
 
 import engine_mount
 from engine_mount.recordings.compare import compare
-from engine_mount.recordings.difference import ToleranceError, Tolerances, signal_table
 from engine_mount.recordings.events import recorded_events
-from engine_mount.recordings.matching import ComparisonError
-from engine_mount.recordings.merge import merge
 from mount_recorder.bag_writer import BagWriter
 
 COUNT = 400
@@ -30,42 +25,13 @@ def car(tmp_path):
     """Return a recording of the mounts `mount_left` and `mount_right`."""
 
     def written(name, left=SIGNALS, right=SIGNALS, start=START, phase=0, **options):
-        parts = [
-            engine_mount.open(
-                write_answers(
-                    tmp_path / f'{name}_{side}', signals, start=begin, namespace=f'/mount_{side}', **more
-                )
-            )
-            for side, signals, begin, more in (
-                ('left', left, start, {}),
-                ('right', right, start + phase, options),
-            )
-        ]
-        merge(parts, tmp_path / name, different_sessions=True)
+        writer = BagWriter(tmp_path / name)
+        add_answers(writer, left, start=start, namespace='/mount_left')
+        add_answers(writer, right, start=start + phase, namespace='/mount_right', **options)
+        writer.close()
         return engine_mount.open(tmp_path / name)
 
     return written
-
-
-def test_both_mounts_are_compared_under_their_own_names(car):
-    comparison = compare(car('a'), car('b', right=changed(150, 0.25)))
-    assert not comparison.equal
-    assert {signal.name for signal in comparison.differing} == {
-        'mount_right/current_setpoint.coil_current',
-        'mount_right/control_trace.current',
-    }
-    figures = json.loads(json.dumps(comparison.figures(), allow_nan=False))
-    topics = ('air_gap', 'displacement', 'current_setpoint', 'control_trace')
-    assert set(figures['topics']) == {f'mount_{side}/{name}' for side in ('left', 'right') for name in topics}
-    found = {
-        side: figures['topics'][f'mount_{side}/current_setpoint']['signals']['coil_current']['differing']
-        for side in ('left', 'right')
-    }
-    assert found == {'left': 0, 'right': 1}
-    assert [row[0] for row in signal_table(comparison.signals).rows] == [
-        'mount_right/current_setpoint\ncoil_current',
-        'mount_right/control_trace\ncurrent',
-    ]
 
 
 @pytest.mark.parametrize('phase', [-600_000, -400_000, 400_000, 600_000])
@@ -94,38 +60,4 @@ def test_sessions_and_marks_of_each_mount_are_compared(car):
     a = car('a', marks=((10, 'left behind'),))
     comparison = compare(a, car('b', session='scenario: sweep\n'))
     assert 'the sessions differ: mount_right: scenario is bench in A, sweep in B' in comparison.sentences()
-    assert 'marks only in A: mount_right: mark left behind' in comparison.sentences()
     assert 'left behind' in [event.text for event in recorded_events(a)]
-
-
-def test_a_tolerance_may_be_that_of_one_mount(car):
-    a, b = car('a'), car('b', left=changed(150, 0.25), right=changed(150, 0.25))
-    one = ('mount_right/current_setpoint=0.3', 'mount_right/control_trace.current=0.3')
-    assert {signal.mount for signal in compare(a, b, Tolerances(one)).differing} == {'mount_left/'}
-    both = ('current_setpoint=0.3', 'control_trace.current=0.3')
-    assert compare(a, b, Tolerances(both)).equal
-    with pytest.raises(ToleranceError, match=r'mount_rigt/current_setpoint.*no such signal'):
-        compare(a, b, Tolerances(('mount_rigt/current_setpoint=0.3',)))
-
-
-def test_a_mark_without_a_mount_does_not_make_one(tmp_path):
-    one, other = (
-        engine_mount.open(write_answers(tmp_path / side, SIGNALS, namespace=f'/mount_{side}'))
-        for side in ('left', 'right')
-    )
-    writer = BagWriter(tmp_path / 'marks')
-    writer.add_topic('/event', 'std_msgs/msg/String')
-    writer.write('/event', text('by hand'), START)
-    writer.close()
-    merge([other, engine_mount.open(tmp_path / 'marks')], tmp_path / 'both', different_sessions=True)
-    comparison = compare(one, engine_mount.open(tmp_path / 'both'))
-    assert comparison.equal
-    assert comparison.only_b == ('/event',)
-    assert comparison.marks_b == ('mark by hand',)
-
-
-def test_a_mount_of_another_name_is_the_only_one_that_is_left(car, tmp_path):
-    alone, two = engine_mount.open(write_answers(tmp_path / 'alone', SIGNALS)), car('a')
-    assert compare(alone, engine_mount.open(tmp_path / 'a_right')).equal
-    with pytest.raises(ComparisonError, match='no topic is in both'):
-        compare(alone, two)  # which of both is meant is not for us to guess

@@ -12,9 +12,8 @@ from collections import Counter
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from mcap.writer import CompressionType, Writer
 from recorded_drive import write_drive
 from ros_testing import mutated
 
@@ -22,7 +21,6 @@ import engine_mount
 from engine_mount.recordings import ReadingError
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.mcap_records import RECORD
 from engine_mount.recordings.metadata import MetadataError, read_metadata
 from engine_mount.recordings.series import SeriesError
 
@@ -98,35 +96,6 @@ def test_what_is_read_of_a_mutated_file_is_what_was_written_or_not_sound(intact,
     with contextlib.suppress(ReadingError):
         found, sound, unproven = judged(file if alone else file.parent)
         assert found <= original or not sound or unproven
-
-
-def records_of(content):
-    """Return (opcode, position) of the records of a file, those in chunks left out."""
-    position, found = len(MCAP0_MAGIC), []
-    while position < len(content) - len(MCAP0_MAGIC):
-        opcode, length = RECORD.unpack_from(content, position)
-        found.append((opcode, position))
-        position += RECORD.size + length
-    return found
-
-
-def foreign_file(folder, writer):
-    """Return the file of a recording by one of `WRITERS`, its bytes, content and records."""
-    file = folder / 'another.mcap'
-    rewritten(write_drive(folder / 'bag', 5, chunk_size=700) / 'bag_0.mcap', file, WRITERS[writer])
-    recording = engine_mount.open(file)
-    assert recording.whole
-    content = file.read_bytes()
-    return file, bytearray(content), contents(recording), records_of(content)
-
-
-def test_a_damaged_declaration_behind_the_messages_is_none_of_them(tmp_path):
-    file, content, original, records = foreign_file(tmp_path, 'chunks without')
-    end = dict(records)[Opcode.DATA_END]
-    position = next(place for opcode, place in records if opcode == Opcode.CHANNEL and place > end)
-    content[position] = Opcode.MESSAGE
-    file.write_bytes(content)
-    assert contents(engine_mount.open(file)) <= original
 
 
 @given(SEEDS)

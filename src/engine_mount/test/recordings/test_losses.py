@@ -124,13 +124,6 @@ def figures(recording):
     return losses(recording, audits), audits
 
 
-def test_a_sound_drive_has_nothing_to_complain_of(tmp_path):
-    found, audits = figures(write(tmp_path / 'bag'))
-    assert found.sound
-    assert (found.samples, found.lost_samples, found.asked, found.unanswered) == (2000, 0, 2000, 0)
-    assert sentences(audits, found)[-1].startswith('Nothing is known to be lost')
-
-
 def test_an_unanswered_sample_is_no_lost_message(tmp_path):
     found, audits = figures(write(tmp_path / 'bag', unanswered=range(500, 898)))
     assert (found.lost_samples, found.lost_messages, found.unanswered) == (0, 0, 398)
@@ -210,15 +203,6 @@ def test_words_and_json_tell_the_same_figures(tmp_path):
     assert 'samples lost: 5 of 2000 (10 messages of all topics)' in words
     assert 'samples unanswered: 398 of 1995 while control was active' in words
     assert f'faults: 2: 0.499 s mount_control: {found.faults[0].sentence}; 0.600 s mount_driver: ' in words
-
-
-def test_of_many_faults_the_first_are_named_and_the_others_counted(tmp_path):
-    marks = [(100 + 10 * number, f'{{kind: fault, text: number {number}}}') for number in range(8)]
-    found, _ = figures(write(tmp_path / 'bag', marks=marks))
-    assert len(found.faults) == 8
-    lines = found.faults_text().splitlines()
-    assert lines[:3] == ['8:', '0.100 s number 0;', '0.110 s number 1;']
-    assert lines[-2:] == ['0.140 s number 4;', 'and 3 more']
 
 
 # Stamps that no sample has.

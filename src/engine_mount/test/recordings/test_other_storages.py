@@ -6,8 +6,7 @@ import sqlite3
 
 import numpy as np
 import pytest
-from mcap.records import Statistics
-from recorded_drive import PERIOD, START, sample, write_drive
+from recorded_drive import PERIOD, START, sample
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -16,7 +15,6 @@ from engine_mount.recordings import ReadingError
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.recover import recover
-from mount_recorder import mcap_writer
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101
@@ -96,13 +94,3 @@ def test_a_file_that_is_packed_as_a_whole_is_refused_with_the_way_out(tmp_path):
     (tmp_path / 'bag.mcap.zstd').write_bytes(b'')
     with pytest.raises(ReadingError, match='unpack it by zstd -d'):
         engine_mount.open(tmp_path / 'bag.mcap.zstd')
-
-
-def test_times_are_those_of_the_chunks_where_the_statistics_tell_of_others(tmp_path, monkeypatch):
-    honest = engine_mount.open(write_drive(tmp_path / 'honest', 50))
-    false = {'message_start_time': START - 3600 * 10**9}
-    monkeypatch.setattr(mcap_writer, 'Statistics', lambda **true: Statistics(**{**true, **false}))
-    lying = engine_mount.open(write_drive(tmp_path / 'lying', 50))
-    assert lying.proven
-    assert lying.time_range == honest.time_range
-    assert lying['displacement'].time[0] == honest['displacement'].time[0]

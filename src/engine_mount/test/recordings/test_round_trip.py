@@ -11,7 +11,7 @@ from rosbags.rosbag2 import Reader
 
 import engine_mount
 from engine_mount.recordings.recover import recover
-from mount_recorder.bag_writer import BagWriter, SplitRule
+from mount_recorder.bag_writer import BagWriter
 
 TOPICS = ('/displacement', '/mount_right/event', '/a')
 TYPES = ('sensor_msgs/msg/JointState', 'std_msgs/msg/String', 'std_msgs/msg/String')
@@ -24,9 +24,9 @@ MESSAGES = st.lists(st.tuples(st.sampled_from(TOPICS), PAYLOADS, TIMES, TIMES), 
 
 
 def written(folder, messages, split, chunk_size):
-    writer = BagWriter(folder, chunk_size=chunk_size, split=split)
+    writer = BagWriter(folder, chunk_size=chunk_size, split_size=split)
     for topic, type_name in zip(TOPICS, TYPES, strict=True):
-        writer.add_topic(topic, type_name, latched=topic == '/a')
+        writer.add_topic(topic, type_name)
     for topic, raw, received, sent in messages:
         writer.write(topic, raw, received, sent)
     writer.close()
@@ -58,20 +58,18 @@ def read(folder):
     return found
 
 
-@example([('/a', b'(\xb5/\xfd', 1, 1)], 1, SplitRule())  # begins as if it were packed
+@example([('/a', b'(\xb5/\xfd', 1, 1)], 1, 0)  # begins as if it were packed
 @settings(deadline=None, derandomize=True, max_examples=40)
-@given(MESSAGES, st.sampled_from([1, 300, 5000]), st.sampled_from([SplitRule(), SplitRule(0, 1 << 60)]))
+@given(MESSAGES, st.sampled_from([1, 300, 5000]), st.sampled_from([0, 1]))
 def test_what_is_written_is_read_here_and_by_others(messages, chunk_size, split):
     with tempfile.TemporaryDirectory() as parent:
         folder = written(Path(parent) / 'bag', messages, split, chunk_size)
         found = read(folder)
         assert found == {topic: of_topic(messages, topic) for topic in TOPICS}
-        assert sorted(by_rosbags(folder, split)) == sorted(
-            (topic, received, raw)
-            for topic, raw, received, _ in messages
-            if split == SplitRule() or topic != '/a'
+        assert sorted(by_rosbags(folder)) == sorted(
+            (topic, received, raw) for topic, raw, received, _ in messages
         )
-        if split == SplitRule():
+        if not split:
             assert sorted(by_mcap(folder)) == sorted(messages)
         if messages:
             recovered = recover(folder, Path(parent) / 'recovered')
@@ -79,13 +77,9 @@ def test_what_is_written_is_read_here_and_by_others(messages, chunk_size, split)
             assert read(Path(parent) / 'recovered') == found
 
 
-def by_rosbags(folder, split):
+def by_rosbags(folder):
     with Reader(folder) as reader:
-        return [
-            (connection.topic, time, bytes(raw))
-            for connection, time, raw in reader.messages()
-            if split == SplitRule() or connection.topic != '/a'  # repeated in each piece: ours counts it once
-        ]
+        return [(connection.topic, time, bytes(raw)) for connection, time, raw in reader.messages()]
 
 
 def by_mcap(folder):
@@ -109,7 +103,7 @@ def test_what_a_kill_leaves_is_read_here_and_recovered(tmp_path, kill):
     assert 'how much, the file cannot tell' in str(result)
     assert read(tmp_path / 'recovered')['/displacement'] == of_topic(messages[:kept], '/displacement')
     assert len(list(by_mcap(renamed(tmp_path / 'recovered')))) == kept
-    assert len(by_rosbags(tmp_path / 'recovered', SplitRule())) == kept
+    assert len(by_rosbags(tmp_path / 'recovered')) == kept
 
 
 def renamed(folder):

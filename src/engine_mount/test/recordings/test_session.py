@@ -21,7 +21,7 @@ from mount_ros.topics import SESSION
 def recorded(folder, *names: str):
     writer = BagWriter(folder)
     for name in names:
-        writer.add_topic(name, SESSION.type, latched=True)
+        writer.add_topic(name, SESSION.type)
         writer.write(name, string_message(session_text({'scenario': name})), 1)
     writer.close()
     return open_recording(folder)

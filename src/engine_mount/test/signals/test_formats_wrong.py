@@ -87,7 +87,8 @@ def test_what_is_not_there_or_not_read_is_named(tmp_path):
     with pytest.raises(SourceError, match=r'no\.csv: no such file or folder'):
         read(tmp_path / 'no.csv')
     contents = {
-        'empty.mf4': (b'', 'is empty'), 'a.wav': (b'RIFF\0\0\0\0WAVE', 'type .wav are not read; read are CSV'),
+        'empty.mf4': (b'', 'is empty'),
+        'a.wav': (b'RIFF\0\0\0\0WAVE', 'type .wav are not read; read are CSV'),
         'old.xls': (b'\xd0\xcf\x11\xe0', 'save it as .xlsx'), 'a.bag': (b'#ROSBAG V2.0\n', 'rosbags-convert'),
         'a.csv': (b'version https://git-lfs.github.com/spec/v1\n', 'git lfs pull'),
     }  # fmt: skip

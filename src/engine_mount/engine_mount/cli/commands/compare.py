@@ -33,7 +33,7 @@ def compare(
         list[str] | None,
         option(
             'signal=0.01 in its unit, signal=1% of its largest value, 1% for all, switching=0.002 in s; '
-            'also topic=, topic.signal=, mount_left/topic.signal=',
+            'also topic=, topic.signal=',
             'NAME=VALUE',
             None,
             '--tolerance',

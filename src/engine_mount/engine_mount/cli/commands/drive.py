@@ -12,6 +12,7 @@ from engine_mount.cli.commands.options import (
     Distance,
     Domain,
     JsonFile,
+    Lateral,
     MapFile,
     Namespace,
     NewFolder,
@@ -19,7 +20,6 @@ from engine_mount.cli.commands.options import (
     Rate,
     Scale,
     Settings,
-    Snapshot,
     SpeedText,
     Split,
     TimeColumn,
@@ -51,9 +51,9 @@ Examples:
 
 `engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
-`engine-mount drive --road blocks.csv --speed 60/3.6 --core` - a measured road: height over distance
+`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
-`engine-mount drive --split 500MB --split 60s` - in several files; `--snapshot 30s`: events only
+`engine-mount drive --split 500MB` - in several files
 
 `engine-mount drive --fault coil_open@12 --fault lost_5@6:2` - two faults; `--fault list` names all
 
@@ -97,7 +97,8 @@ def drive(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Scale = None,
-    road: Annotated[str, option('measured road: a table of height over distance', 'FILE')] = '',
+    road: Annotated[str, option('measured road: height over distance, a table or OpenCRG', 'FILE')] = '',
+    lateral: Lateral = 0.0,
     speed: SpeedText = '',
     distance: Distance = '',
     contact_length: Annotated[
@@ -137,8 +138,7 @@ def drive(
     report: Annotated[
         bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
     ] = True,
-    split: Split = None,
-    snapshot: Snapshot = '',
+    split: Split = '',
     priority: Priority = 10,
     restarts: Annotated[
         int, option('times that a node may be lost within a minute before the drive ends; 0: none', least=0)
@@ -150,8 +150,8 @@ def drive(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
-    from engine_mount.reports.drive.results import evaluate_drive, evaluate_snapshots
-    from engine_mount.settings.amounts import checked_recorder, recorder_options
+    from engine_mount.reports.drive.results import evaluate_drive
+    from engine_mount.settings.amounts import recorder_options
 
     screen = TerminalScreen()
     if 'list' in (fault or []):
@@ -168,13 +168,13 @@ def drive(
         )  # fmt: skip
     if not road:
         refuse_without(
-            'road', 'road', speed=speed, distance=distance,
+            'road', 'road', speed=speed, lateral=lateral, distance=distance,
             contact_length=contact_length, repeat=repeat,
         )  # fmt: skip
     elif file:
         raise typer.BadParameter('--road is a scenario of its own; leave out --file')
     parameters = changes_of(settings)
-    if recorder := recorder_options(split or [], snapshot):
+    if recorder := recorder_options(split):
         parameters.setdefault('mount_recorder', {}).update(recorder)
     excitation = None
     if road:
@@ -184,7 +184,7 @@ def drive(
         if len(column or []) > 1:
             raise typer.BadParameter('--column is given once for a road: the column of its height')
         height = ''.join(column or [])
-        found = read_road(road, column=height, distance=distance, speed=speed)
+        found = read_road(road, lateral=lateral, column=height, distance=distance, speed=speed)
         length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
         excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:
@@ -203,11 +203,7 @@ def drive(
         )  # fmt: skip
     except CombinationError as error:
         raise typer.BadParameter(str(error)) from None
-    recorded = checked_recorder(driven.parameters.get('mount_recorder', {}))
-    if recorded.snapshot:
-        told = evaluate_snapshots(driven.folder, recorded, driven.figures, screen)
-    else:
-        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+    told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     write_figures(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []
     for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):

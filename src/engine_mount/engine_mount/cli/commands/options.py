@@ -75,10 +75,7 @@ JsonFile = Annotated[Path | None, option('write all figures to this file', 'FILE
 Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE')]
 Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE')]
 Listing = Annotated[bool, flag('--list', 'tell which there are')]
-Split = Annotated[
-    list[str] | None, option('largest or longest file: 500MB, 60s; may be given once for each', 'LIMIT')
-]
-Snapshot = Annotated[str, option('record only around events, with so much before: 30s', 'DURATION')]
+Split = Annotated[str, option('largest file, such as 500MB; default: one file', 'SIZE')]
 Settings = Annotated[
     list[str] | None,
     option('any parameter of any node; may be repeated', '[NODE.]NAME=VALUE', setting, '--set'),
@@ -131,6 +128,7 @@ Scale = Annotated[
     float | None,
     option('foreign file: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
 ]
+Lateral = Annotated[float, option('OpenCRG: track so far left of the reference line', 'M')]
 Distance = Annotated[
     str, option('road: column of the distance, or the distance between two heights', 'NAME[:UNIT]|M')
 ]

@@ -9,7 +9,6 @@ from engine_mount.cli.commands.options import (
     Domain,
     Namespace,
     NewFolder,
-    Snapshot,
     Split,
     argument,
     option,
@@ -26,9 +25,7 @@ Examples:
 
 `engine-mount record` - all topics, until Ctrl-C; `m` or space sets a mark
 
-`engine-mount record displacement control_trace --split 500MB --split 60s --out bags/long`
-
-`engine-mount record --snapshot 30s` - only what happens around marks, with the 30 s before each
+`engine-mount record displacement control_trace --split 500MB --out bags/long`
 
 In a terminal a line tells messages per second, size, lost messages and marks. The topic `event`, which
 holds the marks, is always recorded. Times are those of the wall clock.
@@ -40,9 +37,7 @@ def record(
         list[str] | None, argument('names of the registry; default: all', '[TOPIC]...', named('topic'))
     ] = None,
     out: NewFolder = None,
-    split: Split = None,
-    snapshot: Snapshot = '',
-    snapshot_after: Annotated[str, option('snapshot: and with so much after an event', 'DURATION')] = '10s',
+    split: Split = '',
     duration: Annotated[float | None, option('length, s; default: until Ctrl-C', 'S')] = None,
     on_full: Annotated[
         str,
@@ -64,18 +59,16 @@ def record(
 
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
-    options = {'on_full': on_full, **recorder_options(split or [], snapshot, snapshot_after)}
-    screen = TerminalScreen()
+    options = {'on_full': on_full, **recorder_options(split)}
+    screen, folder = TerminalScreen(), out or new_place('record')
     outcome = run_record(
-        out or new_place('record'), checked_recorder(options), screen, topics=topics or (),
+        folder, checked_recorder(options), screen, topics=topics or (),
         duration=duration, domain=chosen_domain(domain), namespace=namespace,
     )  # fmt: skip
     if outcome.failure:
         screen.note(outcome.failure)
-    sound = [_print_losses(folder, screen) for folder in outcome.folders]
-    if not sound and not outcome.failure:
-        screen.say('no event came, so no snapshot was saved')
-    if outcome.failure or outcome.lost or not all(sound):
+    sound = _print_losses(folder, screen)
+    if outcome.failure or outcome.lost or not sound:
         raise typer.Exit(1)
 
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from engine_mount.drives.loop.messages import Columns, CoreMessages
 from engine_mount.drives.loop.run import CoreOutcome, run_core_into
 from engine_mount.settings.chosen import Parameters
-from mount_recorder.bag_writer import WHOLE, BagWriter, SplitRule
+from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_ros.messages.cdr import string_message
-from mount_ros.topics import SESSION, TOPICS, Delivery, Topic
+from mount_ros.topics import SESSION, TOPICS, Topic
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.plant.mounts import ALONE
 
@@ -26,7 +26,7 @@ def record_core(
     *,
     excitation: Excitation | None = None,
     namespace: str = '',
-    split: SplitRule = WHOLE,
+    split_size: int = 0,
     begin: int | None = None,
 ) -> CoreOutcome:
     """Run the scenario in `parameters`, write it to the recording `folder`, and return what happened.
@@ -36,7 +36,7 @@ def record_core(
     is built already; stamps count from the log time `begin` (ns), by default the present.
     """
     begin = time.time_ns() if begin is None else begin
-    writer = BagWriter(folder, split=split, chunk_size=LONG_CHUNK_SIZE)
+    writer = BagWriter(folder, split_size=split_size, chunk_size=LONG_CHUNK_SIZE)
     sessions = {ALONE: session} if isinstance(session, str) else session
     sinks, sim = {}, parameters.get('mount_sim', {})
     try:
@@ -45,8 +45,7 @@ def record_core(
         for mount, own in writers.items():
             for topic in TOPICS:
                 if own.names[topic.name] not in declared:
-                    latched = topic.delivery is Delivery.LATCHED
-                    writer.add_topic(own.names[topic.name], topic.type, latched=latched)
+                    writer.add_topic(own.names[topic.name], topic.type)
             declared |= set(own.names.values())
             own.write(SESSION, string_message(sessions[mount]), 0)
             sinks[mount] = CoreMessages(sim, own.write, own.write_columns, mount)

@@ -17,7 +17,6 @@ from mount_ros.topics import (
     SESSION,
     SIM_CLAMP_FORCE,
     SIM_MOUNT_FORCE,
-    Delivery,
 )
 from mount_sim.rack import RackRecording
 
@@ -41,7 +40,7 @@ def record_friction_rack(folder: Path, measured: RackRecording, session: Mapping
     begin = time.time_ns()
     try:
         for topic in _TOPICS:
-            writer.add_topic(f'/{topic.name}', topic.type, latched=topic.delivery is Delivery.LATCHED)
+            writer.add_topic(f'/{topic.name}', topic.type)
         writer.write(f'/{SESSION.name}', string_message(session_text(new_session(session))), begin)
         positions = ScalarsLayout(DISPLACEMENT)
         forces = OneNumberLayout(wrench)

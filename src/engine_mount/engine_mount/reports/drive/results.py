@@ -13,17 +13,14 @@ from engine_mount.reports.drive.signals import load_drive
 from engine_mount.reports.drive.summary import (
     Figures,
     late_control,
-    snapshots_sentence,
     summarise,
-    summarise_snapshots,
     summary_table,
 )
 from engine_mount.reports.json_file import write_json
 from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.mounts import mounts_of, settings_of_mounts
 from engine_mount.settings.run_folder import RunFolder
-from mount_recorder.folders import recordings_of, saved_snapshots
-from mount_recorder.parameters import RecorderParameters
+from mount_recorder.folders import recordings_of
 
 _COMMON = ('scenario', 'mode', 'samples', 'recordings', 'real_time_factor')  # to all mounts of a run
 
@@ -66,18 +63,6 @@ def evaluate_drive(
             _draw(folder, part, figures[part.mount], screen, result)
         _make(folder.report, lambda: _write_page(folder, parts, screen), result)
     return result
-
-
-def evaluate_snapshots(
-    folder: RunFolder, recorder: RecorderParameters, run: Figures, screen: Screen
-) -> DriveResult:
-    """Say what a run has that recorded only events: its figures would need all of the drive."""
-    saved = saved_snapshots(folder.recording)
-    complaints = [words for place in saved for words in _audited(open_recording(place), screen)]
-    screen.say(snapshots_sentence(len(saved), recorder))
-    figures = summarise_snapshots(saved, run)
-    write_json(figures, folder.summary)
-    return DriveResult(figures, saved, complaints)
 
 
 def _evaluate_mount(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
-from mount_recorder.parameters import RecorderParameters
 from mount_sim.plant.mounts import seat_of, without_friction
 
 Figures = dict[str, Any]
@@ -78,12 +76,6 @@ def summarise(
     }
 
 
-def summarise_snapshots(snapshots: list[Path], run: Figures) -> Figures:
-    """Return the figures of a drive that recorded only events: those of `run`, as in `summarise`."""
-    figures = {name: run[name] for name in ('scenario', 'mode', 'samples', 'real_time_factor')}
-    return {'snapshots': [str(place) for place in snapshots], **figures, **_latencies(run)}
-
-
 def late_control(figures: Mapping[str, Any]) -> list[str]:
     """Return a sentence if control answered its first sample well behind the start of the excitation."""
     if without_friction(figures['mount']):
@@ -99,17 +91,6 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
         's); until then the mount had no damping: drive again if the initialisation was repeated, or give it '
         'more time by mount_sim.timeline.start'
     ]
-
-
-def snapshots_sentence(count: int, parameters: RecorderParameters) -> str:
-    """Return what a drive with `--snapshot` saved."""
-    if not count:
-        return 'No event came, so no snapshot was saved; m or space sets one by hand in real time.'
-    noun = 'snapshot was' if count == 1 else 'snapshots were'
-    return (
-        f'{count} {noun} saved, up to {parameters.snapshot:g} s before an event and '
-        f'{parameters.snapshot_after:g} s after it; figures of the drive need a full recording.'
-    )
 
 
 def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:

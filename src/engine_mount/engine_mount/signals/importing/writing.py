@@ -25,7 +25,7 @@ def write_channels(
     begin = min(int(channel.stamps[0]) for channel in channels)
     end = max(int(channel.stamps[-1]) for channel in channels)
     try:
-        writer.add_topic(f'/{SESSION.name}', SESSION.type, latched=True)
+        writer.add_topic(f'/{SESSION.name}', SESSION.type)
         for channel in channels:
             topic = channel.place.topic
             # of topics that every command takes the registry tells the unit

@@ -1,17 +1,8 @@
-"""Which topics of a recording share chunks: those that a car has, and all others."""
+"""The registered topic behind the name of a recorded one."""
 
 import functools
 
 from mount_ros.topics import RACK_TOPICS, TOPICS, Topic
-
-OF_A_CAR = 0
-OF_OTHERS = 1
-
-
-def topic_group(name: str, type_name: str) -> int:
-    """Return the group of the topic with this full name; one that no registry knows is among the others."""
-    topic = registered_topic(name, type_name)
-    return OF_OTHERS if topic is None or topic.only_simulated else OF_A_CAR
 
 
 # Recordings have the same few names, and of each it is asked again and again.
