@@ -132,8 +132,8 @@ def table_in(folder):
 def at(count, action):
     """Return what takes the progress of a run and calls `action` once, when `count` recordings are done."""
 
-    def report(progress):
-        if progress.done == count:
+    def report(done, of):
+        if done == count:
             action()
 
     return report

@@ -118,7 +118,6 @@ def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activat
 @pytest.mark.parametrize(
     'odd',
     [
-        {'data': bytes(8)},
         {'data': bytes(64), 'dlc': 64},
         {'data': b'', 'is_fd': False, 'is_remote_frame': True, 'dlc': 8},
         {'data': bytes(24), 'is_extended_id': True},

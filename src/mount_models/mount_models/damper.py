@@ -245,13 +245,11 @@ def _checked_points(columns: Any) -> tuple[FloatArray, FloatArray]:
             f'velocity ({velocity[0]:g} .. {velocity[-1]:g} m/s) must rise strictly within '
             f'0 .. {HIGHEST_VELOCITY:g} m/s; give magnitudes, the characteristic is odd'
         )
-    if force[0] != 0.0 or force.min() < 0.0 or force.max() > HIGHEST_FORCE:
+    if force[0] != 0.0 or force.min() < 0.0 or not 0.0 < force.max() <= HIGHEST_FORCE:
         raise ParameterError(
-            f'force ({force[0]:g} N at first, {force.min():g} .. {force.max():g} N) must begin at 0 N and '
-            f'lie within 0 .. {HIGHEST_FORCE:g} N; friction only opposes motion'
+            f'force ({force[0]:g} N at first, {force.min():g} .. {force.max():g} N) must begin at 0 N, lie '
+            f'within 0 .. {HIGHEST_FORCE:g} N and be greater than 0 N somewhere; friction only opposes motion'
         )
-    if not force.max() > 0.0:
-        raise ParameterError('force must be greater than 0 N somewhere; else choose no damping by its levels')
     return velocity, force
 
 

@@ -185,7 +185,7 @@ def _specimen_in(text: str) -> Specimen:
 
 def _check_version(content: Any) -> None:
     version = content.get('schema_version') if isinstance(content, Mapping) else SCHEMA_VERSION
-    if version != SCHEMA_VERSION or isinstance(version, bool):
+    if version != SCHEMA_VERSION:
         raise SpecimenError(
             f'schema_version ({excerpt(version)}) must be {SCHEMA_VERSION}; the file is of another version '
             'of this software, or none of its specimens: calibrate again'

@@ -129,7 +129,7 @@ def test_unknown_velocity_gives_unknown_force():
         ({'velocity': [0, 2], 'force': [0, 1]}, r'velocity \(0 \.\. 2 m/s\)'),
         ({'velocity': [0, 1], 'force': [5, 9]}, r'force \(5 N at first.* must begin at 0 N'),
         ({'velocity': [0, 0.5, 1], 'force': [0, -1, 9]}, 'friction only opposes motion'),
-        ({'velocity': [0, 1], 'force': [0, 0]}, 'must be greater than 0 N somewhere'),
+        ({'velocity': [0, 1], 'force': [0, 0]}, 'be greater than 0 N somewhere'),
         ({'law': 'magic'}, "no damper law is called 'magic'; known are viscous"),
         ({'law': 'viscous', 'slope': 5.0}, "'slope' is no parameter of the viscous damper"),
         (ViscousDamper(-5.0), r'damping_coefficient \(-5 N s/m\) must lie within 1 \.\.'),

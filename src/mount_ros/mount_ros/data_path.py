@@ -73,7 +73,7 @@ class DataPath:
         self.lockstep = lockstep
         self.refused, self.refusal = 0, ''
         self._thread = thread or DataThread(owner.context, on_failure)
-        self._direct = thread is not None and not lockstep
+        self._direct = thread is not None and thread.shared and not lockstep
         self.node = io_node(owner, name)
         self.publisher_watch = PublisherWatch(self.node, on_conflict)
         """Who publishes the subscribed topics; `on_conflict` is called when others begin or cease to."""

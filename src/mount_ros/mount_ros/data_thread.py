@@ -55,12 +55,10 @@ class DataThread:
     each waiting or later `change` raises `DataThreadEndedError`; `remove` and `remove_poll` return.
     """
 
-    def __init__(
-        self,
-        context: Context,
-        on_failure: Callable[[str], None] = lambda sentence: None,
-    ):
+    def __init__(self, context: Context, on_failure: Callable[[str], None] = lambda sentence: None):
         self.failure = ''
+        self.shared = True
+        """Whether more than one node may be served."""
         self.local_topics: dict[str, LocalTopic] = defaultdict(LocalTopic)
         """By full name: messages pass directly between the nodes that share this thread."""
         self._context = context

@@ -21,8 +21,6 @@ class Loop:
 
 
 class FakeThreads:
-    own = WATCH
-
     def __init__(self, permitted=True):
         self.priorities = dict.fromkeys(NAMES, 0)
         self.shown = dict(NAMES)
@@ -52,6 +50,7 @@ def system(monkeypatch):
     system = FakeThreads()
     system.bounds = []
     system.now = 0.0
+    monkeypatch.setattr(real_time.threading, 'get_native_id', lambda: WATCH)
     monkeypatch.setattr(real_time, 'limit_without_sleep', lambda *limits: system.bounds.append(limits))
     return system
 
@@ -130,7 +129,7 @@ def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     whole.begin(loop)
     assert worked(whole, system, 0.75) == ''
     said = worked(whole, system, 0.9)
-    assert re.search(r'thread data used 0\.\d\d of a core in 1 s \(limit 0\.8\); lower the load', said)
+    assert re.search(r'thread data used 0\.\d\d of a core in 1\.\d s \(limit 0\.8\); lower the load', said)
     whole.check()
     assert not system.prioritised()
     whole.end(loop)

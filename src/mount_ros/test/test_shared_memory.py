@@ -45,7 +45,6 @@ def test_what_nobody_holds_is_removed_and_what_is_held_or_new_stays(tmp_path):
         fcntl.flock(of_several, fcntl.LOCK_SH)
         remove_abandoned(tmp_path, youngest=0.0)
     assert _files(tmp_path) == sorted([*kept, *shared])
-    remove_abandoned(tmp_path / 'nowhere')
 
 
 def test_what_a_killed_node_has_left_is_removed(domain):

@@ -63,7 +63,7 @@ def _top(
 
 def prepare() -> None:
     """Compile the laws for this machine, for drives and workers of a fleet; done by the set-up."""
-    from engine_mount.fleet.prepare import prepare
+    from engine_mount.fleet.example import prepare
 
     with terminal().status('compiling the laws for this machine (once, about half a minute)'):
         prepare()

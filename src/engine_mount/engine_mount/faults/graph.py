@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +24,8 @@ PATIENCE = 30.0  # s, chosen: for what happens in a second or two on a machine t
 SHARED_MEMORY = Path('/dev/shm')
 START_PATIENCE = 90.0  # s, chosen: a first start may compile the laws
 LOOK_PERIOD = 0.005  # s
+TIED = ('setpriv', '--pdeathsig', 'KILL')
+"""Words before a command by which the kernel ends it with the process that starts it (util-linux)."""
 _SETTLED = 0.3  # s, chosen: of current without a break counts as damping
 _TRACEBACK = 'Traceback (most recent call last)'
 _CODES = (0, 1, 130, -9)  # of `drive`: nothing wrong, something wrong, interrupted, killed
@@ -81,7 +82,7 @@ class GraphUnderTest:
         self._log = place.folder / f'{namespace}.log'
         with self._log.open('wb') as log:
             self.process = subprocess.Popen(
-                tied(command),
+                [*TIED, *command],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -189,7 +190,7 @@ class GraphUnderTest:
             self._shared |= _shared_memory(process)
 
     def _running(self) -> list[psutil.Process]:
-        return [each for each in self._processes if _runs(each)]
+        return [each for each in self._processes if runs(each)]
 
     def _left_behind(self) -> list[str]:
         """Return its processes, files of shared memory and locks that are still there."""
@@ -211,12 +212,12 @@ def _family(pid: int) -> list[psutil.Process]:
     """Return a process and all that it has started, those that have these, and so on, that still run."""
     try:
         process = psutil.Process(pid)
-        return [each for each in (process, *process.children(recursive=True)) if _runs(each)]
+        return [each for each in (process, *process.children(recursive=True)) if runs(each)]
     except psutil.NoSuchProcess:
         return []
 
 
-def _runs(process: psutil.Process) -> bool:
+def runs(process: psutil.Process) -> bool:
     """Return whether it still runs; a zombie does not, nor a later process of the same number."""
     try:
         return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
@@ -239,21 +240,3 @@ def _shared_memory(process: psutil.Process) -> set[str]:
     except psutil.Error:
         return set()
     return {path.name for path in paths if path.parent == SHARED_MEMORY}
-
-
-_TIED = """
-import ctypes, os, signal, sys
-ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG of Linux, linux/prctl.h; it outlives exec
-if os.getppid() != int(sys.argv[1]):  # it ended before
-    sys.exit(1)
-os.execvp(sys.argv[2], sys.argv[2:])
-"""
-
-
-def tied(command: Sequence[str]) -> list[str]:
-    """Return the command that runs `command`, a foreign program, and is killed when this process ends.
-
-    By the kernel, whatever ends this process (prctl(2)): a process that knows its starter ends by itself. To
-    be started by a thread that lives as long as this process; what `command` starts in turn is its own.
-    """
-    return [sys.executable, '-I', '-S', '-c', _TIED, str(os.getpid()), *command]

@@ -45,7 +45,6 @@ class Outcome:
     highest_current_a: float = 0.0  # on the bus while it lasted
     complaints: list[str] = field(default_factory=list)
     late: list[str] = field(default_factory=list)  # complaints about time alone
-    earlier: list[str] = field(default_factory=list)  # what was wrong with trials before this one
     seen: bool = False  # the fault was injected
 
     @property

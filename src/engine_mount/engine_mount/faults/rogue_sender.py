@@ -31,6 +31,7 @@ from mount_ros.messages.scalars import ScalarsLayout, stamp_of
 from mount_ros.nodes.process import ros_context
 from mount_ros.nodes.shutdown import end_process
 
+Reply = Callable[[bytes], bytes | None]
 Step = Callable[[], object]
 """Sends what is due in one period."""
 
@@ -105,19 +106,16 @@ _SOUND = (0.0, 1.0, 3.0), (0.0, 500.0, 1000.0)
 _EVENT = string_message('flood ' + 'x' * 100)
 
 ON_BUS = {'can_host': second_host, 'can_electronics': second_electronics}
-REPLIES = {
+MESSAGES: dict[str, tuple[topics.Topic, Reply | Iterator[bytes]]] = {
     'current_setpoint': (topics.CURRENT_SETPOINT, setpoint),
     'displacement': (topics.DISPLACEMENT, displacement),
-}
-"""{kind: topic, and what is published of each displacement}."""
-MESSAGES = {
     'air_gap': (topics.AIR_GAP, air_gap()),
     'table': (topics.CURRENT_FORCE_TABLE, table(*_SOUND)),
     'table_old': (topics.CURRENT_FORCE_TABLE, table(*_SOUND, 1_000_000_000)),
     'table_not_monotone': (topics.CURRENT_FORCE_TABLE, table((0.0, 2.0, 1.0), (0.0, 300.0, 500.0))),
     'flood_topic': (topics.EVENT, itertools.repeat(_EVENT)),
 }
-"""{kind: topic, and its messages, a few in each period until there are no more}."""
+"""{kind: topic, and what is published of each displacement, or messages, a few in each period}."""
 
 
 def _bus_step(kind: str, port: int, stack: ExitStack) -> Callable[[], Step]:
@@ -139,25 +137,25 @@ def _node_step(kind: str, domain: int, namespace: str, stack: ExitStack) -> Call
         return lambda: lambda: next(turns) and client.call_async(GetParameters.Request(names=['damper']))
     path = DataPath(node)
     stack.callback(path.stop)
+    topic, sent = MESSAGES[kind]
+    reply, messages = (sent, iter(())) if callable(sent) else (None, sent)
     senders: list[Callable[[bytes], None]] = []
 
     def send_reply(raw: bytes) -> None:
         for send in senders:
-            if (message := REPLIES[kind][1](raw)) is not None:
+            if reply and (message := reply(raw)) is not None:
                 send(message)
 
-    if kind in REPLIES:
+    if reply:
         path.subscribe(topics.DISPLACEMENT, send_reply)
         path.start()
 
     def begin() -> Step:
         """Publish once a node subscribes, or `_MATCH_LIMIT` is over."""
-        topic = (REPLIES | MESSAGES)[kind][0]
         send, end = path.sender(topic), time.monotonic() + _MATCH_LIMIT
         while path.unmatched() and time.monotonic() < end:
             time.sleep(0.01)
         senders.append(send)
-        messages = MESSAGES[kind][1] if kind in MESSAGES else iter(())
         return lambda: [send(message) for message in itertools.islice(messages, _AT_ONCE)]
 
     return begin

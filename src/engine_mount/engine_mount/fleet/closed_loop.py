@@ -18,8 +18,16 @@ from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import has
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import CoreChain, run_core_into
-from engine_mount.fleet.figures import AnswerFigures, compared_answers, difference, ordered_sum
-from engine_mount.fleet.setpoints import Compared, Parameters, Recorded, changed_parameters
+from engine_mount.fleet.setpoints import (
+    AnswerFigures,
+    Compared,
+    Parameters,
+    Recorded,
+    changed_parameters,
+    compared_answers,
+    difference,
+    ordered_sum,
+)
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import session_parameters
 from engine_mount.reports.fleet.looks import Signals

@@ -4,8 +4,9 @@ import hashlib
 import math
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,17 +16,16 @@ import yaml
 import engine_mount
 from engine_mount.drives.drive import check_drive, parameters_of_session
 from engine_mount.drives.loop.recording import record_core
+from engine_mount.fleet.places import places
 from engine_mount.fleet.runner import Done, run_tasks
 from engine_mount.recordings.cut import cut
 from engine_mount.settings.mounts import settings_of_mounts
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.settings import checked_settings
-from mount_recorder.bag_writer import BagWriter
+from mount_control.policy.registry import POLICIES
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
-from mount_ros.messages.cdr import accelerometer
-from mount_ros.messages.scalars import OneNumberLayout
 from mount_sim.excitation.scenario import SweepScenario
 from mount_sim.plant.mounts import with_control_of_mount
 
@@ -34,7 +34,7 @@ Settings = Mapping[str, Any]
 _DECLARED = yaml.safe_load(Path(__file__).with_name('example.yaml').read_text(encoding='utf-8'))
 DRIVES: Mapping[str, Settings] = _DECLARED['drives']
 VARIATIONS: Mapping[str, Settings] = _DECLARED['variations']
-DAMAGES = ('truncated', 'no_metadata', 'garbage', 'no_data', 'wrong_checksum', 'foreign')
+DAMAGES = ('truncated', 'no_metadata', 'garbage', 'no_data', 'wrong_checksum')
 
 WHOLE_FLEET = len(DRIVES) * len(VARIATIONS)
 FEWEST = len(DAMAGES) + 1
@@ -169,18 +169,24 @@ def _spoil(folder: Path, damage: str) -> None:
         case 'wrong_checksum':
             middle = len(content) // 2
             file.write_bytes(content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :])
-        case 'foreign':
-            shutil.rmtree(folder)
-            _write_foreign(folder, random)
 
 
-def _write_foreign(folder: Path, random: np.random.Generator) -> None:
-    """Write a bag of another system, which holds 5 s of an acceleration and no displacement."""
-    writer, imu = BagWriter(folder), OneNumberLayout(accelerometer)
-    try:
-        writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
-        for place, value in enumerate(random.normal(0.0, 0.3, 500)):
-            stamp = place * 10_000_000  # ns
-            writer.write('/imu/data', imu.pack(stamp, float(value)), stamp)
-    finally:
-        writer.close()
+def prepare(
+    scenarios: Sequence[str] = ('bench', 'motorway'), policies: Sequence[str] = tuple(POLICIES)
+) -> None:
+    """Compile for these scenarios and policies, or load what is compiled already.
+
+    A worker of a fleet that compiles by itself takes some 45 MiB more.
+    """
+    from engine_mount.fleet import catalogue, replay  # load more than an example needs
+
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (scenario, policy) in enumerate(product(scenarios, policies)):
+            drive = {'sim': {'scenario': scenario}, 'control': {'policy': policy}}
+            make_one(Ordered(Path(folder) / f'{scenario}_{policy}', number, drive, {}))
+        for place in places([folder]).values():
+            catalogue.rows_of(Path(place.uri), place)
+            for closed_loop in (False, True):
+                replay.rows_of(
+                    Path(place.uri), place, {'mount_control': {'highest_current': 1.0}}, closed_loop
+                )

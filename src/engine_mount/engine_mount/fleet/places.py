@@ -28,7 +28,7 @@ class Place(NamedTuple):
 
     uri: str
     recording: str
-    size: int
+    size_bytes: int
     fingerprint: str
 
 
@@ -46,11 +46,6 @@ def root_of(uri: str) -> str:
     if is_uri(uri) and scheme_of(uri) != 'file':
         return uri.rstrip('/')
     return os.path.abspath(local_path(uri))
-
-
-def is_below(uri: str, roots: Iterable[str]) -> bool:
-    """Return whether `uri` is one of `roots` or lies below one."""
-    return any(f'{uri}/'.startswith(f'{root.rstrip("/")}/') for root in map(root_of, roots))
 
 
 def select_recordings(sources: Sequence[str]) -> list[Place]:

@@ -1,6 +1,5 @@
 """Questions to the tables of a fleet, in SQL, answered by DuckDB from the Parquet files of a folder."""
 
-import difflib
 import json
 import os
 import shlex
@@ -9,11 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import ORDER
-from engine_mount.fleet.places import SelectionError, select_recordings
+from engine_mount.fleet.job import JOURNAL, ORDER
 from engine_mount.fleet.tables import COLUMNS, NEEDED_FOR
 from engine_mount.signals.extras import required
-from engine_mount.signals.sources.source import SourceError
 
 if TYPE_CHECKING:
     import pyarrow
@@ -42,10 +39,9 @@ class QueryError(ValueError):
 
 
 class Worst(NamedTuple):
-    """A row of a table, its value in the column of the question, its place, and commands that open it."""
+    """A row of a table, its place, and commands that open it."""
 
     row: Mapping[str, Any]
-    value: float
     uri: str
     commands: list[str]
 
@@ -94,17 +90,15 @@ def tables_of(folder: str | os.PathLike[str]) -> dict[str, 'pyarrow.dataset.Data
     dataset, folder = required('pyarrow.dataset', NEEDED_FOR), Path(folder)
     if folder.is_file():
         raise QueryError(f'{folder} is a file; name the folder that it is in, {folder.parent}')
-    there = _files(folder)
-    is_result = (folder / ORDER).is_file()
-    if not there and is_result:
-        raise QueryError(f'{folder} is not finished; the same engine-mount fleet replay goes on with it')
+    there, order = _files(folder), folder / ORDER
     if not there:
         raise QueryError(
             f'{folder} holds no table of a fleet ({", ".join(f"{name}.parquet" for name in COLUMNS)}); '
-            'engine-mount fleet index or replay makes one'
+            'engine-mount fleet index or replay makes one, or goes on where it stopped'
         )
-    for source in _sources(folder) if is_result else ():
-        there = _files(Path(source)) | there
+    if order.is_file():
+        for source in json.loads(order.read_text(encoding='utf-8'))['asked_for']:
+            there = _files(Path(source)) | there
     try:
         return {name: dataset.dataset(file, format='parquet') for name, file in there.items()}
     except (OSError, ValueError) as error:
@@ -120,27 +114,24 @@ def result_of(folder: str | os.PathLike[str]) -> 'pyarrow.Table':
     return table
 
 
-def worst(folder: str | os.PathLike[str], by: str, count: int = 10, *, lowest: bool = False) -> list[Worst]:
+def worst(folder: str | os.PathLike[str], by: str, count: int = 10) -> list[Worst]:
     """Return the rows with the largest absolute values of column `by`, the largest first.
 
-    Of a result, or where there is none of a catalogue. `lowest`: those with the smallest values instead.
-    Rows without a number are left out; equal ones stand by the names of their recordings. Raises
-    `QueryError`.
+    Of a result, or where there is none of a catalogue. Rows without a number are left out; equal ones stand
+    by the names of their recordings. Raises `QueryError`.
     """
     tables = tables_of(folder)
     name = 'result' if 'result' in tables else 'recordings'
     numbers = [field.name for field in tables[name].schema if str(field.type) in ('double', 'int64')]
     if by not in numbers:
-        near = difflib.get_close_matches(by, numbers, n=3)
-        hint = f'did you mean {" or ".join(near)}?' if near else f'there are {", ".join(numbers)}'
-        raise QueryError(f'{by!r} is no column of numbers of {name}; {hint}')
-    order = f'"{by}"' if lowest else f'abs("{by}") desc'
-    sql = f'select * from {name} where "{by}" is not null order by {order}, recording, mount limit {count}'
+        raise QueryError(f'{by!r} is no column of numbers of {name}; there are {", ".join(numbers)}')
+    order = f'abs("{by}") desc, recording, mount'
+    sql = f'select * from {name} where "{by}" is not null order by {order} limit {count}'
     places = _places(Path(folder)) if name == 'result' else {}
     found = []
     for row in query(folder, sql).to_pylist():
         uri = row.get('uri') or places.get(row['recording'], row['recording'])
-        found.append(Worst(row, float(row[by]), uri, _commands(row, uri)))
+        found.append(Worst(row, uri, _commands(row, uri)))
     return found
 
 
@@ -160,26 +151,17 @@ def _commands(row: Mapping[str, Any], uri: str) -> list[str]:
 
 
 def _places(folder: Path) -> dict[str, str]:
-    """Return {recording: URI} of the recordings of a result, looked up where its order found them."""
-    try:
-        return {place.recording: place.uri for place in select_recordings(_sources(folder))}
-    except (SelectionError, SourceError) as error:
-        raise QueryError(
-            f'where the recordings of {folder} lie is not known: {error}; what was moved is found by a link '
-            'where it was'
-        ) from None
+    """Return {recording: URI} of the recordings of a result, by its journal."""
+    with (folder / JOURNAL).open(encoding='utf-8') as lines:
+        next(lines)  # the columns
+        answers = [json.loads(line) for line in lines]
+    return {row['recording']: uri for uri, _, rows in answers for row in rows['result']}
 
 
 def _files(folder: Path) -> dict[str, Path]:
     """Return the tables that are in a folder, by their names."""
     files = {name: folder / f'{name}.parquet' for name in COLUMNS}
     return {name: file for name, file in files.items() if file.is_file()}
-
-
-def _sources(folder: Path) -> list[str]:
-    """Return the places that the result in a folder was made of."""
-    sources: list[str] = json.loads((folder / ORDER).read_text(encoding='utf-8'))['asked_for']
-    return sources
 
 
 def _sentence(reason: str, sql: str, tables: Mapping[str, 'pyarrow.dataset.Dataset']) -> str:

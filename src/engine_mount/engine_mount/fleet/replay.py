@@ -4,13 +4,12 @@ import functools
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import JobProgress, Rows, TableJob
+from engine_mount.fleet.job import Rows, TableJob
 from engine_mount.fleet.places import Place, root_of, select_recordings
-from engine_mount.fleet.runner import LOCAL, processes_for
 from engine_mount.fleet.setpoints import (
     Compared,
     Parameters,
@@ -21,6 +20,7 @@ from engine_mount.fleet.setpoints import (
 )
 from engine_mount.fleet.tables import Row
 from engine_mount.recordings.place import open_mount, open_run, recording_hash, recording_place
+from engine_mount.recordings.session import versions_told
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import NoEffectError
 from engine_mount.signals.sources.stores import local_copy
@@ -52,7 +52,7 @@ def replay_fleet(
     changes: Parameters,
     out: Path,
     closed_loop: bool = False,
-    progress: Callable[[JobProgress], None] = lambda progress: None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
     **options: Any,
 ) -> Replayed:
     """Replay the recordings of catalogues, URIs and paths into the folder `out`, as recorded and changed.
@@ -76,25 +76,17 @@ def replay_fleet(
     done = job.run(recordings, progress, json.loads(json.dumps(order, default=list)), **options)
     table = done.tables['result']
     outcomes = count_outcomes(table.select(['recording', 'outcome']).to_pylist())
-    read = [answer.rows['result'] for answer in done.read]
-    processes = len({answer.worker for answer in done.read} - {''})
-    if options.get('scheduler', LOCAL) == LOCAL:  # where one was lost, another one took its place
-        processes = min(processes, processes_for(options.get('workers', 0), len(done.read)))
-    wall, busy = time.monotonic() - begin, sum(answer.busy for answer in done.read)
-    replayed = sum(max(row.get('duration_s') or 0.0 for row in rows) for rows in read)
+    wall = time.monotonic() - begin
+    replayed = sum(max(row.get('duration_s') or 0.0 for row in each.rows['result']) for each in done.read)
     figures = {
         'recordings': len(recordings),
         'replayed': outcomes[REPLAYED],
         'another_policy': outcomes[ANOTHER_POLICY],
         'failed': outcomes[FAILED],
-        'done_before': len(recordings) - len(read),
+        'done_before': len(recordings) - len(done.read),
         'wall_s': wall,
-        'starting_s': done.starting,
-        'processor_s': busy,
         'replayed_s': replayed,
-        'real_time_factor_per_core': replayed / (wall * processes) if processes else None,
-        'real_time_factor_per_processor_s': replayed / busy if busy else None,
-        'workers': processes,
+        'real_time_factor': replayed / wall,
         'result': str(out / 'result.parquet'),
     }
     not_fetched = [row for answer in done.read if not answer.fingerprint for row in answer.rows['result']]
@@ -106,17 +98,13 @@ def rows_of(path: Path, place: Place, changes: Parameters, closed_loop: bool = F
 
     What cannot be replayed has its reason there.
     """
-    common = {'recording': place.recording, 'size_bytes': place.size, **_common(changes, closed_loop)}
-
-    def without_figures(error: ValueError) -> Row:
-        outcome = ANOTHER_POLICY if isinstance(error, NoEffectError) else FAILED
-        return {'reason': str(error).replace(str(path), place.recording), 'outcome': outcome}
-
+    common = {'recording': place.recording, 'size_bytes': place.size_bytes, **_common(changes, closed_loop)}
     try:
         opened = open_run(path)
     except ValueError as error:
-        unread = {'sha256': recording_hash(recording_place(path)), 'mount': ''}
-        return {'result': [common | unread | without_figures(error)]}
+        reason = str(error).replace(str(path), place.recording)
+        unread = {'sha256': recording_hash(recording_place(path))}
+        return {'result': [each | unread for each in _failure(place, reason, common)['result']]}
     whole = functools.cache(lambda: recording_hash(opened.path))  # once, and where it is needed
     rows = []
     for recording in opened.by_mount():
@@ -126,9 +114,11 @@ def rows_of(path: Path, place: Place, changes: Parameters, closed_loop: bool = F
             check_concerned(recorded, changes)
             whole()  # the checksum of the file is taken in the same pass
             row |= _compare(recorded, changes, closed_loop).row
-            row |= {'reason': '', 'outcome': REPLAYED, 'recorded_with': _version(recorded)}
+            version = versions_told(recorded.session).get('mount_bringup', '')
+            row |= {'reason': '', 'outcome': REPLAYED, 'recorded_with': version}
         except ValueError as error:
-            row |= without_figures(error)
+            outcome = ANOTHER_POLICY if isinstance(error, NoEffectError) else FAILED
+            row |= {'reason': str(error).replace(str(path), place.recording), 'outcome': outcome}
         rows.append(row)
     if any(row['outcome'] != ANOTHER_POLICY for row in rows):
         rows = [{'sha256': whole(), **row} for row in rows]
@@ -146,10 +136,8 @@ def signals_of(uri: str, changes: Parameters, mount: str = '', closed_loop: bool
 
 def count_outcomes(rows: Iterable[Row]) -> dict[str, int]:
     """Return how many recordings have each outcome."""
-    found: dict[str, str] = {}
-    for row in rows:
-        outcomes = (row['outcome'], found.get(row['recording'], row['outcome']))
-        found[row['recording']] = max(outcomes, key=_OF_SEVERAL.index)
+    rising = sorted(rows, key=lambda row: _OF_SEVERAL.index(row['outcome']))
+    found = {row['recording']: row['outcome'] for row in rising}
     counts = Counter(found.values())
     return {outcome: counts[outcome] for outcome in _OF_SEVERAL}
 
@@ -164,7 +152,7 @@ def _compare(recorded: Recorded, changes: Parameters, closed_loop: bool) -> Comp
 
 def _failure(place: Place, reason: str, common: Row) -> Rows:
     """Return the row of a recording that could not be read."""
-    unread = {'recording': place.recording, 'mount': '', 'size_bytes': place.size}
+    unread = {'recording': place.recording, 'mount': '', 'size_bytes': place.size_bytes}
     return {'result': [common | unread | {'reason': reason, 'outcome': FAILED}]}
 
 
@@ -176,9 +164,3 @@ def _common(changes: Parameters, closed_loop: bool) -> Row:
         'replayed_with': json.dumps(replayed_with, sort_keys=True),
         'changes': json.dumps(changes, sort_keys=True, default=list),
     }
-
-
-def _version(recorded: Recorded) -> str:
-    """Return with which version of this project a recording was made, empty where it does not tell."""
-    told = recorded.session.get('versions')
-    return str(told.get('mount_bringup', '')) if isinstance(told, Mapping) else ''

@@ -12,7 +12,6 @@ import os
 import pickle
 import signal
 import threading
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -27,7 +26,6 @@ LOSSES = 3
 
 _LOST = f'{LOSSES} workers were lost with it: killed, or out of memory'
 _NICENESS = 10  # chosen: the user of the machine comes first
-_MEMORY_CHECK = 0.1  # s, chosen
 _PR_SET_PDEATHSIG = 1  # Linux, linux/prctl.h
 _LIMIT = 10.0  # s, chosen: for a cluster to answer, and to be left
 _OF_WORKERS = (
@@ -38,7 +36,6 @@ _OF_WORKERS = (
     'PYTHONSAFEPATH',
 )
 _LOGGERS = ('distributed', 'distributed.client', 'tornado', 'tornado.application', 'asyncio')
-_GROUP_LIMIT = Path('/sys/fs/cgroup/memory.max')  # cgroups(7)
 
 
 class SchedulerLostError(ConnectionError):
@@ -58,49 +55,33 @@ class Done(NamedTuple):
 
 
 def run_tasks(
-    work: Callable[[Any], Any],
-    items: Sequence[Any],
-    *,
-    scheduler: str = LOCAL,
-    workers: int = 0,
-    memory: int = 0,
+    work: Callable[[Any], Any], items: Sequence[Any], *, scheduler: str = LOCAL, workers: int = 0
 ) -> Iterator[Done]:
     """Yield `work(item)` of each item as it is done, in any order.
 
-    `scheduler` is `local` (`workers` processes of this machine, 0 for one on each core; each ends beyond
-    `memory` bytes, 0 for its share of the machine's) or the address of a Dask cluster, tcp://HOST:PORT. One
-    that raises is a `Done` with its reason. A task whose worker is lost is run again, at the end, and given
-    up after `LOSSES` workers. Raises `SchedulerLostError` where the cluster does not answer, and
-    `ChildProcessError` where no process can start.
+    `scheduler` is `local` (`workers` processes of this machine, 0 for one on each core) or the address of a
+    Dask cluster, tcp://HOST:PORT. One that raises is a `Done` with its reason. A task whose worker is lost is
+    run again, at the end, and given up after `LOSSES` workers. Raises `SchedulerLostError` where the cluster
+    does not answer, and `ChildProcessError` where no process can start.
     """
     if not items:
         return iter(())
     if scheduler == LOCAL:
-        return _run_here(work, items, processes_for(workers, len(items)), memory)
+        return _run_here(work, items, min(workers or len(os.sched_getaffinity(0)), len(items)))
     return _run_on_cluster(work, items, scheduler)
-
-
-def processes_for(workers: int, tasks: int) -> int:
-    """Return how many processes of this machine work at a time; `workers` 0 is one for each core."""
-    return min(workers or len(os.sched_getaffinity(0)), tasks)
 
 
 class _Worker:
     """A process with a pipe of its own: killed while it sends a result, it holds up no other one."""
 
-    def __init__(self, memory: int):
+    def __init__(self) -> None:
         context = multiprocessing.get_context('spawn')  # this process may hold threads of middleware
         self.pipe, theirs = context.Pipe()
         self.is_ready = False
-        self._process = context.Process(target=_serve, args=(theirs, os.getpid(), memory), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, os.getpid()), daemon=True)
         with _environment_of_workers():
             self._process.start()
         theirs.close()
-
-    def begin(self, task: bytes) -> None:
-        """Hand over a task; a worker that is lost by then is noticed by its pipe."""
-        with contextlib.suppress(OSError):
-            self.pipe.send_bytes(task)
 
     def end(self) -> None:
         """Kill the process."""
@@ -109,21 +90,21 @@ class _Worker:
         self.pipe.close()
 
 
-def _run_here(work: Callable, items: Sequence[Any], count: int, memory: int) -> Iterator[Done]:
+def _run_here(work: Callable, items: Sequence[Any], count: int) -> Iterator[Done]:
     import cloudpickle  # only where tasks leave this process
 
-    limit = memory or _memory_of_machine() // (os.cpu_count() or 1)
     waiting, losses, failed_starts = deque(range(len(items))), Counter[int](), 0
     workers: dict[Any, _Worker] = {}  # by their pipes
     under_way: dict[Any, int] = {}
     try:
         while waiting or under_way:
             while waiting and len(workers) < count:
-                worker = _Worker(limit)
+                worker = _Worker()
                 workers[worker.pipe] = worker
             for pipe in list(workers.keys() - under_way)[: len(waiting)]:
                 under_way[pipe] = waiting.popleft()
-                workers[pipe].begin(cloudpickle.dumps((work, items[under_way[pipe]])))
+                with contextlib.suppress(OSError):  # a worker that is lost by then is noticed below
+                    pipe.send_bytes(cloudpickle.dumps((work, items[under_way[pipe]])))
             for pipe in wait(list(under_way)):
                 worker, place = workers[pipe], under_way[pipe]
                 try:
@@ -179,37 +160,20 @@ def _environment_of_workers() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
-def _memory_of_machine() -> int:
-    """Return how many bytes this machine has, or its group of processes may take."""
-    whole = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE')
-    with contextlib.suppress(OSError, ValueError):  # no group, or one without a limit
-        return min(whole, int(_GROUP_LIMIT.read_text(encoding='ascii')))
-    return whole
-
-
-def _serve(pipe: Connection, starter: int, memory: int) -> None:
+def _serve(pipe: Connection, starter: int) -> None:
     """Do pickled tasks from a pipe, one after the other, until it is closed.
 
-    The process ends with its starter and beyond `memory` bytes, at a low priority.
+    The process has a low priority, ends with its starter, and is the first to end where memory does.
     """
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != starter:  # it ended before
         os.kill(os.getpid(), signal.SIGKILL)
     os.nice(_NICENESS)
-    threading.Thread(target=_limit_memory, args=(memory,), name='memory', daemon=True).start()
+    Path('/proc/self/oom_score_adj').write_text('1000', encoding='ascii')  # proc(5)
     pipe.send(None)  # it has begun to work
     with contextlib.suppress(EOFError):
         while True:
             pipe.send_bytes(_perform(pipe.recv_bytes()))
-
-
-def _limit_memory(memory: int) -> None:
-    page = os.sysconf('SC_PAGE_SIZE')
-    while True:
-        with open('/proc/self/statm', encoding='ascii') as file:  # proc(5)
-            if int(file.read().split()[1]) * page > memory:
-                os.kill(os.getpid(), signal.SIGKILL)
-        time.sleep(_MEMORY_CHECK)
 
 
 def _perform(task: bytes) -> bytes:

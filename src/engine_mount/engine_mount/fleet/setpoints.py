@@ -1,13 +1,17 @@
-"""One recording as recorded and with a change, both through the core controller."""
+"""One recording as recorded and with a change, both through the core controller; the figures of its row.
+
+Sums are in the order of the samples.
+"""
 
 import math
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine_mount.drives.agreement import SETTLED, SETTLING
-from engine_mount.drives.core import ControlReplay, run_ramp
+from engine_mount.drives.core import ControlAnswers, ControlReplay
 from engine_mount.drives.inputs.consumed_samples import (
     Column,
     Notes,
@@ -30,12 +34,13 @@ from engine_mount.drives.inputs.input import (
     without,
 )
 from engine_mount.drives.replay import check_parameters, refuse_other_rate, with_changes
-from engine_mount.fleet.figures import AnswerFigures, compared_answers, difference
+from engine_mount.recordings.events import paired_switchings, switching_times
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.times import each_once
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import check_effect, control_parameters
 from engine_mount.signals.importing.provenance import SCENARIO
+from mount_models.arithmetic.sums import each_interpolated
 from mount_ros.topics import (
     AIR_GAP,
     CONTROL_TRACE,
@@ -95,20 +100,17 @@ def compare_setpoints(recorded: Recorded, changes: Parameters) -> Compared:
 
     Raises a `ValueError` with the reason where there is nothing to answer.
     """
+    if 'mount_init' in changes:
+        raise ReplayError(
+            'parameters of mount_init change nothing that a fleet replays; try them with --closed-loop, '
+            'or on one recording with engine-mount replay'
+        )
     recording, parameters = recorded.recording, recorded.parameters
     changed = changed_parameters(recorded, changes)
     is_imported = recorded.session.get('scenario') == SCENARIO  # such a recording holds no gap
     gaps = recorded_gaps(recording, default_gap({}).dated(0) if is_imported else None)
-    ramps = []
-    if 'mount_init' in changes or len(gaps) > 1:  # replayed, or between two runs of the controller
-        ramps = ramps_of(recording, parameters, gaps, Notes())
-    changed_gaps = {}
-    if 'mount_init' in changes:
-        if not ramps:
-            raise ReplayError(
-                'there is no initialisation to replay, so parameters of mount_init change nothing'
-            )
-        changed_gaps = {gap.stamp: gap for gap in (run_ramp(ramp, changed).gap for ramp in ramps)}
+    # a ramp is of interest between two runs of the controller only
+    ramps = ramps_of(recording, parameters, gaps, Notes()) if len(gaps) > 1 else []
     answers = _recorded_answers(recording, parameters)
     control = control_parameters(parameters)
     runs = control_runs(displacement_of(recording), answers, ramps, gaps, control, Notes())
@@ -121,12 +123,12 @@ def compare_setpoints(recorded: Recorded, changes: Parameters) -> Compared:
     of_changed = without(told, changes.get('mount_control', {}))
     figures = AnswerFigures(), AnswerFigures()
     for run in runs:
-        gap = changed_gaps.get(run.gap.stamp, run.gap)
+        first, table = int(run.stamps[0]), run.gap.table
         replays = (
-            ControlReplay(int(run.stamps[0]), run.gap, parameters, told),
-            ControlReplay(int(run.stamps[0]), gap, changed, of_changed),
+            ControlReplay(first, run.gap, parameters, told),
+            ControlReplay(first, run.gap, changed, of_changed),
         )
-        for each, table in zip(figures, (run.gap.table, gap.table), strict=True):
+        for each in figures:
             each.begin_run(table.current, table.normal_force)
         for begin in range(0, len(run.stamps), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
@@ -184,3 +186,133 @@ def _agreement(time: Column, replayed: Column, recorded: Column, is_whole: bool)
         return {}
     is_same = not found.differing or (not is_whole and abs(found.largest) <= SETTLED)
     return {'as_recorded': is_same, 'as_recorded_largest_a': abs(found.largest)}
+
+
+class AnswerFigures:
+    """What one controller did: setpoints, damping, and the friction that its force model predicts."""
+
+    def __init__(self) -> None:
+        self._columns: dict[str, list[Column]] = defaultdict(list)
+        self._steps: list[
+            list[tuple[Times, Column]]
+        ] = []  # of each run: stamps (ns), how far damping is open
+        self._table: Sequence[Column] = ()
+
+    def begin_run(self, current: Column, normal_force: Column) -> None:
+        """Note that the controller was activated anew, with a table (A, N)."""
+        self._steps.append([])
+        self._table = [np.array(column, np.float64) for column in (current, normal_force)]
+
+    def add(self, answers: ControlAnswers) -> None:
+        """Take answers in the order of their samples; a trace that was not made is 0.
+
+        The friction is that at the normal force of the setpoint, which may be held below the wanted one.
+        """
+        is_damped = answers.traces['damping_active'] > 0.0
+        traces = answers.traces[is_damped]
+        force = traces['friction_coefficient'] * each_interpolated(answers.setpoints[is_damped], *self._table)
+        known = ~np.isnan(force)
+        # with the sign of the wanted force: the noise of the velocity, whose sign is as often wrong, cancels
+        power = np.copysign(force, traces['desired_force']) * traces['velocity']
+        columns = {'setpoint': answers.setpoints, 'force': force[known], 'power': power[known]}
+        for name, column in columns.items():
+            self._columns[name].append(column)
+        steps = answers.traces['damping_active'][answers.traced]
+        self._steps[-1].append((answers.stamps[answers.traced], steps))
+        self._columns['damped'].append(is_damped)
+
+    @property
+    def setpoints(self) -> Column:
+        """The setpoints (A) of all samples."""
+        return self._column('setpoint')
+
+    def switching(self, zero: int) -> tuple[Column, Column]:
+        """Return when damping went on and off, s from the stamp `zero` (ns) on."""
+        found = []
+        for run in self._steps:
+            stamps, active = (np.concatenate(each) for each in zip(*run, strict=True))
+            found.append(switching_times((stamps - zero) / 1e9, active))
+        on, off = (np.concatenate(each) for each in zip(*found, strict=True))
+        return on, off
+
+    def row(self, sample_time: float, changed: str = '') -> dict[str, Any]:
+        """Return the figures as columns, with `changed` (`_changed`) before their unit."""
+        setpoints, force = self.setpoints, self._column('force')
+        known = setpoints[~np.isnan(setpoints)]
+        return {
+            f'peak_current{changed}_a': known.max(initial=0.0) if known.size else math.nan,
+            f'mean_current{changed}_a': ordered_sum(known) / known.size if known.size else math.nan,
+            f'damping{changed}_s': np.count_nonzero(self._column('damped')) * sample_time,
+            f'peak_friction{changed}_n': force.max(initial=0.0),
+            f'rms_friction{changed}_n': math.sqrt(ordered_sum(force * force) / setpoints.size),
+            f'pad_energy{changed}_j': ordered_sum(self._column('power')) * sample_time,
+        }
+
+    def _column(self, name: str) -> Column:
+        return np.concatenate(self._columns[name])
+
+
+class Difference(NamedTuple):
+    """How values differ from others: counts, rms, the largest with its sign, and times in s; else NaN."""
+
+    compared: int
+    differing: int
+    rms: float
+    largest: float
+    largest_at: float
+    first_at: float
+
+
+def difference(time: Column, values: Column, others: Column) -> Difference:
+    """Return how `values` differ from `others`, both (n,) over `time` (s); NaN is compared with nothing."""
+    differences = values - others
+    known = ~np.isnan(differences)
+    time, differences = time[known], differences[known]
+    compared, places = differences.size, np.flatnonzero(differences)
+    if not compared:
+        return Difference(0, 0, *[math.nan] * 4)
+    largest = int(np.argmax(np.abs(differences)))
+    return Difference(
+        compared,
+        places.size,
+        math.sqrt(ordered_sum(differences * differences) / compared),
+        float(differences[largest]),
+        float(time[largest]) if places.size else math.nan,
+        float(time[places[0]]) if places.size else math.nan,
+    )
+
+
+def compared_answers(
+    time: Column, zero: int, answers: Sequence[AnswerFigures], sample_time: float
+) -> dict[str, Any]:
+    """Return what two controllers did and how it differs, as columns: as recorded, and with the change.
+
+    `time` (s) of their samples counts from the stamp `zero` (ns), `sample_time` in s.
+    """
+    before, after = answers
+    setpoints = difference(time, after.setpoints, before.setpoints)
+    on_and_off = [each.switching(zero) for each in answers]
+    changes = paired_switchings(*on_and_off, sample_time)
+    moved = [change.moved for change in changes if change.moved]
+    return {
+        'duration_s': time.size * sample_time,
+        'samples': time.size,
+        'setpoints_differing': setpoints.differing,
+        'setpoint_difference_rms_a': setpoints.rms,
+        'setpoint_difference_largest_a': setpoints.largest,
+        'setpoint_difference_largest_at_s': setpoints.largest_at,
+        'setpoint_difference_first_at_s': setpoints.first_at,
+        **before.row(sample_time),
+        **after.row(sample_time, '_changed'),
+        'switched_on': len(on_and_off[0][0]),
+        'switched_on_changed': len(on_and_off[1][0]),
+        'switchings_appeared': sum(change.time_a is None for change in changes),
+        'switchings_vanished': sum(change.time_b is None for change in changes),
+        'switchings_moved': len(moved),
+        'switching_moved_furthest_s': max(moved, key=abs, default=math.nan),
+    }
+
+
+def ordered_sum(values: Column) -> float:
+    """Return the sum of values (n,), added one after the other: `np.sum` has no order of its own."""
+    return float(np.cumsum(values)[-1]) if values.size else 0.0

@@ -4,34 +4,25 @@ Each of the first two returns a result with `figures()` in SI units, `report(scr
 and `specimen(name)`.
 """
 
-from __future__ import annotations
-
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from engine_mount.identification.actuator.calibration import ActuatorCalibration
-    from engine_mount.identification.coil.inductance import InductanceCalibration
-    from engine_mount.identification.rack import FileValues
-    from engine_mount.signals.mapping import Mapping
+from engine_mount.identification.fitting import Progress, silent
+from engine_mount.identification.force_law import ActuatorCalibration, fit_force_law
+from engine_mount.identification.inductance import InductanceCalibration, calibrate_inductance
+from engine_mount.identification.rack import RACK, FileValues, read_force, read_ripple
+from engine_mount.signals.mapping import Mapping, with_options
+from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT
+from mount_models.specimen import chosen_specimen
 
 Place = str | os.PathLike[str]
-Progress = Callable[[float, str], None]
 
 _FLOOR = 0.006  # chosen: weights as 2 N of 330 N
 
 
-def _silent(share: float, what: str) -> None:
-    pass
-
-
 def _mapping(columns: Mapping | dict[str, str] | None) -> Mapping:
-    from engine_mount.identification.rack import RACK
-    from engine_mount.signals.mapping import Mapping, with_options
-
     if isinstance(columns, Mapping):
         return columns
     texts = [f'{name}={text}' for name, text in (columns or {}).items()]
@@ -43,28 +34,20 @@ def actuator(
     *,
     columns: Mapping | dict[str, str] | None = None,
     values: FileValues | None = None,
-    orders: tuple[int, int, int, int, int] = (4, 4, 4, 2, 4),
     base: Place = '',
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> ActuatorCalibration:
     """Return the force law, Eqs (3) and (4), fitted to measured points of gap, current and force.
 
     `columns` is {quantity: 'COLUMN:UNIT'} for gap, current and force, `values` holds the gaps of single
-    files; `orders` are the numbers of coefficients of a1 .. a5. `base` is the specimen file that
-    gives all other values, the shipped one without. Raises `LawRefusedError` for outliers, too few gaps or
-    currents, and a law that is not positive, rising with the current and falling with the gap within the
-    measured range; and the readers' errors.
+    files. `base` is the specimen file that gives all other values, the shipped one without. Raises
+    `LawRefusedError` for outliers, too few gaps or currents, and a law that is not positive, rising with the
+    current and falling with the gap within the measured range; and the readers' errors.
     """
-    from engine_mount.identification.actuator.calibration import ActuatorCalibration
-    from engine_mount.identification.actuator.fit import fit_force_law
-    from engine_mount.identification.rack import FileValues, read_force
-    from mount_models.specimen import chosen_specimen
-
-    starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]
+    paths = [Path(file) for file in files]
     points = read_force(paths, _mapping(columns), values or FileValues())
-    floor = _FLOOR * float(points.force.max())
-    fit = fit_force_law(points.gap, points.current, points.force, orders, floor, progress)
-    return ActuatorCalibration(fit, starting, paths)
+    fit = fit_force_law(*points, _FLOOR * float(points.force.max()), progress)
+    return ActuatorCalibration(fit, chosen_specimen(str(base)), paths)
 
 
 def inductance(
@@ -82,17 +65,12 @@ def inductance(
 ) -> InductanceCalibration:
     """Return the gap curves L_0.2 and i_20 (Fig. 4), fitted to coil ripple recorded at known gaps.
 
-    The temperature with most recordings is that of the curves. With recordings at a second one the
-    compensation is measured, else it is stated from the conductivity's `coefficient` (1/K) and the force law
-    of the `base` (a specimen file, the shipped one without). `rest_current` (A), `crossing_inductance` (H),
-    `turns_area` (m^2) and `supply` (V) are those of the base without. Recordings at temperatures `held_out`
-    (degC) only judge. Raises `LawRefusedError` and the readers' errors.
+    The temperature with most recordings is that of the curves, recordings at a second one measure the
+    compensation; in between it goes by the conductivity's `coefficient` (1/K). `rest_current` (A),
+    `crossing_inductance` (H), `turns_area` (m^2) and `supply` (V) are those of the `base` (a specimen file,
+    the shipped one without) where they are not given. Recordings at temperatures `held_out` (degC) only
+    judge. Raises `LawRefusedError` and the readers' errors.
     """
-    from engine_mount.identification.coil.inductance import calibrate_inductance
-    from engine_mount.identification.rack import FileValues, read_ripple
-    from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT
-    from mount_models.specimen import chosen_specimen
-
     starting, paths = chosen_specimen(str(base)), [Path(file) for file in files]
     starting = replace(
         starting,
@@ -112,8 +90,8 @@ def rack(
     seed: int = 0,
     noise: float = 0.01,
     drawn: bool = False,
-    celsius: Sequence[float] = (20.0,),
-    progress: Progress = _silent,
+    celsius: Sequence[float] = (20.0, 80.0),
+    progress: Progress = silent,
 ) -> list[Path]:
     """Write recordings of the simulated rack into `folder`: force, ripple at 16 gaps, friction of the pads.
 

@@ -1,65 +1,176 @@
-"""Identify parameters from recordings: `friction` of the pads, and `drift` over many drives.
+"""Identify parameters from recordings: `friction` of the pads.
 
-Each function returns a result with `figures()` in SI units, `report(screen)` for people and `draw(file)`.
+It returns a result with `figures()` in SI units, `report(screen)` for people, `draw(file)` and
+`specimen(name)`. The laws that it fits and the checks of recordings: `engine_mount.identification.friction`.
 """
 
-from __future__ import annotations
-
+import functools
+import itertools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from engine_mount.identification.drift import DriftResult
-    from engine_mount.identification.friction.result import FrictionIdentification
-    from engine_mount.signals import mapping
+from engine_mount.identification.fitting import IdentificationError, Progress, silent
+from engine_mount.identification.friction.coefficients import fit_coefficients
+from engine_mount.identification.friction.files import friction_mapping, read_recording
+from engine_mount.identification.friction.ladder import Rung, fit_ladder, law_error
+from engine_mount.identification.friction.laws import all_laws
+from engine_mount.identification.friction.ramp_hold import fit_ramp_hold, mean_contact
+from engine_mount.identification.friction.recording import FrictionRecording
+from engine_mount.identification.friction.result import FrictionIdentification, Pair, validate
+from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
+from engine_mount.identification.friction.screening import case_of, subtract_zero
+from engine_mount.recordings.place import recording_hash
+from engine_mount.signals.mapping import Mapping
+from mount_models.specimen import chosen_specimen, friction_contact
 
-Place = str | os.PathLike[str]
+STEPS = ('auto', RAMP, SAWTOOTH, 'ladder')
+_Place = str | os.PathLike[str]
+_Recordings = list[tuple[FrictionRecording, str]]
 
 
 def friction(
-    train: Sequence[Place] = (),
-    held_out: Sequence[Place] = (),
+    train: Sequence[_Place] = (),
+    held_out: Sequence[_Place] = (),
     *,
-    files: Sequence[Place] = (),
+    files: Sequence[_Place] = (),
     step: str = 'auto',
     clamp: str = 'sliding',
     zero: str = '',
-    columns: mapping.Mapping | dict[str, str] | None = None,
+    columns: Mapping | dict[str, str] | None = None,
     seed: int = 0,
-    base: Place = '',
-    progress: Callable[[float, str], None] = lambda share, law: None,
+    base: _Place = '',
+    progress: Progress = silent,
 ) -> FrictionIdentification:
     """Return the friction contact in recordings, and which law is worth its parameters.
 
     Laws are fitted to `train` and judged by `held_out`; or trained on each of `files` and tried on each other
-    one, of one file on its halves. `step` is auto, or only ramp (step 1), sawtooth or ladder; `clamp` is the
-    normal force of a damper's JSON (sliding, rest, none), `zero` the source of the zero of the force (law,
-    rest, recorded; '' for the default of each kind of file). `columns` is
-    {quantity: 'COLUMN:UNIT'}. `base` is the specimen file that gives all other values, the shipped one
-    without. Raises `IdentificationError` and the readers' errors.
+    one. `step` is auto, or only ramp (step 1), sawtooth or ladder; `clamp` is the normal force of a damper's
+    JSON (sliding, rest, none), `zero` the source of the zero of the force (law, recorded; '' for the default
+    of each kind of file). `columns` is {quantity: 'COLUMN:UNIT'}. `base` is the specimen file that gives all
+    other values, the shipped one without. Raises `IdentificationError` and the readers' errors.
     """
-    from engine_mount.identification.friction.files import friction_mapping
-    from engine_mount.identification.friction.identification import identify_friction
-    from mount_models.specimen import chosen_specimen
-
     if isinstance(columns, dict):
         columns = friction_mapping([f'{name}={text}' for name, text in columns.items()])
-    paths = ([Path(place) for place in places] for places in (train, held_out, files))
-    return identify_friction(chosen_specimen(str(base)), *paths, step, clamp, zero, columns, seed, progress)
+    seen, unseen, others = ([Path(place) for place in places] for places in (train, held_out, files))
+    _check_order(seen, unseen, others, step)
+    result = FrictionIdentification(chosen_specimen(str(base)))
+    read = functools.partial(_read, result, step=step, clamp=clamp, zero=zero, mapping=columns)
+    if others:
+        _try_pairs(result, _moving(read(others, 'both')), progress, seed)
+        return result
+    training = read(seen, 'train')
+    result.held_out = _moving(read(unseen, 'held out'))
+    sawtooths = [each for each, kind in training if kind == SAWTOOTH]
+    if step != 'ladder':
+        result.ramps = [fit_ramp_hold(each) for each, kind in training if kind == RAMP]
+        if result.ramps:
+            result.contact, _ = mean_contact(result.ramps)
+        if sawtooths and step != RAMP:
+            _fit_coefficients(result, sawtooths)
+    moving = _moving(training)
+    if step in (RAMP, SAWTOOTH) or not moving:
+        return result
+    known = (result.contact, result.fit.coefficients) if result.contact and result.fit else None
+    result.rungs = fit_ladder(all_laws(moving, known), moving, result.held_out, progress, seed)
+    if not result.held_out:
+        result.notes.append('no recording is held out: training errors alone do not show which law to use')
+    return result
 
 
-def drift(
-    recordings: Sequence[Place], *, hours: Mapping[Path, float] | None = None, specimen: Place = ''
-) -> DriftResult:
-    """Return wear of the pads and other drift per hour over recordings with an initialisation.
+def _check_order(train: Sequence[Path], held_out: Sequence[Path], files: Sequence[Path], step: str) -> None:
+    """Raise `IdentificationError` for arguments that contradict each other."""
+    if step not in STEPS:
+        raise IdentificationError(f'--step {step!r} must be one of {", ".join(STEPS)}')
+    if files and (train or held_out):
+        raise IdentificationError(
+            '--file tries all pairs of its files; give it alone, or --train and --held-out'
+        )
+    if not files and not train:
+        raise IdentificationError(
+            '0 recordings to train with; give --train FILE..., or --file FILE... for all pairs'
+        )
+    both = {each.resolve() for each in train} & {each.resolve() for each in held_out}
+    if both:
+        raise IdentificationError(
+            f'{min(both).name} is among --train and --held-out; a held-out recording must be unseen: leave '
+            'it out on one side'
+        )
 
-    Times are `hours` of all recordings by their paths (a counter), else when their sessions began. `specimen`
-    is the file of this actuator, the shipped one without. Raises `IdentificationError` and the readers'
-    errors.
-    """
-    from engine_mount.identification.drift import identify_drift
-    from mount_models.specimen import chosen_specimen
 
-    return identify_drift([Path(each) for each in recordings], chosen_specimen(str(specimen)), hours)
+def _read(
+    result: FrictionIdentification,
+    paths: Sequence[Path],
+    part: str,
+    step: str,
+    clamp: str,
+    zero: str,
+    mapping: Mapping | None,
+) -> _Recordings:
+    """Return the recordings with their kinds; hash, first look, cases and notes go into `result`."""
+    recordings = []
+    for path in paths:
+        recording = read_recording(path, mapping, clamp)
+        kind = kind_of_motion(recording)
+        # a ramp among sawtooths gives their contact
+        if part == 'train' and kind != step and step in (RAMP, SAWTOOTH) and (step, kind) != (SAWTOOTH, RAMP):
+            raise IdentificationError(
+                f'{recording.name} looks like {kind}, not like {step}; leave --step to auto, or choose '
+                'another file'
+            )
+        key = path.name if path.name not in result.recordings else str(path)
+        digest = recording_hash(path)
+        for other, entry in result.recordings.items():
+            if entry['sha256'] == digest:
+                raise IdentificationError(
+                    f'{key} and {other} ({entry["part"]}) are the same to the bit; a held-out recording must '
+                    'be unseen, and none counts twice: give each recording once'
+                )
+        result.recordings[key] = {'part': part, 'kind': kind, 'sha256': digest}
+        if kind != RAMP:
+            recording, result.looks[key] = subtract_zero(recording, zero)
+            case = case_of(recording, result.looks[key])
+            result.cases += [case] if case else []
+        result.notes += [f'{recording.name}: {note}' for note in recording.notes]
+        recordings.append((recording, kind))
+    return recordings
+
+
+def _moving(recordings: _Recordings) -> list[FrictionRecording]:
+    return [each for each, kind in recordings if kind != RAMP]
+
+
+def _fit_coefficients(result: FrictionIdentification, sawtooths: Sequence[FrictionRecording]) -> None:
+    """Steps 2 and 3, and their validation on held-out recordings."""
+    contact = result.contact
+    if contact is None:
+        contact = result.contact = friction_contact(result.base.friction)
+        result.notes.append(
+            'no ramp and hold among the training: step 2 uses the contact of the base (c_R '
+            f'{contact.tangential_stiffness:.3g} N/m, d_R {contact.tangential_damping:.3g} N s/m, c_Re '
+            f'{contact.contact_stiffness:.3g} N/m)'
+        )
+    result.lines = [line for each in sawtooths for line in stroke_lines(each, contact)]
+    result.fit = fit_coefficients(result.lines)
+    result.validations = [validate(each, contact, result.fit.coefficients) for each in result.held_out]
+
+
+def _try_pairs(
+    result: FrictionIdentification, recordings: list[FrictionRecording], progress: Progress, seed: int
+) -> None:
+    if len(recordings) < 2:
+        raise IdentificationError(
+            f'{len(recordings)} of the recordings move to and fro; the ladder needs at least 2: '
+            'give another one'
+        )
+
+    def fit(one: FrictionRecording) -> list[Rung]:
+        def named(share: float, law: str) -> None:
+            progress(share, f'{one.name}: {law}')
+
+        return fit_ladder(all_laws([one]), [one], [], named, seed)
+
+    ladders = [fit(each) for each in recordings]
+    for (one, ladder), (other, _) in itertools.permutations(zip(recordings, ladders, strict=True), 2):
+        rungs = [each._replace(held_out_error=law_error(each.law, each.values, [other])) for each in ladder]
+        result.pairs.append(Pair(one.name, other, rungs))

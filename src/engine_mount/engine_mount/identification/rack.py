@@ -5,16 +5,13 @@ from collections.abc import Mapping as Keys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from engine_mount.identification.actuator.points import ForcePoints, gap_groups
-from engine_mount.identification.coil.points import RippleRecording
 from engine_mount.identification.fitting import FloatArray, IdentificationError
+from engine_mount.identification.force_points import ForcePoints, gap_groups
+from engine_mount.identification.gap_curves import RippleRecording
 from engine_mount.recordings.place import open_run, recording_hash, recording_place
-from engine_mount.recordings.recording import Recording
 from engine_mount.signals.formats.bag import is_recording
 from engine_mount.signals.mapping import Mapping
 from engine_mount.signals.quantities import Quantity, by_name
@@ -25,8 +22,14 @@ from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
 
 RACK = by_name(
     Quantity('gap', 'length', 'air gap', 20e-6, 5e-3, by_size=True, mapped='air_gap'),
-    Quantity('current', 'current', 'current of the coil', 0.05, 20.0, by_size=True),
-    Quantity('force', 'force', 'force of the actuator', 2.0, 2e4, by_size=True),
+    Quantity(
+        'current', 'current', 'current of the coil', 0.05, 20.0, (f'{COIL_RIPPLE.name}.coil_current',),
+        by_size=True,
+    ),
+    Quantity(
+        'force', 'force', 'force of the actuator', 2.0, 2e4, ('sim/clamp_force.wrench.force.z',),
+        by_size=True,
+    ),
     Quantity('inductance', 'inductance', 'inductance of the coil', 1e-3, 1.0, by_size=True),
     Quantity('current_rate', 'current/time', 'slope of the current', 10.0, 1e5, by_size=True),
     Quantity('flux_rate', 'flux density/time', 'slope of the flux density', 5.0, 1e5, by_size=True),
@@ -35,15 +38,13 @@ RACK = by_name(
         mapped='temperature',
     ),
 )  # fmt: skip
-"""What a rack measures, with the range of its largest value."""
-FORCE_SIGNAL = 'sim/clamp_force:wrench.force.z'
+"""What a rack measures, with the range of its largest value; titles are topic and field in recordings."""
 _GAP_IN_NAME = re.compile(r'(?<![\d.])(\d+(?:\.\d+)?)um(?![a-z])', re.IGNORECASE)
 _CELSIUS_IN_NAME = re.compile(r'([+-]?\d+(?:\.\d+)?)degC', re.IGNORECASE)
 _FEWEST = 8  # chosen: fewer points are no measurement
 _LONGEST_STUCK = 12  # rows, chosen: coarse converters repeat themselves for a few
 _BINS = 100  # chosen: points from one recorded ramp
 _LARGEST_INVALID = 0.1  # share, chosen
-_TEMPERATURES_APART = 5.0  # K between neighbouring readings, chosen: a coil passes through all in between
 _LARGEST_DRIFT = 10.0  # K, chosen: 1 um or two of the gap to either side
 
 
@@ -86,22 +87,30 @@ def read_force(files: Sequence[Path], mapping: Mapping, values: FileValues) -> F
 
     Raises `IdentificationError` and the readers' errors.
     """
-    parts = []
+    parts, known = [], {name: RACK[name] for name in ('current', 'force', 'gap')}
     for file in _checked_files(files):
-        if _is_table(file):
-            needed = ('current', 'force', *(() if file in values.gap else ('gap',)))
-            columns = select_rows(
-                recording_place(file), mapping, {name: RACK[name] for name in needed}, needed
-            )
-            current, force = columns['current'], columns['force']
-            gap = columns['gap'] if 'gap' in columns else np.full(current.shape, values.gap[file])
-        else:
-            gap, current, force = _force_from_topics(file, mapping, values)
+        place = recording_place(file)
+        columns = select_rows(place, mapping, known, ('current', 'force'))
+        current, force = columns['current'], columns['force']
         _check_size(file, force)
         _check_alive(file, 'current', 'A', current)
         _check_alive(file, 'force', 'N', force, current)
-        parts.append((gap, current, force))
+        if is_recording(place):
+            current, force = _means(current, force)
+        held = file in values.gap or 'gap' not in columns
+        parts.append(
+            (np.full(current.shape, values.gap_of(file)) if held else columns['gap'], current, force)
+        )
     return ForcePoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _means(current: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return up to `_BINS` points of a recorded ramp: means over small steps of the current."""
+    known = current >= 0.0
+    current, force = current[known], force[known]
+    steps = np.minimum((current / current.max() * _BINS).astype(int), _BINS - 1)
+    means = np.array([(current[steps == k].mean(), force[steps == k].mean()) for k in np.unique(steps)])
+    return means[:, 0], means[:, 1]
 
 
 def read_ripple(
@@ -113,7 +122,9 @@ def read_ripple(
     """
     recordings: list[RippleRecording] = []
     for file in _checked_files(files):
-        read = _ripple_from_table if _is_table(file) else _ripple_from_topics
+        # topics of this project have fixed meanings
+        is_table = not is_recording(recording_place(file)) or COIL_RIPPLE.name not in open_run(file)
+        read = _ripple_from_table if is_table else _ripple_from_topics
         recordings += read(file, mapping, values, turns_area)
     for recording in recordings:
         share = float(np.mean(~(recording.inductance > 0.0)))
@@ -123,35 +134,6 @@ def read_ripple(
                 f'{_LARGEST_INVALID:.0%} may be; check polarity of the coil and of its sensors'
             )
     return recordings
-
-
-def _force_from_topics(
-    file: Path, mapping: Mapping, values: FileValues
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return up to `_BINS` points of a recorded ramp: means over small steps of the current."""
-    recording = open_run(file)
-    ripple = _topic(recording, COIL_RIPPLE.name)
-    choice = mapping.columns.get('force')
-    topic, colon, signal = (choice.column if choice else FORCE_SIGNAL).partition(':')
-    if not colon:
-        raise IdentificationError(
-            f'--column force={topic}: of an MCAP recording write TOPIC:FIELD, as {FORCE_SIGNAL}'
-        )
-    messages = _topic(recording, topic)
-    current, force = ripple['coil_current'], messages[signal]
-    known = np.isfinite(force)
-    if known.sum() >= _FEWEST:
-        force = np.interp(ripple.stamps, messages.stamps[known], force[known], left=np.nan, right=np.nan)
-        both = np.isfinite(force) & np.isfinite(current) & (current >= 0.0)
-        current, force = current[both], force[both]
-    if known.sum() < _FEWEST or current.size < _FEWEST:
-        raise IdentificationError(
-            f'{file}: {topic} and {COIL_RIPPLE.name} have too few finite samples of the same time, needed '
-            f'are {_FEWEST}; are they of one recording? Record again'
-        )
-    steps = np.minimum((current / current.max() * _BINS).astype(int), _BINS - 1)
-    means = np.array([(current[steps == k].mean(), force[steps == k].mean()) for k in np.unique(steps)])
-    return np.full(len(means), values.gap_of(file)), means[:, 0], means[:, 1]
 
 
 def _ripple_from_table(
@@ -178,17 +160,12 @@ def _ripple_from_table(
     by_column = 'gap' in columns and file not in values.gap
     gaps = columns['gap'] if by_column else np.full(current.shape, values.gap_of(file))
     groups, recordings = gap_groups(gaps), []
-    for group in groups:
-        parts = _parts_by_temperature(np.sort(group), celsius)
-        for rows in parts:
-            gap = float(gaps[rows].mean())
-            if celsius is None or file in values.celsius:
-                degrees = values.celsius_of(file)
-            else:
-                degrees = _settled(file, celsius[rows])
-            name = file.name if len(groups) == 1 else f'{file.name} at {gap * 1e6:.1f} um'
-            name += f', {degrees:.0f} degC' if len(parts) > 1 else ''
-            recordings.append(RippleRecording(name, gap, degrees, current[rows], inductance[rows]))
+    for rows in map(np.sort, groups):
+        gap = float(gaps[rows].mean())
+        told = celsius is None or file in values.celsius
+        degrees = values.celsius_of(file) if told else _settled(file, celsius[rows])
+        name = file.name if len(groups) == 1 else f'{file.name} at {gap * 1e6:.1f} um'
+        recordings.append(RippleRecording(name, gap, degrees, current[rows], inductance[rows]))
     return recordings
 
 
@@ -196,7 +173,7 @@ def _ripple_from_topics(
     file: Path, mapping: Mapping, values: FileValues, turns_area: float
 ) -> list[RippleRecording]:
     recording = open_run(file)
-    series, warmth = _topic(recording, COIL_RIPPLE.name), COIL_TEMPERATURE.name
+    series, warmth = recording[COIL_RIPPLE.name], COIL_TEMPERATURE.name
     flux_rate, current_rate = (series.derivative(name) for name in ('flux_density', 'coil_current'))
     inductance = measured_inductance(turns_area, flux_rate, current_rate)
     current = series['coil_current']
@@ -208,23 +185,12 @@ def _ripple_from_topics(
     return [RippleRecording(file.name, values.gap_of(file), celsius, current, inductance)]
 
 
-def _parts_by_temperature(
-    rows: npt.NDArray[np.intp], celsius: FloatArray | None
-) -> list[npt.NDArray[np.intp]]:
-    """Return the rows in parts between which the coil's temperature (degC) leaves a gap, coldest first."""
-    if celsius is None:
-        return [rows]
-    order = rows[np.argsort(celsius[rows], kind='stable')]
-    parts = np.split(order, np.flatnonzero(np.diff(celsius[order]) > _TEMPERATURES_APART) + 1)
-    return [np.sort(part) for part in parts]
-
-
 def _settled(file: Path, celsius: FloatArray) -> float:
     """Return the mean of the coil's temperatures (degC); raises `IdentificationError` if they ran away."""
     if np.ptp(celsius) > _LARGEST_DRIFT:
         raise IdentificationError(
             f'{file}: the coil temperature ran from {celsius.min():.1f} to {celsius.max():.1f} degC, it may '
-            f'by {_LARGEST_DRIFT:g} K; let the coil settle between recordings, or make them shorter'
+            f'by {_LARGEST_DRIFT:g} K; let the coil settle, and give each temperature a file of its own'
         )
     return float(celsius.mean())
 
@@ -270,21 +236,6 @@ def _check_alive(
         )
 
 
-def _is_table(file: Path) -> bool:
-    """Return whether a file holds columns: no recording of this project, whose topics have fixed meanings."""
-    return not is_recording(recording_place(file)) or COIL_RIPPLE.name not in open_run(file)
-
-
 def _bare_name(file: Path) -> str:
     """Return the name without the kind of file; a folder's has none, whatever stands behind its last dot."""
     return file.name if file.is_dir() else file.stem
-
-
-def _topic(recording: Recording, name: str) -> Any:
-    """Return the messages of a topic; raises `IdentificationError` where there are none."""
-    if name not in recording:
-        raise IdentificationError(
-            f'{recording.path} has no topic {name}; it holds {", ".join(sorted(recording)) or "none"}: is it '
-            'a recording of the rack?'
-        )
-    return recording[name]

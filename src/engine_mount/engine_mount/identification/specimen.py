@@ -3,7 +3,6 @@
 import datetime
 import math
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -22,7 +21,6 @@ PARTS = {
     'friction': 'identify friction',
 }
 """Parts of a specimen that are measured, and the command for each."""
-_READABLE = 0o644
 
 
 def check_targets(*files: Path | None) -> None:
@@ -83,20 +81,17 @@ def save_specimen(specimen: Specimen, path: str | Path) -> None:
     text = yaml.safe_dump(
         specimen_to_mapping(checked_specimen(specimen)), sort_keys=False, default_flow_style=None, width=110
     )
-    target = Path(path)
     heading = '# Specimen of the engine mount. SI units; the coefficients of force_law: see Table 1.\n'
-    with tempfile.NamedTemporaryFile(
-        'w', encoding='utf-8', dir=target.parent, prefix=f'.{target.name}.', delete=False
-    ) as file:
-        try:
+    target = Path(path)
+    beside = target.with_name(f'.{target.name}.{os.getpid()}')
+    try:
+        with beside.open('w', encoding='utf-8') as file:
             file.write(heading + text)
             file.flush()
             os.fsync(file.fileno())
-            os.chmod(file.name, _READABLE)
-            os.replace(file.name, target)
-        except BaseException:
-            Path(file.name).unlink(missing_ok=True)
-            raise
+        os.replace(beside, target)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def specimen_to_mapping(specimen: Specimen) -> dict[str, Any]:

@@ -3,14 +3,17 @@
 import os
 import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
+import psutil
 import pytest
 from ros_testing import free_domain
 
 from engine_mount.faults import session
 from engine_mount.faults.case import MATRIX
-from engine_mount.faults.graph import Place, tied
+from engine_mount.faults.graph import TIED, Place, runs
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -40,9 +43,14 @@ def test_the_graph_that_runs_is_ended_whatever_signal_comes(monkeypatch, number)
     assert signal.getsignal(number) is before
 
 
-def test_a_program_of_others_is_not_run_for_a_starter_that_has_ended(monkeypatch):
-    assert subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=True).stdout == b'run\n'
-    with subprocess.Popen(['true']) as other:
-        monkeypatch.setattr(os, 'getpid', lambda: other.pid)
-        ended = subprocess.run(tied(['echo', 'run']), stdout=subprocess.PIPE, check=False)
-    assert (ended.returncode, ended.stdout) == (1, b'')
+def test_a_graph_ends_with_the_process_that_started_it():
+    start = f'started = subprocess.Popen({[*TIED, "sleep", "60"]})'
+    code = f'import subprocess; {start}; print(started.pid, flush=True); started.wait()'
+    end = time.monotonic() + 30.0
+    with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE) as starter:
+        graph = psutil.Process(int(starter.stdout.readline()))
+        while graph.name() != 'sleep':
+            assert time.monotonic() < end
+        starter.kill()
+        while runs(graph):
+            assert time.monotonic() < end

@@ -1,15 +1,14 @@
 """Tasks on processes of this machine and on a cluster: what is lost is run again, what is started ends."""
 
 import contextlib
-import json
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from engine_mount.fleet import runner
@@ -25,7 +24,7 @@ def work(place):
     time.sleep(600)
 
 if __name__ == '__main__':
-    for done in run_tasks(work, range(8), workers=2, **eval(sys.argv[1])):
+    for done in run_tasks(work, range(8), workers=2,):
         print(done.result or done.reason, flush=True)
 """
 _PATIENCE = 60.0  # s
@@ -46,10 +45,6 @@ def test_all_tasks_are_done_once_by_as_many_processes_as_asked(tmp_path, monkeyp
     assert all(one.result[0] == one.place**2 and one.reason == '' for one in done)
     assert len({one.result[1] for one in done} - {os.getpid()}) == 2
     assert {one.result[2:] for one in done} == {(min(os.nice(0) + 10, 19), '1', 'as any process')}
-
-
-def test_nothing_to_do_starts_nothing():
-    assert list(run_tasks(abs, [], scheduler='tcp://127.0.0.1:1')) == []
 
 
 def test_a_task_that_raises_is_a_result_with_its_reason():
@@ -75,44 +70,17 @@ def test_an_error_that_cannot_be_sent_is_told_by_its_words():
     assert done.reason == 'RuntimeError: OddError: odd'
 
 
-def test_a_worker_that_is_killed_costs_a_retry(tmp_path):
-    first = tmp_path / 'first'
-
-    def work(place):
-        if place == 5 and not first.exists():
-            first.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return place
-
-    done = list(run_tasks(work, range(12), workers=2))
-    assert sorted(one.result for one in done) == list(range(12))
-
-
-def test_a_task_that_kills_its_workers_is_given_up_and_no_other_one_is(tmp_path):
+def test_a_worker_that_is_killed_costs_a_retry_and_a_task_that_kills_its_workers_is_given_up(tmp_path):
     def work(place):
         (tmp_path / f'{place}_{os.getpid()}').touch()
-        if place == 3:
+        if place == 3 or (place == 5 and len(list(tmp_path.glob('5_*'))) == 1):
             os.kill(os.getpid(), signal.SIGKILL)
         return place
 
-    done = sorted(run_tasks(work, range(6), workers=2), key=lambda one: one.place)
-    assert [one.result for one in done] == [0, 1, 2, None, 4, 5]
+    done = sorted(run_tasks(work, range(8), workers=2), key=lambda one: one.place)
+    assert [one.result for one in done] == [0, 1, 2, None, 4, 5, 6, 7]
     assert done[3].reason == '3 workers were lost with it: killed, or out of memory'
     assert len(list(tmp_path.glob('3_*'))) == LOSSES
-
-
-@pytest.mark.slow
-def test_a_task_that_outgrows_the_memory_of_its_worker_is_given_up():
-    def work(place):
-        if place == 0:
-            held = bytearray(b'x' * 2_000_000_000)
-            time.sleep(_PATIENCE)
-            return len(held)
-        return place
-
-    done = sorted(run_tasks(work, range(3), workers=1, memory=1_000_000_000), key=lambda one: one.place)
-    assert [one.result for one in done] == [None, 1, 2]
-    assert 'out of memory' in done[0].reason
 
 
 def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
@@ -120,15 +88,16 @@ def test_nobody_else_can_hand_work_to_the_processes_of_this_machine():
         time.sleep(0.05)
         return os.getpid()
 
-    before = {os.getpid(): sockets_of(os.getpid())}
+    def sockets(process):
+        return {each.laddr for each in psutil.Process(process).net_connections('inet')}
+
+    before = sockets(os.getpid())
     tasks = run_tasks(work, range(20), workers=2)
     workers = {next(tasks).result for _ in range(10)}
-    opened = {
-        process: sockets_of(process) - before.get(process, set()) for process in {os.getpid(), *workers}
-    }
+    opened = set().union(*map(sockets, {os.getpid(), *workers})) - before
     tasks.close()
     assert workers
-    assert set().union(*opened.values()) == set()
+    assert opened == set()
 
 
 def test_processes_that_cannot_start_end_the_run_with_a_sentence(monkeypatch):
@@ -172,7 +141,7 @@ def test_items_are_not_all_handed_over_at_once():
     ],
 )
 def test_no_worker_outlives_the_command(blow, tmp_path):
-    with _started(tmp_path, '{}') as command:
+    with _started(tmp_path) as command:
         workers = [int(command.stdout.readline()) for _ in range(2)]
         os.killpg(command.pid, blow) if blow == signal.SIGINT else command.send_signal(blow)
         command.wait(_PATIENCE)
@@ -183,68 +152,19 @@ def test_no_worker_outlives_the_command(blow, tmp_path):
             assert told.count('Traceback') == 1
 
 
-def test_a_cluster_by_its_address_does_the_same(cluster):
-    address, _ = cluster
-    done = list(run_tasks(abs, range(-20, 0), scheduler=address))
-    assert sorted(one.result for one in done) == list(range(1, 21))
-
-
-def test_a_scheduler_that_is_lost_ends_the_run_with_what_was_done(cluster, tmp_path):
-    address, scheduler = cluster
-    with _started(tmp_path, repr({'scheduler': address})) as command:
-        results = [int(command.stdout.readline()) for _ in range(2)]
-        assert all(results)
-        scheduler.kill()
-        command.wait(_PATIENCE)
-        told = command.stderr.read()
-        assert 'SchedulerLostError: the scheduler' in told.splitlines()[-1]
-        assert told.count('Traceback') == 1
-
-
 @pytest.mark.slow
 def test_an_address_where_no_scheduler_is_is_refused():
     with pytest.raises(SchedulerLostError, match=r'tcp://127\.0\.0\.1:1: no Dask scheduler answers there'):
         list(run_tasks(abs, [1], scheduler='tcp://127.0.0.1:1'))
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """Any Dask cluster, of a scheduler and a worker: the address, and the scheduler's process."""
-    told = tmp_path / 'scheduler.json'
-    options = ['--no-dashboard', '--host', '127.0.0.1', '--port', '0', '--scheduler-file', str(told)]
-    with contextlib.ExitStack() as stack:
-        scheduler = _process(stack, 'scheduler', *options)
-        _wait_until(told.exists)
-        _process(stack, 'worker', '--no-dashboard', '--scheduler-file', str(told), '--nthreads', '1')
-        yield json.loads(told.read_text())['address'], scheduler
-
-
-def sockets_of(process):
-    """Return the TCP and UDP sockets (inodes) that a process holds."""
-    inodes = set()
-    for descriptor in Path(f'/proc/{process}/fd').iterdir():
-        with contextlib.suppress(OSError):
-            inodes.update(re.findall(r'socket:\[(\d+)\]', os.readlink(descriptor)))
-    tables = [Path(f'/proc/net/{kind}') for kind in ('tcp', 'tcp6', 'udp', 'udp6')]
-    of_network = {line.split()[9] for table in tables for line in table.read_text().splitlines()[1:]}
-    return inodes & of_network
-
-
-def _process(stack, kind, *arguments):
-    command = [sys.executable, '-m', 'distributed.cli.dask_' + kind, *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    stack.callback(process.wait)
-    stack.callback(process.kill)
-    return process
-
-
 @contextlib.contextmanager
-def _started(folder, options):
+def _started(folder):
     """A process of its own group, as a terminal starts it, that runs tasks."""
     script = folder / 'command.py'
     script.write_text(_COMMAND)
     process = subprocess.Popen(
-        [sys.executable, str(script), options],
+        [sys.executable, str(script)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -14,7 +14,7 @@ from mount_recorder.session import session_text
 from engine_mount.fleet import catalogue, replay
 from engine_mount.fleet.places import places
 from engine_mount.drives.loop import recording
-from engine_mount.fleet.prepare import prepare
+from engine_mount.fleet.example import prepare
 from ros_testing import compiled_so_far
 
 prepare(scenarios=['motorway'], policies=['switched_viscous'])

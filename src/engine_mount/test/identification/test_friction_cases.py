@@ -7,9 +7,8 @@ import pytest
 from joint import DT, TIME, jenkin, measured, motion
 
 from engine_mount.identification.fitting import IdentificationError
-from engine_mount.identification.friction.cases import case_of, ladder_case
-from engine_mount.identification.friction.identification import identify_friction
-from engine_mount.identification.friction.look import first_look, subtract_zero
+from engine_mount.identification.friction.screening import case_of, first_look, ladder_case, subtract_zero
+from engine_mount.identification.identify import friction
 from mount_models.specimen import default_specimen
 
 LIMITS = (600.0, 600.0)
@@ -57,25 +56,16 @@ def test_a_force_that_is_not_of_friction_is_named_by_what_it_goes_with(of, word)
     assert word in case.sentence
 
 
-def entries(**errors):
-    return {
-        name.replace('_', ' '): {'train_error': train, 'held_out_error': held}
-        for name, (train, held) in errors.items()
-    }
+def of_ladder(train, held_out):
+    return ladder_case({'Dahl': {'train_error': train, 'held_out_error': held_out}}, 'Dahl')
 
 
 def test_a_ladder_is_a_case_where_no_law_explains_or_predicts():
-    assert ladder_case(entries(Dahl=(0.2, 0.3), Coulomb=(0.6, 0.7))) is None
-    assert ladder_case({}) is None
-    poor = ladder_case(entries(Dahl=(0.5, 0.6), Coulomb=(0.6, 0.7)))
-    assert poor is not None
-    assert poor.kind == 'not explained'
+    assert of_ladder(0.2, 0.3) is of_ladder(0.2, None) is None
+    poor, other = of_ladder(0.5, 0.6), of_ladder(0.2, 0.6)
+    assert (poor.kind, other.kind) == ('not explained', 'not predicted')
     assert 'Dahl, explains 75% of its mean square' in poor.sentence
-    other = ladder_case(entries(Dahl=(0.2, 0.6), Coulomb=(0.6, 0.7)))
-    assert other is not None
-    assert other.kind == 'not predicted'
     assert '96% of its mean square in training and 64% of what was held out' in other.sentence
-    assert ladder_case(entries(Dahl=(0.2, None), Coulomb=(0.6, None))) is None
 
 
 def written_sawtooth(file, amplitude):
@@ -93,41 +83,28 @@ def written_sawtooth(file, amplitude):
 
 
 def test_no_coefficient_is_written_from_a_contact_that_mostly_sticks(tmp_path):
-    base = default_specimen()
     slides, sticks = (written_sawtooth(tmp_path / f'{a}.csv', a) for a in (20e-3, 0.75e-3))
-    result = identify_friction(base, [slides], step='sawtooth')
-    assert result.specimen('own').friction != base.friction
-    refused = identify_friction(base, [slides], [sticks], step='sawtooth')
+    result = friction([slides], step='sawtooth')
+    assert result.specimen('own').friction != default_specimen().friction
+    refused = friction([slides], [sticks], step='sawtooth')
     with pytest.raises(IdentificationError, match=r'no coefficient of friction is written: .*mostly sticks'):
         refused.specimen('own')
 
 
-def stuck_at_rest(zero):
+def test_the_zero_of_the_loop_is_taken_by_word_and_doubts_that_of_the_file():
     x = motion(0.01)
-    return measured(x, jenkin(x, LIMITS, 1e6, 1e-3, 1.5e-3), zero)
-
-
-def test_a_zero_is_doubted_in_words_where_rest_and_loop_disagree():
-    recording = stuck_at_rest(250.0)
+    recording = measured(x, jenkin(x, LIMITS, 1e6, 1e-3, 1.5e-3), 250.0)  # it begins with a force of its own
     by_law, look = subtract_zero(recording, 'law')
     assert by_law.force.mean() == pytest.approx(recording.force.mean() - 250.0, abs=20.0)
-    assert 'the rest before the motion reads 7' in by_law.notes[-1]
-    assert 'so the rest is not used' in by_law.notes[-1]
+    assert 'from the loop' in by_law.notes[-1]
     assert abs(look.zero) < 1e-9
-    by_rest, _ = subtract_zero(recording, 'rest')
-    assert by_rest.force[:100].mean() == pytest.approx(0.0, abs=2.0)
-    assert 'doubtful: the loop gives 2' in by_rest.notes[-1]
     untouched, _ = subtract_zero(recording)
     np.testing.assert_array_equal(untouched.force, recording.force)
     assert 'doubtful: the loop gives 2' in untouched.notes[-1]
-
-
-def test_a_zero_that_agrees_is_not_doubted():
-    x = motion(0.01)
-    recording = measured(x, jenkin(x, LIMITS, 1e6, 1e-3, 0.0), 0.0)
-    assert subtract_zero(recording)[0].notes == ()
-    assert 'agrees' in subtract_zero(recording, 'law')[0].notes[-1]
-    assert 'doubtful' not in subtract_zero(recording, 'rest')[0].notes[-1]
+    without = measured(x, jenkin(x, LIMITS, 1e6, 1e-3, 0.0), 0.0)
+    assert subtract_zero(without)[0].notes == ()
+    with pytest.raises(IdentificationError, match="--zero 'rest' must be one of law, recorded"):
+        subtract_zero(recording, 'rest')
 
 
 def test_a_zero_that_no_loop_tells_is_left_as_recorded_and_said():
@@ -136,12 +113,3 @@ def test_a_zero_that_no_loop_tells_is_left_as_recorded_and_said():
     left, _ = subtract_zero(recording, 'law')
     np.testing.assert_array_equal(left.force, recording.force)
     assert 'the loop gives it only to +-' in left.notes[-1]
-
-
-def test_a_rest_that_there_is_not_and_an_unknown_word_are_refused():
-    x = 0.01 * np.sin(3 * TIME)
-    recording = measured(x, jenkin(x, LIMITS, 1e6, 0.0, 0.0), 0.0)
-    with pytest.raises(IdentificationError, match=r'moves within the first 0\.1 s'):
-        subtract_zero(recording, 'rest')
-    with pytest.raises(IdentificationError, match="--zero 'first' must be one of law, rest, recorded"):
-        subtract_zero(recording, 'first')

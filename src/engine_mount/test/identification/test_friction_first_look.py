@@ -5,7 +5,7 @@ import pytest
 from joint import DT, jenkin, measured, motion
 
 from engine_mount.identification.friction.laws import dahl_force
-from engine_mount.identification.friction.look import first_look
+from engine_mount.identification.friction.screening import first_look
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_sim.plant.friction import full_response
@@ -51,24 +51,3 @@ def test_laws_that_are_not_the_fitted_one_have_their_zero_within_three_deviation
         look = first_look(measured(x, force, zero, seed))
         assert abs(look.zero - zero) < 3.0 * look.deviation
         assert look.known
-
-
-def test_a_contact_that_never_slips_does_not_show_its_zero():
-    x = motion(0.3e-3)
-    recording = measured(x, jenkin(x, (600.0, 600.0), 1e6, 0.0, 0.1e-3), 0.0)
-    look = first_look(recording)
-    assert look.sliding < 0.02
-    assert not look.known
-
-
-@pytest.mark.parametrize(
-    ('amplitude', 'play', 'most'),
-    [(0.02, 0.1e-3, 'sliding'), (0.75e-3, 0.0, 'sticking'), (0.01, 8e-3, 'in_play')],
-)
-def test_shares_of_the_way_say_what_the_contact_does(amplitude, play, most):
-    x = motion(amplitude)
-    look = first_look(measured(x, jenkin(x, (600.0, 600.0), 1e6, play, 0.0), 0.0))
-    shares = {'sliding': look.sliding, 'sticking': look.sticking, 'in_play': look.in_play}
-    assert max(shares, key=shares.__getitem__) == most
-    assert sum(shares.values()) == pytest.approx(1.0)
-    assert look.explained > 0.99

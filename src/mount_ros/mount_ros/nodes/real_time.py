@@ -55,7 +55,7 @@ class RealTime:
         """Whether the system may not take memory of this process away."""
         self._threads = threads or Threads()
         self._clock = clock
-        self._watcher = self._threads.own
+        self._watcher = threading.get_native_id()
         self._loops: list[Any] = []
         self._ordinary_until = -math.inf  # s
         self._held: dict[int, int] = {}  # thread: priority
@@ -100,15 +100,16 @@ class RealTime:
             for number in before.keys() & used.keys():
                 share = (used[number] - before[number]) / (now - begin)
                 if share > _SHARE:
-                    return self._give_back(self._threads.names().get(number, str(number)), share)
+                    thread = self._threads.names().get(number, str(number))
+                    return self._give_back(f'{thread} used {share:.2f} of a core in {now - begin:.1f} s')
             return ''
 
-    def _give_back(self, thread: str, share: float) -> str:
+    def _give_back(self, use: str) -> str:
         self._ordinary_until = self._clock() + _REST
         self.given_back = (
-            f'real-time priority {self.priority} given back: thread {thread} used {share:.2f} of a core in '
-            f'{_WINDOW:g} s (limit {_SHARE:g}); lower the load of this machine or the number of its graphs, '
-            f'then activate again, not before {_REST:g} s'
+            f'real-time priority {self.priority} given back: thread {use} (limit {_SHARE:g}); lower '
+            f'the load of this machine or the number of its graphs, then activate again, not before '
+            f'{_REST:g} s'
         )
         self._give()
         return self.given_back

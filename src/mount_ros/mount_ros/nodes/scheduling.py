@@ -17,8 +17,6 @@ _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT o
 class Threads:
     """The threads of this process, by the numbers that the system gives them."""
 
-    own = property(lambda self: threading.get_native_id(), doc='The number of the calling thread.')
-
     def names(self) -> dict[int, str]:
         """Return {number: name} of all threads: Python's name where it has one, else the system's."""
         found = {}

@@ -55,7 +55,6 @@ def end_process(code: int) -> NoReturn:
     """End with this exit code, past the middleware's own clearing up where that would wait for ever."""
     if any(thread.name == _THREAD for thread in threading.enumerate()):
         sys.stdout.flush()
-        sys.stderr.flush()
         os._exit(code)
     sys.exit(code)
 

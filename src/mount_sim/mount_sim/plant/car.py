@@ -1,18 +1,17 @@
 """One engine on several mounts in one compiled step; do parameters fit the length of a step?
 
-The steps are linearised about rest, so nothing of them is written a second time: each number of what moves is
-shifted a little, and what becomes of it in one step is a column of the matrix of the step. Where an
+The step of one plant is linearised about rest, so nothing of it is written a second time: each number of what
+moves is shifted a little, and what becomes of it in one step is a column of the matrix of the step. Where an
 eigenvalue of that lies outside the unit circle, a motion grows from step to step.
 """
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_bytes, record_dtype
-from mount_models.arrays import ByteArray, FloatArray
+from mount_models.arrays import ByteArray
 from mount_models.friction.contact import check_friction
 from mount_models.quantity import ParameterError, flattened
 from mount_sim.excitation.excitation import Seat
@@ -43,11 +42,10 @@ GROWTH_ALLOWED = 1e-6
 """Of a motion in one step, chosen: far above rounding, 2 % in a second."""
 
 _BENCH = int(Seat.BENCH)
-_SHIFT, _SHIFT_OF_CAR = 1e-6, 1e-9  # SI, chosen: small for heights, angles and forces of branches
+_SHIFT = 1e-6  # SI, chosen: small for heights, angles and forces of branches
 _SHIFTS = {'volume': 1e-12, 'flow': 1e-9}  # m^3, m^3/s (chosen): within one piece of the hydromount's laws
 _MOVING = [*VEHICLE_STATE.names, *ENGINE_STATE.names, *HYDROMOUNT_STATE.names]  # first in `STATE`
 _DISPLACEMENT = STATE.fields['displacement'][1] // 8
-_NUMBERS = STATE.itemsize // 8
 _NOTHING = np.zeros(1)
 
 
@@ -123,57 +121,26 @@ def checked_plant(plant: Plant, seat: Seat, step_time: float) -> Plant:
         for name, value in values.items()
         if name.startswith(parts) and value != defaults[name]
     ]
-    _check_growth(growth(plant, seat, step_time), ', '.join(changed), step_time)
-    return plant
-
-
-def check_car(memory: CarMemory, seat: Seat, step_time: float) -> None:
-    """Raise `ParameterError` if in steps of `step_time` s a motion of the engine would grow without end."""
-    _check_growth(car_growth(memory, seat, step_time), 'engine.*, vehicle.* and places.*', step_time)
-
-
-def _check_growth(found: float, names: str, step_time: float) -> None:
+    found = growth(plant, seat, step_time)
     if found > 1.0 + GROWTH_ALLOWED:
         raise ParameterError(
-            f'{names} do not fit together: in steps of {1e6 * step_time:g} us the motion of the simulated '
-            f'plant would grow without end, {found:.6g} times in a step; set them closer to their defaults'
+            f'{", ".join(changed)} do not fit together: in steps of {1e6 * step_time:g} us the motion of the '
+            f'simulated plant would grow without end, {found:.6g} times in a step; set them closer to their '
+            'defaults'
         )
+    return plant
 
 
 def growth(plant: Plant, seat: Seat, step_time: float) -> float:
     """Return by how much the fastest growing free motion about rest is greater after a step, 1 for not."""
-    law, rest = record_bytes(plant), np.zeros(_NUMBERS)
-    rest.view(STATE)['gap'] = plant.mechanics.rest_gap
-
-    def step(state: FloatArray) -> None:
-        advance(law, state.view(np.uint8), int(seat), _NOTHING, _NOTHING, 0.0, step_time)
-
+    law = record_bytes(plant)
+    moving = [*range(len(_MOVING)), _DISPLACEMENT]
     shifts = [next((by for word, by in _SHIFTS.items() if word in name), _SHIFT) for name in _MOVING]
-    return _growth(step, rest, [*range(len(_MOVING)), _DISPLACEMENT], [*shifts, _SHIFT])
-
-
-def car_growth(memory: CarMemory, seat: Seat, step_time: float) -> float:
-    """Return the same for an engine on several mounts; the fluid of each is checked where it stands alone."""
-    body, rest = memory.body.size, memory.body.size + memory.motions.size
-    whole = np.concatenate([memory.body, memory.motions, memory.states]).view(np.float64)
-    currents = np.zeros(memory.states.size // STATE.itemsize)
-
-    def step(state: FloatArray) -> None:
-        numbers = state.view(np.uint8)
-        trial = memory._replace(body=numbers[:body], motions=numbers[body:rest], states=numbers[rest:])
-        advance_car(*trial, int(seat), _NOTHING, _NOTHING, currents, step_time)
-
-    moving = [*range(rest // 8), *range(rest // 8 + _DISPLACEMENT, whole.size, _NUMBERS)]
-    return _growth(step, whole, moving, [_SHIFT_OF_CAR] * len(moving))
-
-
-def _growth(
-    step: Callable[[FloatArray], None], rest: FloatArray, moving: list[int], shifts: Sequence[float]
-) -> float:
-    """Return the greatest eigenvalue of a `step`, which changes its state in place, for what is `moving`."""
-    states = np.tile(rest, (len(moving) + 1, 1))
+    shifts.append(_SHIFT)
+    states = np.zeros((len(moving) + 1, STATE.itemsize // 8))
+    states.view(STATE)['gap'] = plant.mechanics.rest_gap
     states[range(len(moving)), moving] += shifts
     for state in states:
-        step(state)
+        advance(law, state.view(np.uint8), int(seat), _NOTHING, _NOTHING, 0.0, step_time)
     after = states[:, moving]
     return float(np.abs(np.linalg.eigvals((after[:-1] - after[-1]).T / shifts)).max())

@@ -29,6 +29,7 @@ from mount_models.quantity import ParameterError, Quantity
 from mount_sim.plant.vehicle import BRANCHES, Elastomer, Vehicle, elastomer_force, stretch_branches
 
 _LOWEST_MODE = 0.5  # Hz, chosen: below it the engine is held by nothing
+_FASTEST_STEP = 0.5  # rad in a step, chosen: semi-implicit Euler is stable up to 2
 
 BODY_STATE = number_record(
     *(f'{name}_{what}' for name in ('wheel', 'body', 'engine') for what in ('height', 'velocity')),
@@ -162,12 +163,15 @@ def engine_modes(engine: RigidEngine, supports: Sequence[Support]) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), dtype=np.float64)
 
 
-def check_hold(engine: RigidEngine, supports: Mapping[str, Support]) -> None:
-    """Raise `ParameterError` if the engine could move without a force against it."""
-    lowest = engine_modes(engine, list(supports.values()))[0]
-    if lowest < _LOWEST_MODE:
+def check_hold(engine: RigidEngine, supports: Mapping[str, Support], step_time: float) -> None:
+    """Raise `ParameterError` where nothing holds the engine, or where it moves too fast for the step (s)."""
+    modes = engine_modes(engine, list(supports.values()))
+    highest = _FASTEST_STEP / (2.0 * np.pi * step_time)
+    if not _LOWEST_MODE <= modes[0] <= modes[-1] <= highest:
         raise ParameterError(
-            f'the engine on {", ".join(supports)} has a natural frequency of {lowest:.3g} Hz (limit '
-            f'{_LOWEST_MODE:g} Hz): nothing holds it against heave, roll or pitch; give another place a '
-            'mount (mounts), or the torque rod a lever (engine.rod_lever)'
+            f'the engine on {", ".join(supports)} has natural frequencies of {modes[0]:.3g} .. '
+            f'{modes[-1]:.3g} Hz, which must lie within {_LOWEST_MODE:g} .. {highest:.5g} Hz: below, nothing '
+            'holds it against heave, roll or pitch; give another place a mount (mounts), or the torque rod '
+            'a lever (engine.rod_lever); above, its motion would grow without end: set engine.*, vehicle.elastomer.* '
+            'and places closer to their defaults'
         )

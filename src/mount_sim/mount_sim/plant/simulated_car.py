@@ -16,7 +16,7 @@ from mount_sim.electronics.electronics import Noise, Reading
 from mount_sim.electronics.faults import Faults
 from mount_sim.excitation.excitation import Excitation, Seat, Shaking
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.car import CarLaw, CarMemory, advance_car, check_car, checked_plant
+from mount_sim.plant.car import CarLaw, CarMemory, advance_car, checked_plant
 from mount_sim.plant.engine_body import BODY_STATE, SUPPORT_STATE, Support, check_hold
 from mount_sim.plant.mounts import ALONE, PLACES, mount_names, values_of_mount
 from mount_sim.plant.plant import Memory, Plant, PlantSimulation
@@ -213,9 +213,8 @@ class SimulatedCar:
                 name: Support(*getattr(general.places, name), each.vehicle) for name, each in chosen.items()
             }
             if seat is not Seat.BENCH:
-                check_hold(general.engine, supports)
+                check_hold(general.engine, supports, step_time)
             self._memory = self._joined(CarLaw(checked(general.engine), general.vehicle), supports)
-            check_car(self._memory, seat, step_time)
         self._shaking = Shaking(excitation, general.sample_rate)
         self.mounts: dict[str, SimulatedMount] = {}
         for name, each in chosen.items():

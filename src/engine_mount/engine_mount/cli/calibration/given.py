@@ -13,14 +13,6 @@ if TYPE_CHECKING:
 _GAPS, _TEMPERATURES = (20.0, 5000.0), (-60.0, 250.0)  # um, degC
 
 
-def orders_of(text: str) -> Any:
-    """Return the numbers of coefficients of a1 .. a5 from `4,4,4,2,4`; raises `typer.BadParameter`."""
-    parts = text.replace(' ', '').split(',')
-    if len(parts) != 5 or not all(part.isdigit() for part in parts):
-        raise typer.BadParameter(f'--orders {text}: write five numbers, as in 4,4,4,2,4')
-    return tuple(map(int, parts))
-
-
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
     from engine_mount.identification.rack import RACK

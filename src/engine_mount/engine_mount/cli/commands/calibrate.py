@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import gaps_of, given_ripple, orders_of, rack_mapping
+from engine_mount.cli.calibration.given import gaps_of, given_ripple, rack_mapping
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -37,7 +37,7 @@ _ACTUATOR_EPILOG = (
 
 `engine-mount calibrate actuator force.csv --name left --out left.yaml`
 
-`engine-mount calibrate actuator run1.csv run2.csv --orders 4,4,4,2,4 --figure force.png`
+`engine-mount calibrate actuator run1.csv run2.csv --figure force.png`
 
 `engine-mount calibrate actuator F.csv --column gap=Spalt:mm --column force=Kraft:kN`
 
@@ -53,11 +53,9 @@ _INDUCTANCE_EPILOG = (
     EXIT_CODES
     + """
 
-`engine-mount calibrate inductance ripple_*um.csv --coil-temperature 20 --base left.yaml --out left.yaml`
+`engine-mount calibrate inductance cold/*.csv warm/*.csv --base left.yaml --out left.yaml`
 
-`engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --gap b.csv=320`
-
-`engine-mount calibrate inductance cold/*.csv warm/*.csv` - two temperatures: compensation is measured
+`engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --coil-temperature b.csv=80`
 
 Columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
 `flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
@@ -86,9 +84,6 @@ Gaps = Annotated[list[str] | None, option('air gap of a file, um; may be repeate
 @app.command(cls=Command, epilog=_ACTUATOR_EPILOG)
 def actuator(
     files: Files,
-    orders: Annotated[
-        str, option('numbers of coefficients of a1 .. a5; 18 in all, as in Table 1')
-    ] = '4,4,4,2,4',
     columns: Columns = None,
     map_file: MapFile = None,
     dbc: Dbc = None,
@@ -115,11 +110,9 @@ def actuator(
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values, numbers = FileValues(gaps_of(gaps or [], places)), orders_of(orders)
+    values = FileValues(gaps_of(gaps or [], places))
     with progress() as bar:
-        result = calibrate.actuator(
-            places, columns=mapping, values=values, orders=numbers, base=base or '', progress=bar
-        )
+        result = calibrate.actuator(places, columns=mapping, values=values, base=base or '', progress=bar)
     publish(result, json_file, figure, out, name)
 
 
@@ -159,8 +152,8 @@ def inductance(
 ) -> None:
     """Fit the gap curves L_0.2 and i_20 (Fig. 4) to coil ripple recorded at known gaps.
 
-    The temperature with most recordings is that of the curves. With recordings at a second one the
-    compensation is measured, else it is stated from the conductivity's coefficient and the base's force law.
+    The temperature with most recordings is that of the curves, recordings at a second one measure the
+    compensation; those of one temperature alone are refused.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
@@ -189,7 +182,8 @@ def rack(
         bool, flag('--drawn', 'another actuator with other pads, drawn around the default ones')
     ] = False,
     celsius: Annotated[
-        list[float] | None, option('coil temperature of the ripple, degC; may be repeated')
+        list[float] | None,
+        option('coil temperature of the ripple, degC; repeatable; default: 20 and 80'),
     ] = None,
 ) -> None:
     """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
@@ -198,6 +192,6 @@ def rack(
 
     with progress() as bar:
         files = calibrate.rack(
-            out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0,), progress=bar
+            out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0, 80.0), progress=bar
         )
     TerminalScreen().say(f'{len(files)} recordings in {out}')

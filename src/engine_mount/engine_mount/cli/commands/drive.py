@@ -12,6 +12,7 @@ from engine_mount.cli.commands.options import (
     Distance,
     Domain,
     JsonFile,
+    Lateral,
     MapFile,
     Namespace,
     NewFolder,
@@ -50,7 +51,7 @@ Examples:
 
 `engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
-`engine-mount drive --road blocks.csv --speed 60/3.6 --core` - a measured road: height over distance
+`engine-mount drive --road blocks.crg --speed 60/3.6 --core` - a measured road: height over distance
 
 `engine-mount drive --split 500MB` - in several files
 
@@ -96,7 +97,8 @@ def drive(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Scale = None,
-    road: Annotated[str, option('measured road: a table of height over distance', 'FILE')] = '',
+    road: Annotated[str, option('measured road: height over distance, a table or OpenCRG', 'FILE')] = '',
+    lateral: Lateral = 0.0,
     speed: SpeedText = '',
     distance: Distance = '',
     contact_length: Annotated[
@@ -166,7 +168,7 @@ def drive(
         )  # fmt: skip
     if not road:
         refuse_without(
-            'road', 'road', speed=speed, distance=distance,
+            'road', 'road', speed=speed, lateral=lateral, distance=distance,
             contact_length=contact_length, repeat=repeat,
         )  # fmt: skip
     elif file:
@@ -182,7 +184,7 @@ def drive(
         if len(column or []) > 1:
             raise typer.BadParameter('--column is given once for a road: the column of its height')
         height = ''.join(column or [])
-        found = read_road(road, column=height, distance=distance, speed=speed)
+        found = read_road(road, lateral=lateral, column=height, distance=distance, speed=speed)
         length = float(duration or parameters.get('mount_sim', {}).get('timeline.duration', 0.0))
         excitation = measured_road(found, duration=length, contact_length=contact_length, repeat=repeat)
     elif file:

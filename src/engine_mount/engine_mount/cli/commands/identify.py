@@ -1,11 +1,9 @@
 """`engine-mount identify`: from recordings of a rack to parameters."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.calibration.given import per_file
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -16,12 +14,10 @@ from engine_mount.cli.commands.options import (
     MapFile,
     Rate,
     TimeColumn,
-    argument,
     mapping_of,
     option,
     stated,
 )
-from engine_mount.cli.completion import recordings
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, Group
 
@@ -64,9 +60,7 @@ def friction(
     held_out: Annotated[
         list[str] | None, option('recordings that no fit sees, to judge by', 'FILE...')
     ] = None,
-    file: Annotated[
-        list[str] | None, option('train on each, predict each other one; of one, its halves', 'FILE...')
-    ] = None,
+    file: Annotated[list[str] | None, option('train on each, predict each other one', 'FILE...')] = None,
     step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     channel: Annotated[
         list[str] | None,
@@ -89,10 +83,7 @@ def friction(
     ] = 'sliding',
     zero: Annotated[
         str,
-        option(
-            'zero of the force: law (from the loop), rest (before the motion), recorded; default: law for '
-            'JSON of a damper, else recorded'
-        ),
+        option('zero of the force: law (from the loop) or recorded; default: law for JSON of a damper'),
     ] = '',
     seed: Annotated[int, option('seed of the starts of the searches')] = 0,
     json_file: JsonFile = None,
@@ -125,42 +116,3 @@ def friction(
             base=base or '', progress=bar,
         )  # fmt: skip
     publish(result, json_file, figure, out, name)
-
-
-DRIFT_EPILOG = (
-    EXIT_CODES
-    + """
-
-`engine-mount identify drift bags/monday bags/tuesday bags/friday --figure wear.png`
-
-`engine-mount identify drift a b c --hours a=120 --hours b=180 --hours c=260` - by a counter
-"""
-)
-
-
-@app.command(cls=Command, epilog=DRIFT_EPILOG)
-def drift(
-    recordings: Annotated[
-        list[Path], argument('runs or recordings with an initialisation', 'RECORDING...', recordings)
-    ],
-    specimen: Annotated[
-        Path | None, option('specimen file of this actuator; default: the shipped one')
-    ] = None,
-    hours: Annotated[
-        list[str] | None,
-        option('hours of all recordings; default: when sessions began', 'RECORDING=H'),
-    ] = None,
-    json_file: JsonFile = None,
-    figure: Figure = None,
-) -> None:
-    """Show wear of the pads per hour, with its uncertainty, and the travel left until the law's range ends.
-
-    A line through the contact gaps of all recordings, weighted by the deviations that the initialisations
-    stated; where gaps scatter more than that, by as much less sure. Offset current likewise from its scatter.
-    """
-    from engine_mount.identification import identify
-    from engine_mount.identification.specimen import check_targets
-
-    check_targets(json_file, figure)
-    counter = per_file(hours or [], recordings, '--hours')
-    publish(identify.drift(recordings, hours=counter, specimen=specimen or ''), json_file, figure)

@@ -128,6 +128,7 @@ Scale = Annotated[
     float | None,
     option('foreign file: factor to m/s^2 upwards, or on a column with a unit; -1: an axis that points down'),
 ]
+Lateral = Annotated[float, option('OpenCRG: track so far left of the reference line', 'M')]
 Distance = Annotated[
     str, option('road: column of the distance, or the distance between two heights', 'NAME[:UNIT]|M')
 ]

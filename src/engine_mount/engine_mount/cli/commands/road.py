@@ -8,6 +8,7 @@ import typer
 from engine_mount.cli.commands.options import (
     Distance,
     Figure,
+    Lateral,
     Rate,
     Scale,
     SpeedText,
@@ -29,7 +30,7 @@ _SHOW_EPILOG = """Exit code: 0 when the file is a road, 1 with the reason when n
 
 Examples:
 
-`engine-mount road show blocks.csv --figure road.png`
+`engine-mount road show blocks.crg --lateral 0.75 --figure road.png`
 
 `engine-mount road show profile.csv --column Hoehe:mm --distance Weg:m --speed 60/3.6`
 """
@@ -46,7 +47,8 @@ Examples:
 
 @app.command(cls=Command, epilog=_SHOW_EPILOG)
 def show(
-    file: Annotated[str, argument('table of height over distance', 'FILE')],
+    file: Annotated[str, argument('height over distance: a table, or OpenCRG', 'FILE')],
+    lateral: Lateral = 0.0,
     column: Annotated[str, option('column of the height', 'NAME[:UNIT]')] = '',
     distance: Distance = '',
     speed: SpeedText = '',
@@ -61,7 +63,7 @@ def show(
     from engine_mount.recordings.screen import Table
 
     screen = TerminalScreen()
-    found = road(file, column=column, distance=distance, speed=speed)
+    found = road(file, lateral=lateral, column=column, distance=distance, speed=speed)
     screen.table(Table(found.profile.name, 'll', found.rows()))
     for sentence in found.profile.notes:
         screen.note(sentence)

@@ -9,9 +9,8 @@ As printed, nine numbers of a (and six of b) have scales that no measurement sep
 Compare a and b with other results, not these numbers one by one.
 """
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -25,8 +24,6 @@ from engine_mount.identification.fitting import (
 from engine_mount.identification.friction.sawtooth import StrokeLine
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient, slope_coefficient
 
-VARIANTS = ('full', 'unloaded slope', 'constant slope')
-"""Forms of b: as above, with s_b = 0, and b = b_offset."""
 NORMALISED_AT = 100.0
 FEWEST_SPEEDS = 4
 """In each direction: A_1, A_2, A_3 and one more."""
@@ -39,27 +36,23 @@ _TYPICAL_B_MM = 0.3
 _PER_100_N = np.array([1.0, 1.0, 1.0, 0.01])  # rises with the load are fitted per 100 N
 
 
-@dataclass(frozen=True)
-class CoefficientFit:
+class CoefficientFit(NamedTuple):
     """Parameters of Eqs (12)-(14), and how they meet the lines: rms of a (1) and of b (1/mm).
 
-    `variant` is the form of b. `covariances` holds for the numbers that were fitted together, by their names
-    in `FrictionCoefficients`, their covariance (4, 4); with alpha_2 or beta_2 goes alpha_1 or beta_1, which
-    is 1 - 100 N times it. What was not fitted has 0. `held_out_error` is that of the full model, NaN where
-    nothing was held out.
+    `covariances` holds for the numbers that were fitted together, by their names in `FrictionCoefficients`,
+    their covariance (4, 4); with alpha_2 or beta_2 goes alpha_1 or beta_1, which is 1 - 100 N times it. What
+    was not fitted has 0.
     """
 
     coefficients: FrictionCoefficients
-    variant: str
     a_rms: float
     b_rms_mm: float
     covariances: dict[tuple[str, ...], FloatArray]
-    held_out_error: float = math.nan
 
 
 @single_threaded()
-def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> CoefficientFit:
-    """Return the coefficients for the lines of step 2, with one of `VARIANTS`.
+def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
+    """Return the coefficients for the lines of step 2.
 
     Without different loads nothing depends on F_N. Raises `IdentificationError` for one direction only or too
     few speeds.
@@ -76,7 +69,7 @@ def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> Coef
         values |= dict(zip(names, (level, gain, shift, 0.01 * rise), strict=True))
         values[f'alpha_{side}1'] = 1.0 - 0.01 * rise * NORMALISED_AT
         covariances[names] = covariance
-    (offset, first, second, rise), covariance = _slope_fit(lines, variant, with_load and variant == 'full')
+    (offset, first, second, rise), covariance = _slope_fit(lines, with_load)
     names = ('b_offset', 'b_1', 'b_2', 'beta_2')
     values |= dict(zip(names, (offset, first, second, 0.01 * rise), strict=True))
     values['beta_1'] = 1.0 - 0.01 * rise * NORMALISED_AT
@@ -92,7 +85,7 @@ def fit_coefficients(lines: Sequence[StrokeLine], variant: str = 'full') -> Coef
                                         - np.array([getattr(each, name) for each in lines])))))
         for name, form in (('a', offset_coefficient), ('b', slope_coefficient))
     )  # fmt: skip
-    return CoefficientFit(fitted, variant, a_rms, 1e-3 * b_rms, covariances)
+    return CoefficientFit(fitted, a_rms, 1e-3 * b_rms, covariances)
 
 
 def _check_coverage(lines: Sequence[StrokeLine]) -> None:
@@ -145,19 +138,16 @@ def _offset_fit(lines: Sequence[StrokeLine], with_load: bool) -> tuple[list[floa
     return [*values[:3], values[3] if with_load else 0.0], covariance
 
 
-def _slope_fit(lines: Sequence[StrokeLine], variant: str, loaded: bool) -> tuple[list[float], FloatArray]:
+def _slope_fit(lines: Sequence[StrokeLine], with_load: bool) -> tuple[list[float], FloatArray]:
     """Return b_offset, B_1, B_2, s_b (per 100 N), and their covariance."""
     speed, load, b, deviation = _columns(lines, 'b', 1e-3)
     weight = 1.0 / np.hypot(_TYPICAL_B_MM, deviation)
-    constant = variant == 'constant slope'
 
     def residuals(unknowns: FloatArray) -> FloatArray:
         offset, first, second, rise = unknowns
-        if constant:
-            return np.asarray((offset - b) * weight)
-        factor = 1.0 + (0.01 * rise * load if loaded else 0.0)
+        factor = 1.0 + (0.01 * rise * load if with_load else 0.0)
         # without different loads b_offset and B_1 are one number
-        return np.asarray(((offset if loaded else 0.0) + (first + second * speed) * factor - b) * weight)
+        return np.asarray(((offset if with_load else 0.0) + (first + second * speed) * factor - b) * weight)
 
     (offset, first, second, rise), covariance = _best(
         residuals,
@@ -165,9 +155,7 @@ def _slope_fit(lines: Sequence[StrokeLine], variant: str, loaded: bool) -> tuple
         [-30.0, -100.0, -10.0, -2.0],
         [30.0, 100.0, 10.0, 2.0],
     )
-    if constant:
-        return [offset, 0.0, 0.0, 0.0], covariance
-    return [offset if loaded else 0.0, first, second, rise if loaded else 0.0], covariance
+    return [offset if with_load else 0.0, first, second, rise if with_load else 0.0], covariance
 
 
 def _best(

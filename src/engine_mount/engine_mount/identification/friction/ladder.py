@@ -5,9 +5,8 @@ The training error shows how well a law can follow, the held-out error what it i
 """
 
 import math
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -19,6 +18,7 @@ from engine_mount.identification.friction.recording import (
     smoothed_displacement,
     thinned,
 )
+from engine_mount.identification.friction.screening import explained
 
 SEARCH_SAMPLES = 1200
 """Samples per recording while starts are compared."""
@@ -26,31 +26,36 @@ FINAL_SAMPLES = 5000
 STARTS = 5
 DRAWS = 12
 """So many points are drawn for each start after the first; the search begins at the best of them."""
-TIME_LIMIT = 45.0
-"""Seconds for one law; the best so far counts then."""
 _SPREAD = 1.2  # of the logarithm, by which further starts differ from the first
 
 
-@dataclass(frozen=True)
-class Rung:
-    """One fitted law: its parameters, its errors, how long the search took (s) and whether time ran out."""
+class Rung(NamedTuple):
+    """One fitted law, its parameters, and its errors; that of held-out recordings None without any."""
 
     law: FrictionLaw
     values: FloatArray
     train_error: float
-    held_out_error: float
-    seconds: float
-    out_of_time: bool
+    held_out_error: float | None
 
     @property
     def error(self) -> float:
         """The error that judges the law: held out, or of the training where nothing was."""
-        return self.train_error if math.isnan(self.held_out_error) else self.held_out_error
+        return self.train_error if self.held_out_error is None else self.held_out_error
 
     @property
     def parameters(self) -> dict[str, float]:
         """{parameter: value}."""
         return dict(zip((each.name for each in self.law.parameters), self.values.tolist(), strict=True))
+
+    def figures(self) -> dict[str, Any]:
+        """Return errors and parameters for JSON."""
+        return {
+            'train_error': self.train_error,
+            'held_out_error': self.held_out_error,
+            'explained': explained(self.error),
+            'parameters': self.parameters,
+            'units': {parameter.name: parameter.unit for parameter in self.law.parameters},
+        }
 
 
 def fit_ladder(
@@ -60,17 +65,15 @@ def fit_ladder(
     progress: Progress = silent,
     seed: int = 0,
 ) -> list[Rung]:
-    """Return every law fitted to `training`; the held-out error is NaN without `held_out`.
+    """Return every law fitted to `training`. Nothing of `held_out` enters the fit.
 
-    Nothing of `held_out` enters the fit. `progress(share, law)` is called on the way.
+    `progress(share, law)` is called on the way.
     """
     rungs = []
     for law in laws:
-        begin = time.monotonic()
-        values, out_of_time = _fit_law(law, training, progress, seed)
-        train_error = law_error(law, values, training)
-        held_out_error = law_error(law, values, held_out) if held_out else math.nan
-        rungs.append(Rung(law, values, train_error, held_out_error, time.monotonic() - begin, out_of_time))
+        values = _fit_law(law, training, progress, seed)
+        unseen = law_error(law, values, held_out) if held_out else None
+        rungs.append(Rung(law, values, law_error(law, values, training), unseen))
     return rungs
 
 
@@ -97,11 +100,10 @@ def predicted_force(law: FrictionLaw, values: FloatArray, recording: FrictionRec
 @single_threaded()
 def _fit_law(
     law: FrictionLaw, training: Sequence[FrictionRecording], progress: Progress, seed: int
-) -> tuple[FloatArray, bool]:
-    """Return the best parameters of several bounded searches, and whether time ran out before the end."""
-    end = time.monotonic() + TIME_LIMIT
+) -> FloatArray:
+    """Return the best parameters of several bounded searches."""
     coarse, fine = (
-        _Search(law, [thinned(each, samples) for each in training], end)
+        _Search(law, [thinned(each, samples) for each in training])
         for samples in (SEARCH_SAMPLES, FINAL_SAMPLES)
     )
     random = np.random.default_rng(seed)
@@ -110,21 +112,18 @@ def _fit_law(
         progress(number / (STARTS + 1), law.name)
         starts = [coarse.start(random) for _ in range(DRAWS)] if number else [coarse.start()]
         ends.append(coarse.run(min(starts, key=coarse.cost), 60))
-        if time.monotonic() > end:
-            break
     best = min(ends, key=lambda each: each[1])[0]
     progress(STARTS / (STARTS + 1), law.name)
-    # the coarse result is judged on the fine grid too: a search that time ends early must not make it worse
     values, _ = fine.run(best, 40)
     progress(1.0, law.name)
-    return fine.values(values), time.monotonic() > end
+    return fine.values(values)
 
 
 class _Search:
     """One law on recordings: parameters as the search counts them, by logarithm or in typical sizes."""
 
-    def __init__(self, law: FrictionLaw, recordings: Sequence[FrictionRecording], end: float):
-        self.law, self.recordings, self.end = law, recordings, end
+    def __init__(self, law: FrictionLaw, recordings: Sequence[FrictionRecording]):
+        self.law, self.recordings = law, recordings
         self.low = np.array([each.low for each in law.parameters])
         self.high = np.array([each.high for each in law.parameters])
         self.logarithmic = np.array([each.logarithmic for each in law.parameters])
@@ -164,14 +163,9 @@ class _Search:
 
     def run(self, start: FloatArray, evaluations: int) -> tuple[FloatArray, float]:
         """Return (unknowns, cost) of one search that begins at `start`."""
-
-        def stop_late(intermediate_result: object) -> None:
-            if time.monotonic() > self.end:
-                raise StopIteration
-
         # finite steps wide enough to move turning samples: the laws are not smooth
         fit = least_squares(
             self.residuals, start, bounds=self.bounds, x_scale=1.0, diff_step=1e-4, ftol=1e-7, xtol=1e-7,
-            max_nfev=evaluations, callback=stop_late,
+            max_nfev=evaluations,
         )  # fmt: skip
         return np.asarray(fit.x), float(fit.cost)

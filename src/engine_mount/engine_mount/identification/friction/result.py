@@ -1,30 +1,68 @@
-"""What an identification of friction found: figures, tables, picture, and the specimen made of it."""
+"""What an identification of friction found: validation, figures, tables, picture, and the specimen of it."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+import functools
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.signal import savgol_filter
 
-from engine_mount.identification.fitting import IdentificationError
-from engine_mount.identification.friction.cases import Case, explained, ladder_case
+from engine_mount.identification.fitting import FloatArray, IdentificationError, relative_rms
 from engine_mount.identification.friction.coefficients import CoefficientFit
 from engine_mount.identification.friction.ladder import Rung
-from engine_mount.identification.friction.look import FirstLook
-from engine_mount.identification.friction.pad_law import ModelValidation
+from engine_mount.identification.friction.laws import pad_force
 from engine_mount.identification.friction.ramp_hold import RampHoldFit, mean_contact
-from engine_mount.identification.friction.recording import FrictionRecording
-from engine_mount.identification.friction.sawtooth import StrokeLine
+from engine_mount.identification.friction.recording import FrictionRecording, smoothed_displacement
+from engine_mount.identification.friction.sawtooth import StrokeLine, slip_regions
+from engine_mount.identification.friction.screening import Case, FirstLook, explained, ladder_case
 from engine_mount.identification.specimen import rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
+from mount_models.friction.simplified import simplified_response
 from mount_models.specimen import Specimen
 
 
-@dataclass(frozen=True)
-class Pair:
+class ModelValidation(NamedTuple):
+    """Error of both models on one unseen recording, rms over rms of the measured force (Fig. 11).
+
+    `*_macroslip_error` leaves out what follows a turning point, where the simplified model is not defined,
+    and strokes so slow that it fades mu (see `slip_regions`). `full`, `simplified` are the predicted forces
+    (N, (n,)).
+    """
+
+    recording: FrictionRecording
+    full: FloatArray
+    simplified: FloatArray
+    full_error: float
+    simplified_error: float
+    full_macroslip_error: float
+    simplified_macroslip_error: float
+
+
+def validate(
+    recording: FrictionRecording, contact: FrictionContact, coefs: FrictionCoefficients
+) -> ModelValidation:
+    """Return how full and simplified model predict `recording` from its displacement and normal force."""
+    dt, x, measured = recording.dt, smoothed_displacement(recording), recording.force
+    full = pad_force(contact, coefs, x, dt, recording.normal_force)
+    window = max(3, round(0.02 / dt) | 1)  # 20 ms, chosen: less than the 30 ms or more that are left out
+    short = x.size <= window
+    velocity = np.gradient(x, dt) if short else savgol_filter(x, window, 1, deriv=1, delta=dt)
+    clamp = np.where(velocity >= 0.0, *recording.normal_force.T)
+    simplified, _ = simplified_response(contact, coefs, velocity, clamp, dt)
+    sliding = slip_regions(recording, contact).macro
+    parts = slice(None), sliding if sliding.any() else slice(None)
+    errors = (
+        relative_rms((force - measured)[part], measured[part])
+        for part in parts
+        for force in (full, simplified)
+    )
+    return ModelValidation(recording, full, simplified, *errors)
+
+
+class Pair(NamedTuple):
     """The ladder trained on one recording and tried on another."""
 
     train: str
@@ -36,9 +74,8 @@ class Pair:
 class FrictionIdentification:
     """All that was found; lists are empty where a step had no recordings.
 
-    `recordings` holds part, kind and SHA-256 of each, `looks` go by recording too. `fits` are the forms of b.
-    `cases` keep a coefficient of friction from being written. `contact` is that of the `base` where no ramp
-    was recorded.
+    `recordings` holds part, kind and SHA-256 of each, `looks` go by recording too. `cases` keep a coefficient
+    of friction from being written. `contact` is that of the `base` where no ramp was recorded.
     """
 
     base: Specimen
@@ -46,7 +83,7 @@ class FrictionIdentification:
     ramps: list[RampHoldFit] = field(default_factory=list)
     contact: FrictionContact | None = None
     lines: list[StrokeLine] = field(default_factory=list)
-    fits: list[CoefficientFit] = field(default_factory=list)
+    fit: CoefficientFit | None = None
     validations: list[ModelValidation] = field(default_factory=list)
     rungs: list[Rung] = field(default_factory=list)
     held_out: list[FrictionRecording] = field(default_factory=list)
@@ -55,23 +92,14 @@ class FrictionIdentification:
     cases: list[Case] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def fit(self) -> CoefficientFit | None:
-        """The fit of the coefficients that the held-out recordings chose."""
-        return min(self.fits, key=lambda each: np.nan_to_num(each.held_out_error), default=None)
-
-    @property
-    def coefficients(self) -> FrictionCoefficients | None:
-        """The coefficients of that fit."""
-        return self.fit.coefficients if self.fit else None
-
+    @functools.cached_property
     def ladder(self) -> dict[str, dict[str, Any]]:
-        """Return the errors and parameters of each law; over pairs the mean errors, and the worst."""
+        """Errors and parameters of each law; over pairs the mean errors, and the worst."""
         if not self.pairs:
-            return _ladder_figures(self.rungs)
+            return {each.law.name: each.figures() for each in self.rungs}
         result = {}
         for same in zip(*(pair.rungs for pair in self.pairs), strict=True):
-            held_out = [each.held_out_error for each in same]
+            held_out = [each.error for each in same]
             result[same[0].law.name] = {
                 'train_error': float(np.mean([each.train_error for each in same])),
                 'held_out_error': float(np.mean(held_out)),
@@ -83,11 +111,22 @@ class FrictionIdentification:
             }
         return result
 
+    @property
+    def best(self) -> str:
+        """The law with the least error, held out if anything is."""
+        judged = 'held_out_error' if self.pairs or self.held_out else 'train_error'
+        return min(self.ladder, key=lambda name: float(self.ladder[name][judged]))
+
+    def all_cases(self) -> list[Case]:
+        """Return the cases of the recordings and of the ladder."""
+        case = ladder_case(self.ladder, self.best) if self.ladder else None
+        return [*self.cases, *([case] if case else [])]
+
     def figures(self) -> dict[str, Any]:
         """Return everything as plain numbers and texts, for JSON; SI units but where the name has another."""
         result: dict[str, Any] = {'recordings': self.recordings, 'notes': self.notes}
         if self.looks:
-            result['looks'] = {name: asdict(look) for name, look in self.looks.items()}
+            result['looks'] = {name: look._asdict() for name, look in self.looks.items()}
         if self.ramps:
             result['step_1'] = [_ramp_figures(fit) for fit in self.ramps]
         if self.contact is not None:
@@ -99,45 +138,32 @@ class FrictionIdentification:
                 | {'b_per_mm': 1e-3 * line.b, 'b_interval_per_mm': 1e-3 * line.b_interval}
                 for line in self.lines
             ]
-        if self.coefficients is not None:
-            result['coefficients'] = self.coefficients._asdict()
-            result['variants'] = {
-                fit.variant: {
-                    'held_out_error': _known(fit.held_out_error),
-                    'a_rms': fit.a_rms,
-                    'b_rms_per_mm': fit.b_rms_mm,
-                }
-                for fit in self.fits
-            }
+        if self.fit is not None:
+            result['coefficients'] = self.fit.coefficients._asdict()
+            result['residuals'] = {'a_rms': self.fit.a_rms, 'b_rms_per_mm': self.fit.b_rms_mm}
         if self.validations:
             result['validation'] = [
                 {'recording': each.recording.name}
-                | {name: value for name, value in vars(each).items() if name.endswith('_error')}
+                | {name: value for name, value in each._asdict().items() if name.endswith('_error')}
                 for each in self.validations
             ]
-        ladder = self.ladder()
-        if ladder:
-            result['ladder'] = ladder
-            judged = 'train_error' if self.rungs and not self.held_out else 'held_out_error'
-            result['best'] = min(ladder, key=lambda name: ladder[name][judged])
+        if self.ladder:
+            result |= {'ladder': self.ladder, 'best': self.best}
         if self.pairs:
             result['pairs'] = [
                 {
                     'train': pair.train,
                     'held_out': pair.recording.name,
-                    'ladder': _ladder_figures(pair.rungs),
+                    'ladder': {each.law.name: each.figures() for each in pair.rungs},
                 }
                 for pair in self.pairs
             ]
-        case = ladder_case(ladder)
-        result['cases'] = [asdict(each) for each in (*self.cases, *([case] if case else []))]
-        return result
+        return {**result, 'cases': [case._asdict() for case in self.all_cases()]}
 
     def report(self, screen: Screen) -> None:
         """Show notes, steps, ladder and what keeps a coefficient from being written."""
         for sentence in self.notes:
             screen.note(sentence)
-        result, fit = self.figures(), self.fit
         if self.ramps:
             rows = [
                 (
@@ -153,27 +179,24 @@ class FrictionIdentification:
             ]
             heads = ('step 1', 'c_R (N/m)', 'd_R (N s/m)', 'c_Re (N/m)', 'p (N/m)', 'T (s)')
             screen.table(Table('', 'lrrrrr', rows, heads))
-        if fit is not None:
+        if self.fit is not None:
             screen.say(
-                f'steps 2, 3: {len(self.lines)} strokes; Eqs (13), (14) meet them within {fit.a_rms:.4f} (a) '
-                f'and {fit.b_rms_mm:.2f} 1/mm (b) rms'
+                f'steps 2, 3: {len(self.lines)} strokes; Eqs (13), (14) meet them within '
+                f'{self.fit.a_rms:.4f} (a) and {self.fit.b_rms_mm:.2f} 1/mm (b) rms'
             )
-            for each in self.fits if self.held_out else []:
-                screen.say(f'  form of b: {each.variant}: {_percent(each.held_out_error)} held out')
-        for validation in self.validations:
+        for each in self.validations:
             screen.say(
-                f'held out {validation.recording.name}: full model {_percent(validation.full_error)}, '
-                f'simplified {_percent(validation.simplified_error)}; macroslip '
-                f'{_percent(validation.full_macroslip_error)}, '
-                f'{_percent(validation.simplified_macroslip_error)}'
+                f'held out {each.recording.name}: full model {each.full_error:.1%}, simplified '
+                f'{each.simplified_error:.1%}; macroslip {each.full_macroslip_error:.1%}, '
+                f'{each.simplified_macroslip_error:.1%}'
             )
         if self.pairs:
             screen.table(self._pair_table())
-        if 'ladder' in result:
-            screen.table(_ladder_table(result['ladder']))
-            screen.say(f'best: {result["best"]}')
-        for case in result['cases']:
-            screen.note(case['sentence'], 'warning')
+        if self.ladder:
+            screen.table(_ladder_table(self.ladder))
+            screen.say(f'best: {self.best}')
+        for case in self.all_cases():
+            screen.note(case.sentence, 'warning')
 
     def specimen(self, name: str = '') -> Specimen:
         """Return the base under `name` with the identified contact and coefficients.
@@ -202,7 +225,6 @@ class FrictionIdentification:
                 'normal_force': [coefs.lowest_normal_force, coefs.highest_normal_force],
                 'speed': rounded([min(speeds), max(speeds)]),
             },
-            'form_of_b': fit.variant,
             'contact': 'identified' if self.ramps else 'that of the base',
             'residuals': {
                 'a_rms': rounded(fit.a_rms),
@@ -226,32 +248,13 @@ class FrictionIdentification:
         rows = [
             (
                 f'{names.index(pair.train) + 1} -> {names.index(pair.recording.name) + 1}',
-                *(_percent(each.held_out_error) for each in pair.rungs),
+                *(f'{each.error:.1%}' for each in pair.rungs),
             )
             for pair in self.pairs
         ]
         heads = ('held-out error', *(each.law.name for each in self.pairs[0].rungs))
         caption = ', '.join(f'{number}: {name}' for number, name in enumerate(names, 1))
         return Table('', 'l' + 'r' * (len(heads) - 1), rows, heads, caption)
-
-
-def _known(value: float) -> float | None:
-    return None if np.isnan(value) else value
-
-
-def _ladder_figures(rungs: Sequence[Rung]) -> dict[str, dict[str, Any]]:
-    return {
-        each.law.name: {
-            'train_error': each.train_error,
-            'held_out_error': _known(each.held_out_error),
-            'explained': explained(each.error),
-            'parameters': each.parameters,
-            'units': {parameter.name: parameter.unit for parameter in each.law.parameters},
-            'seconds': each.seconds,
-            'out_of_time': each.out_of_time,
-        }
-        for each in rungs
-    }
 
 
 def _ramp_figures(fit: RampHoldFit) -> dict[str, Any]:
@@ -268,15 +271,10 @@ def _ramp_figures(fit: RampHoldFit) -> dict[str, Any]:
 
 
 def _ladder_table(ladder: dict[str, dict[str, Any]]) -> Table:
-    rows = []
-    for name, entry in ladder.items():
-        parameters = next(iter(entry['parameters'].values()))
-        count = len(parameters if isinstance(parameters, dict) else entry['parameters'])
-        shares = (_percent(entry[key]) for key in ('held_out_error', 'train_error', 'explained'))
-        rows.append((name, *shares, str(count)))
+    keys = ('held_out_error', 'train_error', 'explained')
+    rows = [
+        (name, *('-' if entry[key] is None else f'{entry[key]:.1%}' for key in keys))
+        for name, entry in ladder.items()
+    ]
     caption = 'errors: rms over rms; explains: share of the mean square of the force'
-    return Table('', 'lrrrr', rows, ('law', 'held out', 'training', 'explains', 'parameters'), caption)
-
-
-def _percent(value: float | None) -> str:
-    return '-' if value is None else f'{100 * value:.1f} %'
+    return Table('', 'lrrr', rows, ('law', 'held out', 'training', 'explains'), caption)

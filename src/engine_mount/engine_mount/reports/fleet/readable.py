@@ -5,7 +5,6 @@ from collections.abc import Iterable
 
 _DIGITS = 3  # chosen
 _SMALL = 1e-4  # m, chosen: where all is below, µm
-_LONG_TIME = 3600.0  # s
 
 
 def handy_unit(unit: str, values: Iterable[float]) -> tuple[float, str]:
@@ -28,8 +27,3 @@ def quantity(value: float, unit: str, *, signed: bool = False) -> str:
     """Return a number in `unit` with the unit in which it is read."""
     factor, shown = handy_unit(unit, [value])
     return ' '.join(filter(None, (number(factor * value, signed=signed), shown)))
-
-
-def length_of_time(seconds: float) -> str:
-    """Return a duration in s, or in h where it is long."""
-    return f'{seconds / 3600.0:.1f} h' if seconds >= _LONG_TIME else f'{seconds:.0f} s'

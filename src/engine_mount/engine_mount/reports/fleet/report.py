@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from engine_mount.reports.fleet.distributions import pairs_of, spread
 from engine_mount.reports.fleet.looks import Look, look_section
-from engine_mount.reports.fleet.readable import length_of_time, quantity
+from engine_mount.reports.fleet.readable import quantity
 from engine_mount.reports.fleet.worst_table import worst_section
 from engine_mount.reports.report import Report
 from engine_mount.reports.sections.section import (
@@ -98,7 +98,8 @@ def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Sec
 def _recordings(rows: Rows, done: Rows, failed: Rows, verb: str) -> Finding:
     every, without = ({row['recording'] for row in each} for each in (rows, failed))
     replayed = {row['recording'] for row in done} - without
-    length = length_of_time(sum(row['duration_s'] or 0.0 for row in rows))
+    seconds = sum(row['duration_s'] or 0.0 for row in rows)
+    length = f'{seconds / 3600.0:.1f} h' if seconds >= 3600.0 else f'{seconds:.0f} s'
     text: list[Cell] = [f'{len(every)} recordings: {len(replayed)} {verb} ({length}),']
     if others := len(every - without - replayed):
         text += [Link(f'{others} with another policy', 'another_policy'), 'and']

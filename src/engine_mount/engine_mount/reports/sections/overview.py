@@ -1,7 +1,7 @@
 """What a report begins with: the verdict, the figures that one wants to see first, and what is missing."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def overview(subjects: Sequence[Subject]) -> Section:
 
 def findings(subject: Subject) -> list[Finding]:
     """Return the four findings on a recording, with its name where there are several."""
-    parts: dict[str, Callable[[Subject], tuple[str, Sequence[Cell]]]] = {
+    parts = {
         'Switching': _switching,
         'Faults': _faults,
         'Losses': _losses,

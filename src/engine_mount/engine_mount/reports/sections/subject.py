@@ -71,8 +71,7 @@ _SETTLING = 0.5  # s, chosen: after damping went on
 _SINE_SHARE = 0.98  # chosen: of the variance, above which a stretch counts as one sine
 
 
-@dataclass(frozen=True)
-class Signal:
+class Signal(NamedTuple):
     """One signal: times in s on the time axis of the report, rising, and values in SI units."""
 
     time: Array

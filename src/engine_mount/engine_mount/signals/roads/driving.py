@@ -175,13 +175,15 @@ class Road:
         return rows
 
 
-def road(file: str | Path, *, column: str = '', distance: str = '', speed: str = '') -> Road:
-    """Return the road in a table of height over distance, path or URI.
+def road(
+    file: str | Path, *, lateral: float = 0.0, column: str = '', distance: str = '', speed: str = ''
+) -> Road:
+    """Return the road in an OpenCRG file or a table of height over distance, path or URI.
 
-    For `column` and `distance` see `road_profile`, for `speed` see `speed_of`. Raises `SignalError` or
-    `SourceError`.
+    `lateral`, `column` and `distance` as of `road_profile`, `speed` as of `speed_of`. Raises `SignalError`
+    or `SourceError`.
     """
-    profile = road_profile(file, column=column, distance=distance)
+    profile = road_profile(file, lateral=lateral, column=column, distance=distance)
     return Road(profile, unevenness(profile), speed_of(speed) if speed else None)
 
 

@@ -1,17 +1,21 @@
-"""A road from a table of height over distance; whether it is one, and even."""
+"""A road from an OpenCRG file or a table of height over distance; whether it is one, and even."""
 
+import hashlib
 import re
 from pathlib import Path
 
 import numpy as np
 
 from engine_mount.signals.even_grid import interpolated
+from engine_mount.signals.formats.measured import Provenance
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name
+from engine_mount.signals.roads.crg import read_track
 from engine_mount.signals.roads.iso8608 import RoadProfile, root_mean_square, unevenness
 from engine_mount.signals.selection import select_rows
 from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.sources.stores import local_copy
 from engine_mount.signals.sources.uris import name_of
 
 EFFECTIVE = 'effective_height'
@@ -39,14 +43,23 @@ _HEIGHT = Quantity(
 _OPTION = '--column {column}:{unit}, of a distance --distance {column}:{unit}'
 
 
-def road_profile(uri: str | Path, *, column: str = '', distance: str = '') -> RoadProfile:
+def road_profile(
+    uri: str | Path, *, lateral: float = 0.0, column: str = '', distance: str = ''
+) -> RoadProfile:
     """Return the road in the file at `uri`, checked, on an even grid.
 
-    `column` and `distance` are NAME or NAME:UNIT of columns, the distance may be that between two heights
-    (m). Raises `SignalError` or `SourceError` with one sentence.
+    `lateral` (m, left of the reference line) chooses the track of an OpenCRG file; `column` and `distance`,
+    NAME or NAME:UNIT, the columns of a table, the distance may be that between two heights (m). Raises
+    `SignalError` or `SourceError` with one sentence.
     """
-    if str(uri).lower().endswith('.crg'):
-        raise SignalError(f'{uri}: OpenCRG is not read; export one track as a table of distance and height')
+    name = name_of(str(uri))
+    if name.lower().endswith('.crg'):
+        with local_copy(str(uri)) as path:
+            content = path.read_bytes()
+        places, heights, notes = read_track(name, content, lateral)
+        digest = hashlib.sha256(content).hexdigest()
+        provenance = Provenance(str(uri), digest, len(content), 'OpenCRG', 'engine_mount.signals')
+        return _checked_profile(name, places, heights, provenance, notes)
     measured = read(uri)
     spaced = re.fullmatch(r'[\d.]+(e-?\d+)?', distance)
     known = by_name(_HEIGHT) if spaced else by_name(_HEIGHT, _DISTANCE)
@@ -54,14 +67,29 @@ def road_profile(uri: str | Path, *, column: str = '', distance: str = '') -> Ro
     texts = [f'{name}={text}' for name, text in said.items() if text and name in known]
     mapping = with_options(Mapping(option=_OPTION), texts, known=known)
     rows = select_rows(measured, mapping, known, known)
-    heights, name = rows['height'], name_of(str(uri))
+    heights = rows['height']
     places = float(distance) * np.arange(heights.size) if spaced else rows['distance']
     chosen = mapping.columns['height'].column if column else EFFECTIVE
     effective = chosen == EFFECTIVE and EFFECTIVE in measured.columns
-    spacing, even, done = _even_places(name, places, heights)
-    profile = RoadProfile(
-        float(places[0]), spacing, even, measured.provenance, (*measured.notes, *done), effective
-    )
+    return _checked_profile(name, places, heights, measured.provenance, measured.notes, effective)
+
+
+def _checked_profile(
+    name: str,
+    places: FloatArray,
+    heights: FloatArray,
+    provenance: Provenance,
+    notes: tuple[str, ...],
+    effective: bool = False,
+) -> RoadProfile:
+    """Return heights (n,) at places (n,), m, on an even grid; raises `SignalError` where they are no road."""
+    known = np.flatnonzero(np.isfinite(heights))
+    if not known.size:
+        raise SignalError(f'{name} holds no height: all {heights.size} are missing')
+    if missing := heights.size - 1 - int(known[-1] - known[0]):
+        notes = (*notes, f'{missing} missing heights at the ends are left out')
+    spacing, even, done = _even_places(name, places[known], heights[known])
+    profile = RoadProfile(float(places[known[0]]), spacing, even, provenance, (*notes, *done), effective)
     _check_road(profile)
     return profile
 

@@ -66,11 +66,6 @@ def test_what_is_no_road_is_refused_with_its_guess(road, columns, how, reason):
         road(columns, **how)
 
 
-def test_a_file_of_opencrg_is_refused_with_what_to_export():
-    with pytest.raises(SignalError, match=r'OpenCRG is not read; export one track as a table'):
-        road_profile('blocks.crg')
-
-
 def test_uneven_places_are_brought_onto_an_even_grid(road):
     uneven = np.sort(PLACES + 0.01 * np.random.default_rng(3).uniform(-1.0, 1.0, PLACES.size))
     made = road({'x [m]': uneven, 'z [m]': 0.01 * np.sin(uneven)})

@@ -35,7 +35,7 @@ Examples:
 
 `engine-mount fleet worst catalogue --by peak_displacement_m --count 3` - the largest motions
 
-`engine-mount fleet worst catalogue --by contact_gap_m --lowest` - the smallest gaps
+`engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
 REPORT_EPILOG = """Exit code: 0 when the page is written, also where a recording could not be read again for
 its picture, which the page says; 1 when there is no result, or the page cannot be written.
@@ -74,9 +74,6 @@ def worst(
     folder: Annotated[Path, argument('result or catalogue', 'FOLDER')],
     by: Annotated[str, option('column of numbers', 'COLUMN')],
     count: Annotated[int, option('how many', least=1)] = 10,
-    lowest: Annotated[
-        bool, flag('--lowest', 'the smallest values; otherwise the largest, whatever their sign')
-    ] = False,
     json_file: JsonFile = None,
 ) -> None:
     """List the recordings with the largest values of a column, with the commands that open them."""
@@ -84,8 +81,8 @@ def worst(
     from engine_mount.fleet.questions import worst
 
     screen, rows = TerminalScreen(), []
-    for row, value, uri, commands in worst(folder, by, count, lowest=lowest):
-        recording, mount = row['recording'], row['mount'] or ''
+    for row, uri, commands in worst(folder, by, count):
+        recording, mount, value = row['recording'], row['mount'] or '', row[by]
         rows.append({'recording': recording, 'mount': mount, 'uri': uri, by: value, 'commands': commands})
         name = f'{recording} {mount}'.rstrip()
         screen.say('\n    '.join([f'{len(rows):>2}. {name}: {by} {value:.6g}', *commands]))

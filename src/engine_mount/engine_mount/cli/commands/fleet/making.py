@@ -22,7 +22,6 @@ from engine_mount.cli.commands.options import (
 
 if TYPE_CHECKING:
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.fleet.job import JobProgress
 
 EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
 
@@ -103,9 +102,6 @@ def index(
     out: Annotated[Path, option('folder to make or to bring up to date', 'CATALOGUE')],
     scheduler: Scheduler = 'local',
     workers: Workers = 0,
-    memory: Annotated[
-        int, option('local: most for each process; 0: its share of the machine', 'MB', least=0)
-    ] = 0,
     json_file: JsonFile = None,
 ) -> None:
     """Write what each recording is and holds into a catalogue: a row for it, and one for each event."""
@@ -116,8 +112,8 @@ def index(
 
     screen, began = TerminalScreen(), monotonic()
     with _resumable(screen, 'indexing', transient=True) as progress:
-        found = index(uris, out, progress, scheduler=scheduler, workers=workers, memory=memory * 1_000_000)
-    counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'vanished', 'unreadable')}
+        found = index(uris, out, progress, scheduler=scheduler, workers=workers)
+    counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'unreadable')}
     for name, count in {**counts, 'catalogue': out}.items():
         screen.say(f'{name:<12}{count}')
     if found.unreadable:
@@ -158,11 +154,10 @@ def replay(
         f'recordings {figures["recordings"]}{before}: {figures["replayed"]} replayed, {others}'
         f'{figures["failed"]} failed'
     )
-    if figures['workers']:
-        screen.say(
-            f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
-            f'{figures["real_time_factor_per_core"]:.0f} x real time on each of {figures["workers"]} cores'
-        )
+    screen.say(
+        f'replayed   {figures["replayed_s"]:.0f} s in {figures["wall_s"]:.1f} s, '
+        f'{figures["real_time_factor"]:.0f} x real time'
+    )
     screen.say(f'result     {out}')
     if figures['failed']:
         _note_question(screen, f'{figures["failed"]} failed', out, "result where outcome = 'failed'")
@@ -178,16 +173,14 @@ def replay(
 @contextlib.contextmanager
 def _resumable(
     screen: 'TerminalScreen', what: str, *, transient: bool = False
-) -> Iterator[Callable[['JobProgress'], None]]:
+) -> Iterator[Callable[[int, int], None]]:
     """Give what shows the progress of a job, and say after an interrupt or a lost cluster how it goes on."""
     from engine_mount.fleet.runner import SchedulerLostError
     from mount_bringup.graph.shutdown import Interrupted
 
     with screen.bar(what, transient=transient) as show:
         try:
-            yield lambda now: show(
-                now.done / max(now.of, 1), detail=f'{now.done} of {now.of}, {now.rate:.1f} recordings/s'
-            )
+            yield lambda done, of: show(done / max(of, 1), detail=f'{done} of {of} recordings')
         except KeyboardInterrupt:
             raise Interrupted(f'what was done stands, and {_GOES_ON}') from None
         except SchedulerLostError as error:

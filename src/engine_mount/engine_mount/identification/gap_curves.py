@@ -1,25 +1,51 @@
-"""Gap curves with their uncertainty through points at known gaps, and their inverses."""
+"""Gap curves with their uncertainty through ripple recorded at known gaps, and their inverses (Fig. 4)."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfit, polyval, polyvander
 
-from engine_mount.identification.coil.points import GapPoint
 from engine_mount.identification.fitting import FloatArray, single_threaded
+from mount_models.coil.crossing import CrossingError, find_crossing
 from mount_models.coil.gap import GapCurves, ScaledPolynomial, check_gap_curves, evaluate, slope
 from mount_models.quantity import LawRefusedError
 
+_FEWEST_AT_REST = 20  # chosen
+_REST_HALF_WIDTH = 0.02  # A, chosen: there the inductance is straight over the current
+_CROSSING_HALF_WIDTH = 0.2  # A, chosen
 _FEWEST_GAPS = 6  # chosen: a cubic and two to judge it
 _CONTRADICTION = 3e-6  # m, chosen: below it a point is as good as its gap could be set
 _FAR = 10.0  # standard deviations, chosen: few points are a poor measure of their scatter
 _NEARLY = 1.1  # chosen
 _INVERSE_ERROR = 0.05e-6  # m
+_BEYOND_DOUBT = 2.0  # standard deviations, chosen
 
 
-@dataclass(frozen=True)
-class CurveFit:
+class RippleRecording(NamedTuple):
+    """Ripple at one gap (m) and coil temperature (degC): currents (A) and inductances (H), shape (N,)."""
+
+    name: str
+    gap: float
+    celsius: float
+    current: FloatArray
+    inductance: FloatArray
+
+
+class GapPoint(NamedTuple):
+    """One recording: inductance at rest (H) and crossing current (A) with their standard deviations."""
+
+    name: str
+    gap: float
+    celsius: float
+    inductance: float
+    inductance_std: float
+    crossing_current: float
+    crossing_std: float
+
+
+class CurveFit(NamedTuple):
     """A curve over the gap, the covariance of its coefficients, and its errors at the points as gaps (m).
 
     `largest_gap_std` (m) is the largest standard deviation of a gap read from it, by the curve alone.
@@ -31,14 +57,8 @@ class CurveFit:
     gap_rms: float
     largest_gap_std: float
 
-    @property
-    def degree(self) -> int:
-        """Degree of the polynomial."""
-        return len(self.polynomial.coefficients) - 1
 
-
-@dataclass(frozen=True)
-class GapCalibration:
+class GapCalibration(NamedTuple):
     """The four curves of the controller, and the two fits over the gap that they come from."""
 
     curves: GapCurves
@@ -47,12 +67,47 @@ class GapCalibration:
     points: tuple[GapPoint, ...]
 
 
+def measured_point(
+    recording: RippleRecording, rest_current: float = 0.2, crossing_inductance: float = 20e-3
+) -> GapPoint:
+    """Return L_0.2 and i_20 of one recording; raises `LawRefusedError` naming it."""
+    name, gap, celsius, current, inductance = recording
+    near = (np.abs(current - rest_current) <= _REST_HALF_WIDTH) & np.isfinite(inductance)
+    if near.sum() < _FEWEST_AT_REST:
+        raise LawRefusedError(
+            f'{name}: samples within {_REST_HALF_WIDTH:.2f} A of the rest current ({rest_current:.2f} A) '
+            f'must be at least {_FEWEST_AT_REST}, {int(near.sum())} are: '
+            'a table of few points is not enough; record the ripple, and hold that current for longer'
+        )
+    at_rest = _rest_inductance((current[near] - rest_current) / _REST_HALF_WIDTH, inductance[near])
+    try:
+        crossing = find_crossing(current, inductance, crossing_inductance, _CROSSING_HALF_WIDTH)
+    except CrossingError as error:
+        raise LawRefusedError(f'{name}: {error}, or choose another --crossing-inductance') from error
+    return GapPoint(name, gap, celsius, *at_rest, crossing.current, crossing.current_std)
+
+
+def _rest_inductance(z: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Return the inductance (H) at the rest current and its std: a line through the samples around it."""
+    deviation = np.abs(values - np.median(values))
+    kept = deviation <= max(4.0 * 1.4826 * float(np.median(deviation)), 0.02 * abs(float(np.median(values))))
+    z, values = z[kept], values[kept]
+    powers = np.stack([np.ones_like(z), z], axis=1)
+    if np.ptp(z) < 0.1:
+        powers = powers[:, :1]  # the current was held: nothing to be said of a slope
+    solution, *_ = np.linalg.lstsq(powers, values, rcond=None)
+    scatter = float(np.sum((values - powers @ solution) ** 2)) / max(1, values.size - powers.shape[1])
+    spread = float(np.linalg.inv(powers.T @ powers)[0, 0])
+    return float(solution[0]), math.sqrt(scatter * spread)
+
+
 @single_threaded()
 def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) -> GapCalibration:
     """Return the curves through points at one temperature, both ways.
 
     The degree is the lowest that predicts each point from the others nearly as well as the best one. Raises
-    `LawRefusedError` for too few gaps, a point that contradicts the others, or curves not monotone.
+    `LawRefusedError` for too few gaps, a point that contradicts the others, or a curve that does not tell
+    gaps apart.
     """
     points = sorted(points, key=lambda point: point.gap)
     gaps = np.array([point.gap for point in points])
@@ -62,17 +117,27 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
             f'{gaps.size} given: {", ".join(f"{gap * 1e6:.1f}" for gap in gaps)} um: record more gaps, and '
             'each temperature and gap once'
         )
-    fits, curves = [], []
-    for what, value, std in (
-        ('inductance at the rest current', 'inductance', 'inductance_std'),
-        ('crossing current', 'crossing_current', 'crossing_std'),
-    ):
-        values, stds = (np.array([getattr(point, name) for point in points]) for name in (value, std))
-        fits.append(_fit_curve(what, points, values, stds, highest_degree))
-        curves += [fits[-1].polynomial, _inverse_curve(what, fits[-1].polynomial)]
-    gap_curves = GapCurves(*curves)
-    check_gap_curves(gap_curves)
-    return GapCalibration(gap_curves, fits[0], fits[1], tuple(points))
+    inductance, crossing = (
+        _fit_curve(
+            what,
+            points,
+            np.array([getattr(point, value) for point in points]),
+            np.array([getattr(point, std) for point in points]),
+            highest_degree,
+        )
+        for what, value, std in (
+            ('inductance at the rest current', 'inductance', 'inductance_std'),
+            ('crossing current', 'crossing_current', 'crossing_std'),
+        )
+    )
+    curves = GapCurves(
+        inductance.polynomial,
+        _inverse_curve(inductance.polynomial),
+        crossing.polynomial,
+        _inverse_curve(crossing.polynomial),
+    )
+    check_gap_curves(curves)
+    return GapCalibration(curves, inductance, crossing, tuple(points))
 
 
 def _fit_curve(
@@ -97,26 +162,42 @@ def _fit_curve(
     errors = off / np.maximum(np.abs(slope(polynomial, gaps)), 1e-12)
     scatter = float(np.sum((off * weights) ** 2)) / (gaps.size - coefficients.size)
     covariance = max(scatter, 1e-3) * unscaled
-    dense = polyvander(np.linspace(-1.0, 1.0, 101), coefficients.size - 1)
-    band = np.sqrt(np.einsum('ij,jk,ik->i', dense, covariance, dense))
-    steep = np.maximum(np.abs(slope(polynomial, np.linspace(low, high, 101))), 1e-12)
+    grid = np.linspace(-1.0, 1.0, 101)
+    powers = polyvander(grid, coefficients.size - 1)
+    slopes = slope(polynomial, np.linspace(low, high, 101))
+    _check_slopes(what, low + scale * (grid + 1.0), slopes, scale, covariance)
+    gap_std = _deviations(powers, covariance) / np.maximum(np.abs(slopes), 1e-12)
     return CurveFit(
-        polynomial, covariance, errors, float(np.sqrt(np.mean(errors**2))), float(np.max(band / steep))
+        polynomial, covariance, errors, float(np.sqrt(np.mean(errors**2))), float(np.max(gap_std))
     )
 
 
-def _inverse_curve(what: str, polynomial: ScaledPolynomial) -> ScaledPolynomial:
+def _deviations(rows: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the standard deviations of the products of `rows` with coefficients of that covariance."""
+    return np.asarray(np.sqrt(np.einsum('ij,jk,ik->i', rows, covariance, rows)))
+
+
+def _check_slopes(
+    what: str, gaps: FloatArray, slopes: FloatArray, scale: float, covariance: FloatArray
+) -> None:
+    """Raise `LawRefusedError` unless the curve rises, or falls, with the gap beyond doubt of its scatter."""
+    z, degree = (gaps - gaps.mean()) / scale, len(covariance) - 1
+    powers = np.arange(degree + 1) * z[:, np.newaxis] ** np.maximum(np.arange(degree + 1) - 1, 0)
+    doubtful = (
+        np.sign(slopes[slopes.size // 2]) * slopes <= _BEYOND_DOUBT * _deviations(powers, covariance) / scale
+    )
+    if doubtful.any():
+        raise LawRefusedError(
+            f'the {what} must rise or fall steadily with the gap to separate gaps; at '
+            f'{gaps[np.argmax(doubtful)] * 1e6:.0f} um it does not, beyond {_BEYOND_DOUBT:g} standard '
+            'deviations: narrow the range of gaps, or choose another rest current or crossing inductance'
+        )
+
+
+def _inverse_curve(polynomial: ScaledPolynomial) -> ScaledPolynomial:
     """Return the gap over the value of the curve, exact to `_INVERSE_ERROR` where a polynomial can be."""
     gaps = np.linspace(polynomial.low, polynomial.high, 201)
     values = evaluate(polynomial, gaps)
-    steps = np.sign(np.diff(values))
-    if not np.all(steps == steps[0]) or steps[0] == 0.0:
-        turn = int(np.argmax(steps != steps[steps.size // 2]))
-        raise LawRefusedError(
-            f'the {what} must rise or fall steadily with the gap to separate gaps; it turns at '
-            f'{gaps[turn] * 1e6:.0f} um: narrow the range of gaps, or choose another rest current or '
-            'crossing inductance'
-        )
     low, high = float(values.min()), float(values.max())
     centre, scale = 0.5 * (low + high), 0.5 * (high - low)
     z = (values - centre) / scale

@@ -1,4 +1,4 @@
-"""First look at a recording: the zero of its force, and how much of its way the contact slides.
+"""Screening of a recording: the zero of its force, what the contact does, and whether it tells a coefficient.
 
 Coulomb friction behind a spring with play is fitted with an unknown zero, F = law(x) + zero. It holds what a
 loop can show: sliding, sticking (the spring), and play. The contact may begin with a force of its own: how
@@ -12,25 +12,37 @@ open. At rest a damper may stick, with a force of its own, so what a cell reads 
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from engine_mount.identification.fitting import FloatArray, IdentificationError, single_threaded
 from engine_mount.identification.friction.laws import elastic_play_force
-from engine_mount.identification.friction.recording import FrictionRecording, thinned
+from engine_mount.identification.friction.recording import (
+    FrictionRecording,
+    smoothed_displacement,
+    thinned,
+)
 
-ZEROS = ('law', 'rest', 'recorded')
-"""Sources of the zero: the loop, the mean of the rest before the motion, or the file as it is."""
+ZEROS = ('law', 'recorded')
+"""Sources of the zero: the loop, or the file as it is."""
 DOUBTED = 3.0
-"""Deviations by which two zeros must differ to be doubted (chosen)."""
+"""Deviations by which the zero of the loop must differ from 0 to be doubted (chosen)."""
 LARGEST_DEVIATION = 0.2
 """Share of the force of sliding up to which the deviation of a zero counts as known (chosen)."""
 LOOK_SAMPLES = 1200
 """Samples of a recording that the fit sees (chosen)."""
-_REST = 0.1  # s at the beginning
-_AT_REST = 0.01  # of the range of displacement
+NEVER = 0.02
+"""Share of the way below which a contact does not slide (chosen)."""
+MOST = 0.5
+"""Share of the way above which sticking, or play, is what is seen (chosen)."""
+EXPLAINED = 0.6
+"""Share of a force's mean square about its zero that friction with spring and play must explain (chosen)."""
+LARGEST_ERROR = 0.35
+"""Error, rms over rms, above which no law of the ladder counts (chosen): an eighth of the square."""
 _STIFFNESSES = (5.0, 20.0, 80.0)  # of half the range of force over the stroke, chosen
 _PLAYS = (0.002, 0.05, 0.2)  # of the stroke, chosen
 _FINISHED = 3  # searches that are carried through, chosen
@@ -38,16 +50,21 @@ _WIDE = np.array([3.0, 3.0, 3.0, 0.3, 1.0, 1.0])
 """Deviations of the unknowns beforehand (chosen, wide): what the loop does not show stays this unsure."""
 _EXPECTED = np.array([0.0, 0.0, math.log(20.0), 0.0, 0.0, 0.0])
 _LOW, _HIGH = np.array([-9.0, -9.0, -3.0, 0.0, -1.0, -2.0]), np.array([5.0, 5.0, 12.0, 0.6, 1.0, 2.0])
+_BETTER = 1.0 / 3.0  # of what friction leaves over: so little another motion must leave, chosen
+_LONG = 4.0  # so many times the way to and fro that is not sliding makes a stroke, chosen
+_REMEDIES = {
+    'displacement': 'a spring beside the contact, or the rack itself; measure it unclamped and subtract it',
+    'velocity': 'a viscous part; measure it unclamped and subtract it',
+    'acceleration': 'the mass between cell and contact; move more slowly, or subtract its force',
+}
 
 
-@dataclass(frozen=True)
-class FirstLook:
+class FirstLook(NamedTuple):
     """The zero of the force with its deviation (N), and shares of the way (sum 1).
 
     `limits` (N) are the forces of sliding to the positive and the negative side, `stiffness` (N/m) and `play`
     (m, half of it) those of elastic play. `explained` is the share of the mean square of the force about its
-    zero that the fit explains. `taken` (N) was subtracted from the recorded force before, `rest` (N) is what
-    it read at rest before the motion; None where there was no rest.
+    zero that the fit explains. `taken` (N) was subtracted from the recorded force before.
     """
 
     zero: float
@@ -60,7 +77,6 @@ class FirstLook:
     sticking: float
     in_play: float
     taken: float = 0.0
-    rest: float | None = None
 
     @property
     def known(self) -> bool:
@@ -68,58 +84,37 @@ class FirstLook:
         return self.deviation < LARGEST_DEVIATION * (self.limits[0] + self.limits[1]) / 2.0
 
 
+class Case(NamedTuple):
+    """What was seen, in two words, and a sentence with its figures and a remedy."""
+
+    kind: str
+    sentence: str
+
+
 def subtract_zero(recording: FrictionRecording, zero_from: str = '') -> tuple[FrictionRecording, FirstLook]:
     """Return the recording without the zero of its force, with a note, and its first look.
 
     `zero_from` is one of `ZEROS`, or '' for the default of the recording's kind of file. Raises
-    `IdentificationError` for another word, and for 'rest' without any.
+    `IdentificationError` for another word.
     """
     source = zero_from or recording.zero_from
     if source not in ZEROS:
         raise IdentificationError(f'--zero {source!r} must be one of {", ".join(ZEROS)}')
     look = first_look(recording)
-    quiet, x = recording.time <= _REST, recording.displacement
-    moves = np.ptp(x[quiet]) > _AT_REST * np.ptp(x)
-    rest = None if moves else float(recording.force[quiet].mean())
-    if source == 'rest' and rest is None:
-        raise IdentificationError(
-            f'{recording.name}: the displacement moves within the first {_REST:g} s, so there is no rest to '
-            'take the zero of the force from; choose --zero law or recorded'
+    by_loop, zero, note = f'{look.zero:.0f} +- {look.deviation:.0f} N', 0.0, ''
+    if source == 'law' and look.known:
+        zero, note = look.zero, f'force zero {by_loop}, from the loop'
+    elif source == 'law':
+        note = (
+            f'force zero as recorded: the loop gives it only to +- {look.deviation:.0f} N; unclamp the '
+            'damper once and read the cell then'
         )
-    zero, note = _zero(source, look, rest)
+    elif look.known and abs(look.zero) > DOUBTED * look.deviation:
+        note = f'force zero as recorded; doubtful: the loop gives {by_loop}; --zero law subtracts it'
     notes = (*recording.notes, *([note] if note else []))
     return (
         replace(recording, force=recording.force - zero, notes=notes),
-        replace(look, zero=look.zero - zero, taken=zero, rest=rest),
-    )
-
-
-def _zero(source: str, look: FirstLook, rest: float | None) -> tuple[float, str]:
-    """Return the zero (N), and a note on where it comes from and whether it is doubtful."""
-    by_loop = f'{look.zero:.0f} +- {look.deviation:.0f} N'
-    other = 0.0 if rest is None or source == 'recorded' else rest
-    apart = abs(other - look.zero) > DOUBTED * look.deviation
-    if source == 'recorded':
-        doubt = f'force zero as recorded; doubtful: the loop gives {by_loop}; --zero law subtracts it'
-        return 0.0, doubt if look.known and apart else ''
-    if source == 'rest':
-        note = f'force zero {other:.1f} N, from the {_REST:g} s of rest at the beginning'
-        doubt = f'; doubtful: the loop gives {by_loop}, and at rest a contact may stick; --zero law uses it'
-        return other, note + doubt if look.known and apart else note
-    if not look.known:
-        return 0.0, (
-            f'force zero as recorded: the loop gives it only to +- {look.deviation:.0f} N, and the reading '
-            'at rest may be a force that the contact holds; unclamp the damper once and read the cell then'
-        )
-    note = f'force zero {by_loop}, from the loop'
-    if rest is None:
-        return look.zero, note
-    if not apart:
-        return look.zero, f'{note}; the rest before the motion agrees ({rest:.0f} N)'
-    deviations = abs(rest - look.zero) / look.deviation
-    return look.zero, (
-        f'{note}; the rest before the motion reads {rest:.0f} N, {deviations:.0f} deviations from it: there '
-        'the contact may stick with a force of its own, so the rest is not used (--zero rest would)'
+        look._replace(zero=look.zero - zero, taken=zero),
     )
 
 
@@ -216,3 +211,93 @@ def _correlated_samples(values: FloatArray) -> float:
     correlation = correlation / correlation[0]
     ends = np.flatnonzero(correlation < 0.0)
     return float(max(1.0, 2.0 * correlation[: ends[0] if ends.size else None].sum() - 1.0))
+
+
+def case_of(recording: FrictionRecording, look: FirstLook) -> Case | None:
+    """Return the case that a recording is, or None where it slides and its force is of friction.
+
+    A contact that never slips, mostly sticks, or mostly crosses a play, and a force that is not of friction:
+    no coefficient is written to a specimen from any.
+    """
+    name, stroke = recording.name, float(np.ptp(recording.displacement))
+    other = _other_cause(recording, look)
+    if other:
+        return Case(
+            'not of friction',
+            f'{name}: the force is not of friction: with spring and play it explains {look.explained:.0%} of '
+            f'the mean square; {other}',
+        )
+    shares = (
+        f'it slides on {look.sliding:.0%} of its way, sticks on {look.sticking:.0%}, crosses a play of '
+        f'{2e3 * look.play:.2g} mm on {look.in_play:.0%}'
+    )
+    if look.sliding < NEVER:
+        most = float(np.abs(recording.force - look.zero).max())
+        return Case(
+            'never slips',
+            f'{name}: the contact never slips: {shares}; up to {most:.0f} N its spring of '
+            f'{look.stiffness:.3g} N/m holds, so friction is larger than that, by an unknown amount; strokes '
+            f'longer than {1e3 * stroke:.2g} mm, or a lower clamp, would make it slide',
+        )
+    idle = 2.0 * look.play + sum(look.limits) / look.stiffness
+    longer = (
+        f'the coefficient would rest on little; record strokes of {1e3 * _LONG * idle:.2g} mm or more '
+        f'({_LONG:g} times the way of spring and play)'
+    )
+    if look.in_play > MOST:
+        return Case('play dominates', f'{name}: play dominates: {shares}; {longer}, or take the play out')
+    if look.sticking > MOST:
+        return Case('mostly sticks', f'{name}: the contact mostly sticks: {shares}; {longer}')
+    return None
+
+
+def _other_cause(recording: FrictionRecording, look: FirstLook) -> str:
+    """Return what the force goes with instead of friction, in words; '' where friction explains it."""
+    x, force = smoothed_displacement(recording), recording.force - look.zero
+    velocity = np.gradient(x, recording.dt)
+    motions = {
+        'displacement': x - 0.5 * (x.max() + x.min()),
+        'velocity': velocity,
+        'acceleration': np.gradient(velocity, recording.dt),
+    }
+    shares = {
+        name: float(force @ each) ** 2 / (float(each @ each) * float(force @ force))
+        for name, each in motions.items()
+    }
+    most = max(shares, key=shares.__getitem__)
+    better = 1.0 - shares[most] < _BETTER * (1.0 - look.explained)
+    if look.explained >= EXPLAINED and not better:
+        return ''
+    if shares[most] >= EXPLAINED and better:
+        return f'{most} explains {shares[most]:.0%}: {_REMEDIES[most]}'
+    return (
+        'neither displacement, velocity nor acceleration explains it either: is it the force of this motion, '
+        'or noise of a cell that is hardly loaded (a contact that is loosely clamped)? Check both'
+    )
+
+
+def ladder_case(ladder: Mapping[str, Mapping[str, Any]], best: str) -> Case | None:
+    """Return the case that a ladder is, by the errors of its best law; None where that one is of use."""
+    training, held_out = ladder[best]['train_error'], ladder[best]['held_out_error']
+    error = training if held_out is None else held_out
+    if error <= LARGEST_ERROR:
+        return None
+    if training > LARGEST_ERROR:
+        return Case(
+            'not explained',
+            f'no law explains the force: the best, {best}, explains {explained(training):.0%} of its mean '
+            'square in training already; use none of their parameters, and read above what each recording '
+            'shows',
+        )
+    return Case(
+        'not predicted',
+        f'no law predicts the force: {best} explains {explained(training):.0%} of its mean square in '
+        f'training and {explained(error):.0%} of what was held out; the contact is pressed by another force '
+        'than the recorded normal force, or it changed in between: measure the normal force, or use '
+        'recordings of one clamping; use none of these parameters',
+    )
+
+
+def explained(error: float) -> float:
+    """Return the share of the force's mean square that a law explains, from its error rms over rms."""
+    return max(0.0, 1.0 - error**2)

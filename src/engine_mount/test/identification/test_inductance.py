@@ -1,19 +1,12 @@
 """Gap curves from noisy ripple at known gaps: how near to the truth, and what temperature leaves."""
 
 import functools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from engine_mount.identification.coil.curves import calibrate_gap_curves
-from engine_mount.identification.coil.points import RippleRecording, measured_point
-from engine_mount.identification.coil.temperature import (
-    gap_reluctance,
-    measured_compensation,
-    stated_compensation,
-)
-from engine_mount.identification.coil.unique_region import unique_region
+from engine_mount.identification.gap_curves import RippleRecording, calibrate_gap_curves, measured_point
+from engine_mount.identification.inductance import calibrate_inductance, measured_compensation
 from mount_models.coil.correction import (
     check_compensation,
     crossing_at_calibration,
@@ -121,53 +114,44 @@ def test_the_stated_uncertainty_is_that_of_repeated_calibrations(calibration):
 
 
 def test_a_gap_that_contradicts_the_others_is_refused_and_named(points):
-    wrong = [replace(p, gap=p.gap + 15e-6) if p.name == '390 um' else p for p in points]
+    wrong = [p._replace(gap=p.gap + 15e-6) if p.name == '390 um' else p for p in points]
     with pytest.raises(LawRefusedError, match=r'390 um: by the .* off the given 405\.0 um'):
         calibrate_gap_curves(wrong)
 
 
-def test_too_few_gaps_are_refused(points):
+def test_too_few_gaps_and_the_same_gap_twice_are_refused(points):
     with pytest.raises(LawRefusedError, match=r'6 or more air gaps .* 5 given'):
         calibrate_gap_curves(points[:5])
-
-
-def test_the_same_gap_twice_is_refused(points):
     with pytest.raises(LawRefusedError, match='differ by 1 um'):
         calibrate_gap_curves([*points, points[3]])
 
 
-def test_a_recording_that_is_not_long_enough_is_refused(recordings):
-    short = replace(recordings[0], current=CURRENTS[:2], inductance=recordings[0].inductance[:2])
-    with pytest.raises(LawRefusedError, match=r'270 um: 1 different currents, at least 5'):
-        measured_point(short)
+@pytest.mark.parametrize(
+    ('part', 'sentence'),
+    [
+        (
+            slice(None, None, 200),
+            r'270 um: samples within 0\.02 A .* 20, 6 are: a table of few points',
+        ),
+        (slice(1100, None), r'270 um: samples within 0\.02 A of the rest current'),
+        (slice(1300), r'270 um: coil inductance must fall through .* --crossing-inductance'),
+    ],
+)
+def test_a_table_and_a_recording_without_rest_or_crossing_are_refused(recordings, part, sentence):
+    name, gap, celsius, current, inductance = recordings[0]
+    with pytest.raises(LawRefusedError, match=sentence):
+        measured_point(RippleRecording(name, gap, celsius, current[part], inductance[part]))
 
 
-def test_a_recording_without_the_rest_current_is_refused(recordings):
-    late = replace(recordings[0], current=CURRENTS[1100:], inductance=recordings[0].inductance[1100:])
-    with pytest.raises(LawRefusedError, match=r'270 um: samples within 0\.02 A of the rest current'):
-        measured_point(late)
+def test_a_curve_that_may_turn_within_its_scatter_is_refused(recordings):
+    """At 0.9 A the same inductance belongs to two gaps (section 3.2)."""
+    with pytest.raises(LawRefusedError, match=r'rest current must rise or fall steadily .*2 standard'):
+        calibrate_gap_curves([measured_point(recording, rest_current=0.9) for recording in recordings])
 
 
-def test_a_recording_that_never_reaches_the_crossing_is_refused(recordings):
-    low = replace(recordings[0], current=CURRENTS[:1300], inductance=recordings[0].inductance[:1300])
-    with pytest.raises(LawRefusedError, match='270 um: coil inductance must fall through'):
-        measured_point(low)
-
-
-def test_the_unique_region_is_found_from_the_data(recordings):
-    region = unique_region(recordings)
-    falling, rising, (levels,) = region.falling[0], region.rising[0], region.levels
-    assert falling[0] <= 0.2 < 0.45 <= falling[1] <= 0.75
-    assert 0.95 <= rising[0] <= 1.2 < 1.9 <= rising[1]
-    assert levels[0] < 10e-3
-    assert 25e-3 < levels[1] < 36e-3
-    assert region.warnings(0.2, 20e-3) == []
-
-
-def test_choices_in_the_ambiguous_region_are_warned_of(recordings):
-    current, inductance = unique_region(recordings).warnings(0.9, 34e-3)
-    assert 'rest_current (0.90 A) must lie where' in current
-    assert 'crossing_inductance (34.0 mH) must be one' in inductance
+def test_one_temperature_alone_is_refused_for_another_moves_the_gap(recordings):
+    with pytest.raises(LawRefusedError, match=r'one coil temperature \(20 degC\).* at a second temperature'):
+        calibrate_inductance(recordings, default_specimen(), [])
 
 
 @pytest.mark.parametrize('celsius', [-20.0, 80.0])
@@ -186,14 +170,6 @@ def test_a_wrong_coefficient_matters_little_where_two_temperatures_were_measured
     found = measured_compensation(calibration.curves, 20.0, warm)
     assert max(gap_errors(calibration.curves, 80.0, found, coefficient)) <= 1.5
     assert max(gap_errors(calibration.curves, -20.0, found, coefficient)) <= 9.0
-
-
-def test_a_stated_compensation_takes_the_larger_part(calibration, points):
-    found = stated_compensation(calibration.curves, 20.0, points, default_specimen())
-    rest, contact = gap_errors(calibration.curves, 80.0)
-    left_rest, left_contact = gap_errors(calibration.curves, 80.0, found)
-    assert left_rest <= 0.35 * rest
-    assert left_contact <= 0.2 * contact
 
 
 def test_at_the_temperature_of_the_curves_nothing_changes(calibration, compensation):
@@ -221,10 +197,3 @@ def test_a_temperature_that_is_not_compensated_is_refused(calibration, compensat
 def test_a_compensation_of_nonsense_is_refused(calibration, compensation, change, sentence):
     with pytest.raises(LawRefusedError, match=sentence):
         check_compensation(compensation._replace(**change), calibration.curves)
-
-
-def test_the_reluctance_of_the_gaps_follows_from_the_force(calibration):
-    """Without leakage in the magnet it is that of the gaps alone; the core's own is some percent."""
-    found = gap_reluctance(default_specimen().force_law, np.array([349e-6]))[0]
-    exact = 2.0 * (349e-6 + MAGNET.residual_gap) / (4e-7 * np.pi * MAGNET.gap_area * MAGNET.turns**2)
-    assert found == pytest.approx(exact, rel=0.08)

@@ -8,9 +8,9 @@ import numpy.typing as npt
 from engine_mount.identification.fitting import FloatArray
 from mount_models.quantity import LawRefusedError
 
-Orders = tuple[int, int, int, int, int]
-
-_HIGHEST_ORDER = 7
+ORDERS = (4, 4, 4, 2, 4)
+"""Numbers of coefficients of a1 .. a5 in Table 1; together 18."""
+_FEWEST_POINTS = 3 * sum(ORDERS)
 _PARTS, _FEWEST_IN_PART = 8, 25  # chosen: noise often grows with the force
 _SAME_GAP = 1e-6  # m, chosen
 _FEWEST_CURRENTS = 8  # chosen: five coefficients and some to spare
@@ -28,21 +28,14 @@ class ForcePoints(NamedTuple):
     force: FloatArray
 
 
-def checked_points(
-    gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike, orders: Orders
-) -> ForcePoints:
+def checked_points(gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayLike) -> ForcePoints:
     """Return points of shapes that broadcast as rows of one length, or raise `LawRefusedError`."""
-    if len(orders) != 5 or not all(1 <= order <= _HIGHEST_ORDER for order in orders):
-        raise LawRefusedError(
-            f'orders ({", ".join(str(order) for order in orders)}) must be five numbers of coefficients '
-            f'within 1 .. {_HIGHEST_ORDER}, for a1 .. a5; 4, 4, 4, 2, 4 as in Table 1'
-        )
     arrays = np.broadcast_arrays(*(np.asarray(each, float) for each in (gap, current, force)))
     points = ForcePoints(*(np.ravel(array) for array in arrays))
     gaps, currents, forces = points
-    if forces.size < 3 * sum(orders):
+    if forces.size < _FEWEST_POINTS:
         raise LawRefusedError(
-            f'force measurements ({forces.size}) must be at least {3 * sum(orders)}, three per coefficient; '
+            f'force measurements ({forces.size}) must be at least {_FEWEST_POINTS}, three per coefficient; '
             'measure more gaps or currents'
         )
     if not np.isfinite(points).all():
@@ -57,13 +50,13 @@ def checked_points(
             f'forces ({forces.min():.1f} .. {forces.max():.1f} N) must be positive where the magnet pulls; '
             'is the sign of the load cell right?'
         )
-    groups, needed = gap_groups(gaps), max(orders) + 1
+    groups, needed = gap_groups(gaps), max(ORDERS) + 1
     held = len(groups) > 1  # else the gap was moved all the time
     steps = len(groups) if held else np.unique(gaps).size
     if steps < needed:
         raise LawRefusedError(
             f'force measurements must span at least {needed} air gaps, one more than the longest polynomial '
-            f'has coefficients; {steps} given: measure more gaps, or choose lower orders'
+            f'has coefficients; {steps} given: measure more gaps'
         )
     if np.ptp(gaps) < _SMALLEST_SPAN * gaps.max():
         raise LawRefusedError(

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from engine_mount.identification.coil.curves import calibrate_gap_curves
-from engine_mount.identification.coil.points import GapPoint
+from engine_mount.identification.gap_curves import GapPoint, calibrate_gap_curves
 from mount_models.coil.gap import (
     check_gap_curves,
     crossing_current_from_gap,
@@ -45,7 +44,7 @@ def fitted(inductances):
     """Return the calibration through points without noise."""
     rows = zip(GAPS.tolist(), inductances, CROSSINGS, strict=True)
     return calibrate_gap_curves(
-        [GapPoint(f'{gap * 1e6:.0f} um', gap, 20.0, each, 0.0, i20, 0.0, -0.02) for gap, each, i20 in rows]
+        [GapPoint(f'{gap * 1e6:.0f} um', gap, 20.0, each, 0.0, i20, 0.0) for gap, each, i20 in rows]
     )
 
 
@@ -139,14 +138,11 @@ def test_an_ambiguous_curve_is_refused():
         fitted(at_0_8)
 
 
-def test_curves_that_contradict_their_inverse_are_refused():
+def test_curves_that_contradict_their_inverse_or_have_a_range_in_falling_order_are_refused():
     shifted = CURVES.gap_of_inductance
     shifted = shifted._replace(coefficients=(shifted.coefficients[0] + 5e-6, *shifted.coefficients[1:]))
     with pytest.raises(LawRefusedError, match=r'must agree within 2\.0 um; they differ by 5\.'):
         check_gap_curves(CURVES._replace(gap_of_inductance=shifted))
-
-
-def test_curves_with_a_range_in_falling_order_are_refused():
     falling = CURVES.inductance_of_gap._replace(low=550e-6, high=250e-6)
     with pytest.raises(LawRefusedError, match='rising order'):
         check_gap_curves(CURVES._replace(inductance_of_gap=falling))

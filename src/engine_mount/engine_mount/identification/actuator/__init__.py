@@ -1,1 +1,0 @@
-"""The current-force law fitted to measured points."""

@@ -1,1 +1,0 @@
-"""The ripple inductance over current, gap and temperature, fitted to recordings."""

@@ -1,0 +1,376 @@
+"""Fit the force law (Eqs 3, 4) to measured forces, as the authors did for Table 1; the specimen of it.
+
+With a3 and a4 chosen, Eq (3) is linear in a1, a2 and a5. So the searches begin at places derived from the
+points, whatever the actuator's size.
+"""
+
+import functools
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyfit, polyval
+from scipy.linalg import block_diag
+from scipy.optimize import OptimizeResult, least_squares
+
+from engine_mount.identification.fitting import (
+    FloatArray,
+    Progress,
+    covariance_of,
+    silent,
+    single_threaded,
+)
+from engine_mount.identification.force_points import (
+    ORDERS,
+    ForcePoints,
+    check_outliers,
+    checked_points,
+    far_points,
+    gap_groups,
+)
+from engine_mount.identification.specimen import described_files, rounded, with_part
+from engine_mount.recordings.screen import Screen, Table
+from mount_models.actuator import (
+    LOWEST_SHARE,
+    TABLE_1,
+    ForceLaw,
+    check_force_law,
+    checked_force,
+    coefficients,
+)
+from mount_models.arithmetic.compiled import compiled
+from mount_models.quantity import LawRefusedError
+from mount_models.specimen import Specimen
+
+_STRONG = 20.0  # N: relative errors count above it
+_FROM_ZERO = 0.05  # of the largest current, chosen: measured from below, the law counts as measured from 0 A
+_SHORT_SEARCH = 60  # steps, chosen: sorts good starts from bad ones
+_LONG_SEARCH = 2000
+_PRECISION = 1e-15
+_WIDE = 50.0  # chosen: bounds only keep the search out of nonsense
+_KNEES = (0.3, 0.45, 0.6, 0.8)  # chosen: current of the knee over the largest one, at the mean gap
+_LEANS = (0.1, 0.3)  # chosen: the knee moves to higher currents with the gap
+_SHARPNESSES = (4.0, 9.0, 18.0)  # chosen: a3 times the largest current
+_GRID = np.array(list(itertools.product(np.linspace(0.2, 0.9, 15), (3.0, 5.0, 8.0, 12.0, 18.0))))
+"""Knees and sharpnesses tried for each gap alone (chosen)."""
+_TRIED = 3
+_RIDGE = 1e-9
+_EDGES = np.cumsum([0, *ORDERS])
+
+
+@dataclass(frozen=True)
+class ForceLawFit:
+    """A fitted law, the points it was fitted to, and the covariance (18, 18) of its coefficients.
+
+    The coefficients are a1 .. a5 as the law holds them, one after the other; the covariance is scaled by the
+    scatter of the residuals, to which all counts that the law cannot describe.
+    """
+
+    law: ForceLaw
+    points: ForcePoints
+    covariance: FloatArray
+
+    @functools.cached_property
+    def error(self) -> FloatArray:
+        """Law minus point, N."""
+        return checked_force(self.law, self.points.current, self.points.gap) - self.points.force
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Each measured gap (m) with its rms error (N): where it fits less well."""
+        return [
+            (float(self.points.gap[group].mean()), _rms(self.error[group]))
+            for group in gap_groups(self.points.gap)
+        ]
+
+    @property
+    def relative(self) -> FloatArray:
+        """Errors over forces, where these are above 20 N; NaN where none is."""
+        strong = self.points.force > _STRONG
+        return self.error[strong] / self.points.force[strong] if strong.any() else np.array([np.nan])
+
+    @property
+    def measured_from(self) -> float:
+        """The lowest current that was measured (A); below, the law is continued to 0 N at 0 A. 0 if near."""
+        lowest = float(self.points.current.min())
+        return lowest if lowest > _FROM_ZERO * self.law.current_high else 0.0
+
+    def residuals(self) -> dict[str, float]:
+        """Return the errors over all points: N, and of forces above 20 N relative to them."""
+        return {
+            'relative_rms': _rms(self.relative),
+            'relative_worst': float(np.abs(self.relative).max()),
+            'rms': _rms(self.error),
+            'largest': float(np.abs(self.error).max()),
+        }
+
+
+@dataclass(frozen=True)
+class ActuatorCalibration:
+    """A fitted force law, the files it comes from, and the specimen that gives all other values."""
+
+    fit: ForceLawFit
+    base: Specimen
+    files: Sequence[Path]
+
+    def figures(self) -> dict[str, Any]:
+        """Return parameters and errors for JSON, SI units; None where one is not known."""
+        law, residuals = self.fit.law, self.fit.residuals()
+        stds = np.split(np.sqrt(self.fit.covariance.diagonal().clip(0.0)), _EDGES[1:-1])
+        known = not math.isnan(residuals['relative_rms'])
+        return {
+            'parameters': {f'a{number}': list(part) for number, part in enumerate(law[:5], 1)},
+            'parameter_std': {f'a{number}': part.tolist() for number, part in enumerate(stds, 1)},
+            'valid_gap_m': [law.gap_low, law.gap_high],
+            'valid_current_a': [0.0, law.current_high],
+            'measured_current_a': [float(self.fit.points.current.min()), law.current_high],
+            'points': self.fit.error.size,
+            'relative_rms': residuals['relative_rms'] if known else None,
+            'relative_worst': residuals['relative_worst'] if known else None,
+            'rms_error_n': residuals['rms'],
+            'largest_error_n': residuals['largest'],
+            'rms_by_gap': [{'gap_m': gap, 'rms_n': rms} for gap, rms in self.fit.gaps],
+        }
+
+    def report(self, screen: Screen) -> None:
+        """Show the errors of each gap, and where the law may be used."""
+        law, start, residuals = self.fit.law, self.fit.measured_from, self.fit.residuals()
+        rows = [(f'{1e6 * gap:.1f}', f'{rms:.2f}') for gap, rms in self.fit.gaps]
+        title = f'force law, {sum(ORDERS)} parameters'
+        screen.table(Table(title, 'rr', rows, ('air gap (um)', 'rms error (N)')))
+        screen.say(
+            f'{self.fit.error.size} points; error rms {residuals["relative_rms"]:.2%} of the force above '
+            f'{_STRONG:g} N, worst {residuals["relative_worst"]:.2%}; rms {residuals["rms"]:.2f} N, largest '
+            f'{residuals["largest"]:.2f} N'
+        )
+        screen.say(
+            f'positive, rising with the current and falling with the gap within {law.gap_low * 1e6:.1f} .. '
+            f'{law.gap_high * 1e6:.1f} um and 0 .. {law.current_high:.2f} A; refused beyond'
+        )
+        if start:
+            screen.say(f'measured from {start:.2f} A on; below, the law is continued to 0 N at 0 A')
+
+    def specimen(self, name: str = '') -> Specimen:
+        """Return the base under `name` with the fitted law; raises `SpecimenError`."""
+        fit, law = self.fit, self.fit.law
+        gaps, rms = zip(*fit.gaps, strict=True)
+        valid = {'gap': [law.gap_low, law.gap_high], 'current': [0.0, law.current_high]}
+        if fit.measured_from:
+            valid['measured_current'] = [rounded(fit.measured_from), law.current_high]
+        origin = {
+            'points': fit.error.size,
+            'valid': valid,
+            'residuals': {
+                **{each: rounded(value) for each, value in fit.residuals().items()},
+                'gaps': [float(f'{gap:.6g}') for gap in gaps],
+                'rms_by_gap': rounded(rms),
+            },
+            'covariance': rounded(fit.covariance),
+        }
+        limit = min(self.base.current_limit, law.current_high)
+        recordings = described_files(self.files)
+        return with_part(self.base, name, 'force_law', recordings, origin, force_law=law, current_limit=limit)
+
+    def draw(self, file: Path) -> None:
+        """Write the picture of points and law to `file` (PNG)."""
+        from engine_mount.identification.pictures import draw_force_law
+
+        draw_force_law(self.fit, file)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@single_threaded()
+def fit_force_law(
+    gap: npt.ArrayLike,
+    current: npt.ArrayLike,
+    force: npt.ArrayLike,
+    force_floor: float = 2.0,
+    progress: Progress = silent,
+) -> ForceLawFit:
+    """Return the law that fits `force` (N) measured at `gap` (m) and `current` (A), shapes that broadcast.
+
+    As in Table 1 there are 18 coefficients. Weights are 1 / (`force_floor` + 0.02 F). The search starts from
+    several places derived from the points and keeps the best, within bounds. The law is guarded to the
+    measured gaps and currents, and refused (`LawRefusedError`) where within them it is not positive, rising
+    with current and falling with gap; so are points that lie far from it, and points too few.
+    """
+    points = checked_points(gap, current, force)
+    gaps, currents, forces = points
+    box = (float(gaps.min()), float(gaps.max()), float(currents.max()))
+    centre, half = 0.5 * (box[1] + box[0]), 0.5 * (box[1] - box[0])
+    domain = ((centre - half) * 1e6, (centre + half) * 1e6)
+    tolerance = force_floor + 0.02 * np.abs(forces)
+    mapped = (gaps - centre) / half
+    powers = np.concatenate([mapped[:, np.newaxis] ** np.arange(order) for order in ORDERS], axis=1)
+    belongs_to = np.repeat(np.arange(5), ORDERS)
+
+    def law_of(unknowns: FloatArray) -> ForceLaw:
+        parts = np.split(unknowns, _EDGES[1:-1])
+        a1, a2, a3, a4, a5 = (tuple((_unmapping(domain, part.size) @ part).tolist()) for part in parts)
+        return ForceLaw(a1, a2, a3, a4, a5, *box)
+
+    def misfit(unknowns: FloatArray) -> FloatArray:
+        return np.asarray((checked_force(law_of(unknowns), currents, gaps) - forces) / tolerance)
+
+    def slopes(unknowns: FloatArray) -> FloatArray:
+        of_coefficients = _coefficient_slopes(law_of(unknowns), currents, gaps)[:, belongs_to]
+        return np.asarray(of_coefficients * powers / tolerance[:, np.newaxis])
+
+    strongest, highest = float(forces.max()), box[2]
+    scales = strongest, strongest / highest, 1.0 / highest, highest, strongest / highest**2
+    high = np.repeat([_WIDE * scale for scale in scales], ORDERS)
+    low = -high
+    # the knee is a knee: a mean sharpness and a mean current of it above 0
+    low[_EDGES[2]], low[_EDGES[3]] = 0.1 / highest, 0.01 * highest
+
+    def search(start: FloatArray, steps: int, loss: str) -> OptimizeResult:
+        return least_squares(
+            misfit, np.clip(start, low, high), slopes, bounds=(low, high), x_scale='jac', loss=loss,
+            ftol=_PRECISION, xtol=_PRECISION, gtol=_PRECISION, max_nfev=steps,
+        )  # fmt: skip
+
+    candidates = _starts(_Problem(mapped, currents, forces, tolerance), domain)
+    ends = []
+    for number, start in enumerate(candidates):
+        progress(number / (len(candidates) + 1), 'fitting')
+        ends.append(search(start, _SHORT_SEARCH, 'soft_l1'))  # outliers pull the first searches little
+    best = min(ends, key=lambda end: float(end.cost))
+    if not far_points(forces, np.abs(misfit(best.x))).size:
+        progress(len(candidates) / (len(candidates) + 1), 'fitting')
+        best = search(best.x, _LONG_SEARCH, 'linear')  # with outliers it would hide them
+    law = law_of(best.x)
+    check_outliers(points, checked_force(law, currents, gaps), tolerance)
+    _check_law(law, float(currents.min()))
+    unmapping = block_diag(*(_unmapping(domain, order) for order in ORDERS))
+    return ForceLawFit(law, points, unmapping @ covariance_of(best) @ unmapping.T)
+
+
+@compiled
+def _coefficient_slopes(law, current, gap):
+    """Return the derivatives of Eq (3) with respect to a1 .. a5, shape (points, 5)."""
+    slopes = np.empty((gap.size, 5))
+    for k in range(gap.size):
+        i = current[k]
+        a1, a2, a3, a4, a5 = coefficients(law, gap[k])
+        line, parabola = a1 + a2 * i, a5 * i * i
+        knee, bend = math.atan(a3 * a4), math.atan(a3 * (i - a4))
+        knee_fall, bend_fall = 1.0 / (1.0 + (a3 * a4) ** 2), 1.0 / (1.0 + (a3 * (i - a4)) ** 2)
+        slopes[k, 0] = knee + bend
+        slopes[k, 1] = i * (knee + bend)
+        slopes[k, 2] = (line + parabola) * a4 * knee_fall + (line - parabola) * (i - a4) * bend_fall
+        slopes[k, 3] = ((line + parabola) * knee_fall - (line - parabola) * bend_fall) * a3
+        slopes[k, 4] = i * i * (knee - bend)
+    return slopes
+
+
+@functools.lru_cache(maxsize=32)
+def _unmapping(domain: tuple[float, float], order: int) -> FloatArray:
+    """Return the matrix from coefficients in the mapped gap to those in the gap (um), shape (order, order).
+
+    It is the same at each step of a search, and to derive it takes longer than all else in the step.
+    """
+    columns = []
+    for unit in np.eye(order):
+        plain = Polynomial(unit, domain=domain, window=(-1.0, 1.0)).convert(kind=Polynomial).coef
+        columns.append(np.pad(plain, (0, order - plain.size)))
+    return np.stack(columns, axis=1)
+
+
+def _check_law(law: ForceLaw, lowest: float) -> None:
+    """Raise `LawRefusedError` for a law that cannot be inverted, and say where nothing was measured."""
+    try:
+        check_force_law(law)
+    except LawRefusedError as error:
+        if lowest <= LOWEST_SHARE * law.current_high:
+            raise
+        check_force_law(law, lowest)
+        raise LawRefusedError(
+            f'forces were measured from {lowest:.2f} A on only, where the law is right; below it is '
+            f'continued to 0 N at 0 A, and that fails: {str(error).partition(":")[0]}: measure from '
+            f'{LOWEST_SHARE * law.current_high:.2f} A on'
+        ) from error
+
+
+class _Problem(NamedTuple):
+    """Points as the search sees them: gap mapped to -1 .. 1, A, N, tolerance N."""
+
+    gap: FloatArray
+    current: FloatArray
+    force: FloatArray
+    tolerance: FloatArray
+
+
+def _starts(problem: _Problem, domain: tuple[float, float]) -> list[FloatArray]:
+    """Return coefficients of a1 .. a5 in the mapped gap to start from, the best first, at last Table 1."""
+    highest = float(problem.current.max())
+    trials = [
+        ([sharpness / highest, 0.0, 0.0, 0.0], [knee * highest, lean * knee * highest])
+        for knee, lean, sharpness in itertools.product(_KNEES, _LEANS, _SHARPNESSES)
+    ]
+    groups = gap_groups(problem.gap)
+    if len(groups) >= 3:
+        gaps = [float(problem.gap[group].mean()) for group in groups]
+        best = np.array([_best_knee(problem, group) for group in groups])
+        sharpness = [float(np.median(best[:, 1])), 0.0, 0.0, 0.0]
+        trials.append((sharpness, polyfit(gaps, best[:, 0], 1).tolist()))
+    ends = sorted((_completed(problem, *trial) for trial in trials), key=lambda end: end[0])
+    table_1 = [
+        Polynomial(part).convert(domain=domain, window=(-1.0, 1.0), kind=Polynomial).coef
+        for part in TABLE_1[:5]
+    ]
+    return [*(start for _, start in ends[:_TRIED]), np.concatenate(table_1)]
+
+
+def _completed(problem: _Problem, sharp: list[float], at: list[float]) -> tuple[float, FloatArray]:
+    """Return misfit and all coefficients for given polynomials a3 and a4."""
+    gap, current, force, tolerance = problem
+    lines, parabolas = _shapes(current, np.asarray(polyval(gap, sharp)), np.asarray(polyval(gap, at)))
+    columns = [
+        (shape / tolerance)[:, np.newaxis] * gap[:, np.newaxis] ** np.arange(4)
+        for shape in (lines, lines * current, parabolas)
+    ]
+    solution, misfit = _solved(np.concatenate(columns, axis=1), force / tolerance)
+    a1, a2, a5 = np.split(solution, 3)
+    return float(misfit), np.concatenate([a1, a2, sharp, at, a5])
+
+
+def _best_knee(problem: _Problem, group: npt.NDArray[np.intp]) -> FloatArray:
+    """Return current and sharpness of the best knee of one gap on a grid."""
+    highest = float(problem.current.max())
+    grid = _GRID * (highest, 1.0 / highest)
+    current, tolerance = problem.current[group], problem.tolerance[group]
+    # all trials of a gap at once: to solve them one by one takes about as long as the search that follows
+    lines, parabolas = _shapes(current, grid[:, 1:], grid[:, :1])
+    columns = np.stack([lines, lines * current, parabolas], axis=2)
+    misfits = _solved(columns / tolerance[:, np.newaxis], problem.force[group] / tolerance)[1]
+    return np.asarray(grid[np.argmin(misfits)])
+
+
+def _shapes(current: FloatArray, sharpness: FloatArray, knee: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what multiplies the saturated line and a5 in Eq (3)."""
+    low, bend = np.arctan(sharpness * knee), np.arctan(sharpness * (current - knee))
+    return low + bend, current**2 * (low - bend)
+
+
+def _solved(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return linear fits, slightly held back where columns are alike, and their sums of squares.
+
+    `columns` has shape (..., points, unknowns), `values` (points,).
+    """
+    scale = np.linalg.norm(columns, axis=-2)
+    scale[scale == 0.0] = 1.0
+    scaled = columns / scale[..., np.newaxis, :]
+    across = np.swapaxes(scaled, -1, -2)
+    normal = across @ scaled + _RIDGE * np.eye(scaled.shape[-1])
+    solution = np.linalg.solve(normal, (across @ values)[..., np.newaxis])
+    left = (scaled @ solution)[..., 0] - values
+    return solution[..., 0] / scale, np.asarray(np.sum(left**2, axis=-1))
