@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from command import done
+from command_line import command as done
 from foreign_files import MAKERS
 
 import engine_mount

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from command import done, refused
+from command_line import command as done
+from command_line import refused
 from foreign_files import MAKERS
 
 TIMES = np.arange(1000) / 200.0

@@ -10,22 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from engine_mount.drives.loop import run as core_run
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreOutcome, run_core
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
-from engine_mount.reports.drive.evaluation import switching, tracking_error
+from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, load_drive
-from engine_mount.settings import chosen
 from engine_mount.settings.chosen import policy_of
 from engine_mount.signals.excitation import build_excitation
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.arithmetic.series import series_of
 from mount_models.damper import damper_curve
-from mount_models.specimen import default_specimen
 from mount_ros import topics
 from mount_ros.topics import Topic
 from mount_sim.plant.mounts import with_control_of_mount
@@ -87,12 +84,9 @@ def matched(run) -> Recorded:
     return run(BENCH)
 
 
-def test_friction_force_follows_the_damper(matched):
-    assert matched.tracking <= 0.02
-
-
 def test_friction_force_is_never_far_from_the_damper_s(matched):
-    """The same in the largest error of a sample, over the last 2 s: at most 4 % of the peak."""
+    """In the rms, and in the largest error of a sample over the last 2 s: at most 4 % of the peak."""
+    assert matched.tracking <= 0.02
     settled = matched.drive.seen.damping_active & (matched.drive.seen.time > 2.0)
     time, force = matched.drive.seen.time[settled], matched[topics.SIM_TRUTH]['friction_force'][settled]
     # what the plant shows at a sample is the force of the step that has just ended, half a sample ago
@@ -112,19 +106,12 @@ def test_friction_force_follows_where_the_plant_s_friction_differs(run, scale):
 
 
 def test_the_mount_force_is_nearly_a_sine(matched):
-    harmonics = _harmonics(matched)
-    assert harmonics[0] == pytest.approx(209.5, rel=0.01)
-    distortion = np.sqrt(np.sum(harmonics[1:] ** 2)) / harmonics[0]
-    assert distortion <= 0.03
-
-
-def _harmonics(recorded: Recorded) -> NDArray[np.float64]:
-    """Amplitudes (N) of harmonics 1 to 8 of the mount force over whole periods, damping settled."""
-    time, force = recorded.drive.truth.time, recorded[topics.SIM_TRUTH]['mount_force']
-    first = int(np.searchsorted(time, 1.0 - 1e-9))
-    count = 24 * round(PERIOD / 1e-3)
+    time, force = matched.drive.truth.time, matched[topics.SIM_TRUTH]['mount_force']
+    first, count = int(np.searchsorted(time, 1.0 - 1e-9)), 24 * round(PERIOD / 1e-3)
     spectrum = np.abs(np.fft.rfft(force[first : first + count])) * 2.0 / count
-    return spectrum[24 : 24 * 9 : 24]
+    harmonics = spectrum[24 : 24 * 9 : 24]
+    assert harmonics[0] == pytest.approx(209.5, rel=0.01)
+    assert np.sqrt(np.sum(harmonics[1:] ** 2)) / harmonics[0] <= 0.03
 
 
 def test_damping_takes_energy_out_and_none_goes_back(matched):
@@ -132,32 +119,10 @@ def test_damping_takes_energy_out_and_none_goes_back(matched):
     truth = matched[topics.SIM_TRUTH]
     power = truth['friction_force'][settled] * truth['velocity'][settled]
     assert power.min() >= -0.05 * power.max()
-    dissipated = power.sum() * 1e-3 / (settled.sum() * 1e-3 / PERIOD)
-    ideal = _dissipation_of_the_damper()
-    assert dissipated == pytest.approx(ideal, rel=0.03)
-
-
-def _dissipation_of_the_damper() -> float:
-    """Work per period (J) of the selected damper at 8 Hz and 1 mm."""
     time = np.arange(0.0, PERIOD, 1e-5)
     velocity = 1e-3 * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * time)
-    return float(np.sum(damper_curve(DEFAULT_DAMPER).force(velocity) * velocity) * 1e-5)
-
-
-def test_damping_goes_on_one_period_after_the_magnitude_exceeds_its_level(matched):
-    times = switching(matched.drive.seen)
-    assert len(times.on) == 1
-    assert times.off == ()
-    magnitude = matched[topics.CONTROL_TRACE]['magnitude']
-    exceeded = matched[topics.CONTROL_TRACE].stamps[np.argmax(magnitude > 0.0008)]
-    on = round(1e9 * times.on[0]) + matched.drive.zero
-    assert (on - exceeded) / 1e9 == pytest.approx(0.124)
-
-
-def test_the_current_stays_far_from_its_limits(matched):
-    current = matched[topics.CURRENT_SETPOINT]['coil_current'][2800:]
-    assert 0.9 < current.max() < 1.2
-    assert set(current[:100]) == {0.0}
+    ideal = np.sum(damper_curve(DEFAULT_DAMPER).force(velocity) * velocity) * 1e-5  # J in a period
+    assert power.mean() * PERIOD == pytest.approx(ideal, rel=0.03)
 
 
 def test_with_damping_off_there_is_no_friction_at_all_after_initialisation(run):
@@ -174,7 +139,7 @@ def test_with_damping_off_there_is_no_friction_at_all_after_initialisation(run):
 # The other mounts in the seat, with initialisation and control at work
 
 
-@pytest.mark.parametrize('mount', ['friction_off', 'hydro', 'elastomer'])
+@pytest.mark.parametrize('mount', ['friction_off', 'hydro'])
 def test_without_pads_or_current_the_control_asks_in_vain(run, mount):
     recorded = run({**BENCH, 'mount': mount, 'timeline.duration': 1.5})
     assert recorded.outcome.result is not None
@@ -199,17 +164,7 @@ def test_the_mount_that_is_always_on_damps_without_having_been_shaken(run):
 # Initialisation against the truth, through the whole chain
 
 
-@pytest.mark.parametrize(
-    ('contact_gap', 'rest_gap'),
-    [
-        (300e-6, 480e-6),
-        (300e-6, 540e-6),
-        (349e-6, 508e-6),
-        (400e-6, 510e-6),
-        (440e-6, 500e-6),
-        (440e-6, 540e-6),
-    ],
-)
+@pytest.mark.parametrize(('contact_gap', 'rest_gap'), [(300e-6, 540e-6), (349e-6, 508e-6), (440e-6, 500e-6)])
 def test_without_noise_the_gaps_are_measured_within_a_micrometre(contact_gap, rest_gap):
     result = _initialisation(mechanics__contact_gap=contact_gap, mechanics__rest_gap=rest_gap)
     assert result.contact_gap == pytest.approx(contact_gap, abs=1e-6)
@@ -225,18 +180,6 @@ def test_a_warm_or_cold_coil_is_compensated_by_its_measured_temperature(celsius,
     wrong = (0.0043 - core) * abs(celsius - 20.0)  # share of conductivity that the controller does not know
     assert result.rest_gap == pytest.approx(508e-6, abs=2e-6 + 350e-6 * wrong)
     assert result.contact_gap == pytest.approx(349e-6, abs=4e-6 + 200e-6 * wrong)
-
-
-def test_without_compensation_a_warm_coil_would_shift_both_gaps():
-    """8 % less conductive core: the plant follows its own coefficient. With the copper's it is +7 um."""
-    settings = {**SHORT, 'electronics.coil_temperature': 40.0, 'temperature.copper': 0.0}
-    unaware = replace(default_specimen(), temperature=None)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chosen, 'chosen_specimen', lambda *_: unaware)
-        result = run_core({'mount_sim': settings}, lambda topic, raw, stamp: None).result
-    assert result is not None
-    assert result.rest_gap - 508e-6 == pytest.approx(-26e-6, abs=3e-6)
-    assert result.contact_gap - 349e-6 == pytest.approx(12e-6, abs=3e-6)
 
 
 def test_with_noise_the_gaps_of_20_seeds_stay_within_their_targets():

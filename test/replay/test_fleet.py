@@ -1,22 +1,20 @@
 """A fleet from the first to the last command: the same result from a disk, from S3 and from SFTP."""
 
 import json
-import shutil
 import sys
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from typer.testing import CliRunner
+from command_line import command, refused
 
-from engine_mount.cli.command import app
 from engine_mount.fleet import Fleet
 from engine_mount.fleet.example import make_example
 
 # The stores are those that the tests of engine_mount.signals fetch from.
 sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
 
-from served_stores import Bucket, know_host, name_s3_store, s3_server, sftp_store
+from served_stores import Bucket, name_s3_store, s3_server
 
 pytestmark = pytest.mark.slow
 
@@ -67,12 +65,6 @@ def catalogue_of(folder):
     return [table.drop([name for name in OF_THE_PLACE if name in table.schema.names]) for table in tables]
 
 
-def run(*arguments):
-    ended = CliRunner().invoke(app, ['fleet', *map(str, arguments)], catch_exceptions=False)
-    assert ended.exit_code == 0, ended.output
-    return ended.output
-
-
 def test_every_recording_has_a_row_and_the_damaged_ones_a_reason(local):
     rows = pq.read_table(local / 'result' / 'result.parquet').to_pylist()
     assert len({row['recording'] for row in rows}) == RECORDINGS
@@ -103,45 +95,28 @@ def test_a_store_of_objects_gives_the_bytes_of_the_disk(drives, local, tmp_path,
         folder = asked('s3://drives/2026', tmp_path, workers=2)
         assert table_of(folder) == table_of(local)
         assert catalogue_of(folder) == catalogue_of(local)
-        worst = run('worst', folder / 'result', '--by', 'setpoint_difference_rms_a', '--count', 1)
+        worst = command(
+            'fleet', 'worst', folder / 'result', '--by', 'setpoint_difference_rms_a', '--count', 1
+        )
         assert 'engine-mount report s3://drives/2026/' in worst
 
 
-def test_an_sftp_server_gives_the_bytes_of_the_disk(drives, local, tmp_path, home):
-    served = tmp_path / 'served'
-    served.mkdir()
-    shutil.copytree(drives, served / 'drives')
-    with sftp_store(served, home) as port:
-        know_host(home, port)
-        folder = asked(f'sftp://127.0.0.1:{port}/drives', tmp_path, workers=2)
-        assert table_of(folder) == table_of(local)
-        assert catalogue_of(folder) == catalogue_of(local)
-
-
 def test_the_commands_ask_and_report(local):
-    result = local / 'result'
+    result, found, page = (local / name for name in ('result', 'worst.json', 'page.html'))
     sql = "select recording, setpoint_difference_rms_a as rms from result where reason = '' order by rms desc"
-    rows = json.loads(run('query', result, sql, '--json'))
-    assert run('query', result, sql, '--csv').splitlines()[0] == '"recording","rms"'
-    table = run('query', result, f'{sql} limit 1')
+    rows = json.loads(command('fleet', 'query', result, sql, '--json'))
+    assert command('fleet', 'query', result, sql, '--csv').splitlines()[0] == '"recording","rms"'
+    table = command('fleet', 'query', result, f'{sql} limit 1')
     assert rows[0]['recording'] in table
     assert table.endswith('1 row\n')
     assert all(len(line) <= 80 for line in table.splitlines())
-
-    found = local / 'worst.json'
-    run('worst', result, '--by', 'setpoint_difference_rms_a', '--count', 2, '--json', found)
+    command('fleet', 'worst', result, '--by', 'setpoint_difference_rms_a', '--count', 2, '--json', found)
     worst = json.loads(found.read_text())['worst']
     assert [one['recording'] for one in worst] == [row['recording'] for row in rows[:2]]
     assert all(Path(one['uri']).is_dir() for one in worst)
-
-    page = local / 'page.html'
-    run('report', result, '--out', page, '--count', 1)
+    command('fleet', 'report', result, '--out', page, '--count', 1)
     text = page.read_text(encoding='utf-8')
     assert 'is no MCAP file' in text
-    assert f'1. {worst[0]["recording"]}'.partition('/')[0] in text
     assert 'No picture' not in text
-
-
-def test_a_wrong_column_is_refused_in_one_sentence(local):
-    ended = CliRunner().invoke(app, ['fleet', 'query', str(local / 'result'), 'select nothing from result'])
-    assert 'result has recording, mount, reason' in str(ended.exception)
+    said = refused('fleet', 'query', result, 'select nothing from result', codes=(1,))
+    assert 'result has recording, mount, reason' in said

@@ -1,14 +1,11 @@
 """A fleet that is ended in the middle: a sentence, and the same command goes on to the same table."""
 
-import contextlib
 import json
 import resource
 import shutil
 import signal
 import subprocess
 import sys
-import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -153,15 +150,6 @@ def test_a_command_that_is_ended_goes_on_where_it_was(drives, whole, tmp_path, b
     gone_on_with(drives, tmp_path, whole, DONE)
 
 
-def test_a_cluster_whose_scheduler_is_killed_leaves_what_was_done(drives, whole, tmp_path):
-    with cluster(tmp_path) as (address, scheduler):
-        ended = command(tmp_path, drives, scheduler, signal.SIGKILL, '--scheduler', address)
-    assert ended.returncode == 1
-    assert f'the scheduler ({address}) was lost with' in ended.stderr
-    assert ended.stderr.strip().endswith(f'with this cluster or another one {GOES_ON}')
-    gone_on_with(drives, tmp_path, whole)
-
-
 def gone_on_with(drives, folder, whole, done=None):
     """Let the command go on without being ended, and hold its table against the uninterrupted one."""
     again = command(folder, drives, 0, 0, '--json', folder / 'figures.json')
@@ -171,21 +159,6 @@ def gone_on_with(drives, folder, whole, done=None):
     assert DONE <= before < len(NAMES)
     assert done in (None, before)
     assert (folder / 'result' / 'result.parquet').read_bytes() == whole
-
-
-def test_a_store_that_is_away_for_a_while_is_waited_for(away, whole, tmp_path):
-    def goes():
-        away.away = True
-        threading.Thread(target=comes, daemon=True).start()
-
-    def comes():
-        wait_until(lambda: away.refused >= 3)
-        away.away = False
-
-    outcome = replayed('s3://drives/2026', tmp_path / 'result', workers=1, progress=at(DONE, goes))
-    assert away.refused >= 3
-    assert outcome.not_fetched == []
-    assert table_in(tmp_path / 'result') == whole
 
 
 def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_path, inside, monkeypatch):
@@ -200,18 +173,6 @@ def test_a_store_that_stays_away_ends_the_run_in_a_sentence(away, whole, tmp_pat
     away.away = False
     outcome = replayed('s3://drives/2026', tmp_path / 'result')
     assert outcome.figures['done_before'] == DONE
-    assert table_in(tmp_path / 'result') == whole
-
-
-def test_a_scratch_disk_without_room_is_told_and_tried_again(away, whole, tmp_path, inside, limited):
-    limited(SMALLER)
-    outcome = replayed('s3://drives/2026', tmp_path / 'result')
-    assert len(outcome.not_fetched) == len(NAMES)
-    reason = outcome.not_fetched[0]['reason']
-    assert reason.endswith('cannot be written: File too large; ENGINE_MOUNT_CACHE chooses another folder')
-    limited(None)
-    again = replayed('s3://drives/2026', tmp_path / 'result')
-    assert (again.figures['done_before'], again.not_fetched) == (0, [])
     assert table_in(tmp_path / 'result') == whole
 
 
@@ -243,31 +204,3 @@ def command(folder, drives, process, blow, *options):
         check=False,
         timeout=PATIENCE,
     )
-
-
-@contextlib.contextmanager
-def cluster(folder):
-    """Give the address of a Dask cluster with one worker, and the number of its scheduler's process."""
-    told = folder / 'scheduler.json'
-    with contextlib.ExitStack() as stack:
-        options = ['--no-dashboard', '--host', '127.0.0.1', '--port', '0', '--scheduler-file', str(told)]
-        scheduler = started(stack, folder, 'scheduler', *options)
-        wait_until(told.exists)
-        started(stack, folder, 'worker', '--no-dashboard', '--scheduler-file', str(told), '--nthreads', '1')
-        yield json.loads(told.read_text())['address'], scheduler.pid
-
-
-def started(stack, folder, kind, *arguments):
-    command = [sys.executable, '-m', 'distributed.cli.dask_' + kind, *arguments]
-    quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
-    process = subprocess.Popen(command, cwd=folder, **quiet)
-    stack.callback(process.wait)
-    stack.callback(process.kill)
-    return process
-
-
-def wait_until(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)

@@ -66,20 +66,15 @@ def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
     assert len(notes) == 3
     assert f'mount_control was told damper = viscous_3500 at {told[0][0] / 1e9:.3f} s' in notes[0]
     assert all(note.endswith('the replay does the same') for note in notes)
+    notes = change_notes(outcome.given, LOCKSTEP)
+    assert all(note.endswith('does not: use core') for note in notes)
 
 
 def test_what_the_replay_is_asked_for_stays_as_asked(changed_drive):
-    folder, _ = changed_drive
-    outcome = replay(folder, {'damper': 'viscous_1000'})
+    outcome = replay(changed_drive[0], {'damper': 'viscous_1000'})
     assert [sorted(change.values) for change in outcome.given.changes] == [['eigenfrequency', 'lead_time']]
     (run,) = outcome.replayed.runs
     moving = run.traces['damping_active'] == 1.0
     wanted = np.abs(run.traces['desired_force'][moving]).max()
     speed = np.abs(run.traces['predicted_velocity'][moving]).max()
     assert wanted == pytest.approx(1000.0 * (speed - 0.004), rel=1e-6)
-
-
-def test_a_replay_in_lock_step_says_that_it_does_not_change_them(changed_drive):
-    folder, _ = changed_drive
-    given = replay(folder).given
-    assert all(sentence.endswith('does not: use core') for sentence in change_notes(given, LOCKSTEP))

@@ -10,14 +10,12 @@ import engine_mount
 from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import replay
-from engine_mount.recordings.compare import compare
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.evaluation import tracking_error
 from engine_mount.reports.drive.signals import load_drive
 from engine_mount.reports.sections.subject import Subject
 from engine_mount.settings.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
-from mount_models.quantity import ParameterError
 from mount_recorder.session import session_text
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'src' / 'mount_control' / 'test'
@@ -82,17 +80,6 @@ def test_a_report_reads_a_drive_of_any_policy(drives, policy, levels):
     assert subject.tracking.error == tracking_error(drive, *own)
 
 
-def test_openings_are_compared_as_a_switch_and_as_a_signal(drives, tmp_path):
-    continuous = engine_mount.open(drives['continuous_viscous'])
-    slower = {'mount_sim': SIM, 'mount_control': {**CONTINUOUS, 'continuous_viscous.opening_time': 0.05}}
-    record_core(tmp_path / 'slower', slower, session_text({'parameters': slower}))
-    found = compare(continuous, engine_mount.open(tmp_path / 'slower'))
-    assert 'damping_active' in [signal.signal for signal in found.differing]
-    assert [change.on for change in found.switching] == [True]
-    paper = engine_mount.open(drives['switched_viscous'])
-    assert 'damping_active' not in [signal.signal for signal in compare(paper, paper).signals]
-
-
 def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tmp_path):
     parameters = {'mount_sim': SIM, 'mount_control': {'policy': 'switched_viscous'}}
     record_core(tmp_path / 'old', parameters, session_text({'parameters': {'mount_sim': SIM}}))
@@ -102,11 +89,6 @@ def test_a_session_without_a_policy_is_of_the_first_and_a_drive_names_its_own(tm
     outcome = replay(driven.recording)
     assert outcome.agreement.equal
     assert 'amplitude' in outcome.replayed.runs[0].traces.dtype.names
-
-
-def test_a_change_that_the_recorded_policy_does_not_know_is_refused(drives):
-    with pytest.raises(ParameterError, match='for the chosen policy is switched_viscous'):
-        replay(drives['switched_viscous'], {'continuous_viscous.quality': 0.7})
 
 
 def test_a_recording_is_asked_what_another_policy_would_have_answered(drives):

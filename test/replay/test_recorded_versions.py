@@ -17,12 +17,11 @@ SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 0.1}
         ({'machine': 'z80'}, f'others than here: machine z80 (here {versions()["machine"]})'),
     ],
 )
-@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
-def test_the_replay_says_where_the_recording_is_from(others, sentence, lockstep, domain, tmp_path):
+def test_the_replay_says_where_the_recording_is_from(others, sentence, tmp_path):
     parameters = {'mount_sim': SIM, 'mount_control': {'policy': 'continuous_viscous'}}
     content = {'parameters': parameters, 'versions': {**versions(), **others}}
     record_core(tmp_path / 'drive', parameters, session_text(content))
-    outcome = replay(tmp_path / 'drive', lockstep=lockstep, out=tmp_path / 'replay', domain=domain)
+    outcome = replay(tmp_path / 'drive')
     assert outcome.held
     assert sentence in ' '.join(outcome.sentences())
     assert outcome.figures['recorded_with'] == others

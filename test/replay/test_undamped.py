@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import command
 
-from engine_mount.cli.command import app
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.recordings.cut import cut
 from engine_mount.recordings.recording import Recording, open_recording
@@ -19,8 +18,7 @@ SHORT = ('--duration', '3', '--set', 'mount_sim.timeline.start=2.8', '--set', 'm
 
 def driven(folder: Path, *options: str) -> Recording:
     """Return the recording of a drive in core."""
-    result = CliRunner().invoke(app, ['drive', '--core', '--no-report', *options, '--out', str(folder)])
-    assert result.exit_code == 0, result.output
+    command('drive', '--core', '--no-report', *options, '--out', folder)
     return open_recording(folder / 'recording')
 
 
@@ -44,25 +42,6 @@ def test_it_is_the_drive_of_the_mount_whose_coil_driver_opens(drive, tmp_path):
     assert np.abs(undamped.displacement).max() > 1.3 * np.abs(drive['sim/truth']['displacement']).max()
 
 
-def test_it_has_the_sample_rate_of_the_drive(tmp_path):
-    slow = (*SHORT, '--sample-rate', '500')
-    recording = driven(tmp_path / 'slow', *slow)
-    undamped = undamped_of(recording, parameters_of(recording))
-    assert len(undamped.stamps) == pytest.approx(5.8 * 500, abs=2)
-    assert (undamped.begin - undamped.stamps[0]) / 1e9 == pytest.approx(2.8)
-
-
-def test_of_a_drive_in_real_time_it_ends_with_the_run_and_the_recording_goes_on(drive):
-    parameters = parameters_of(drive)
-    whole = undamped_of(drive, parameters)
-    # In real time the simulator's truth goes on behind the end of its run, as this one behind a shorter run.
-    parameters['mount_sim']['timeline.duration'] = 2.9
-    shorter = undamped_of(drive, parameters)
-    assert len(whole.stamps) - len(shorter.stamps) == 100
-    np.testing.assert_array_equal(shorter.displacement, whole.displacement[:-100])
-    assert shorter.begin == whole.begin
-
-
 def test_the_report_on_a_drive_in_real_time_has_the_undamped_line_and_the_isolation(drive, tmp_path):
     # In real time the electronics sample on until the graph ends: `sim/truth` is longer than the run.
     longer = parameters_of(drive)
@@ -71,8 +50,7 @@ def test_the_report_on_a_drive_in_real_time_has_the_undamped_line_and_the_isolat
     recording = open_recording(tmp_path / 'recording')
     assert len(recording['sim/truth']) == len(drive['sim/truth']) + 33
     page = tmp_path / 'page.html'
-    result = CliRunner().invoke(app, ['report', str(tmp_path / 'recording'), '--out', str(page)])
-    assert result.exit_code == 0, result.output
+    command('report', tmp_path / 'recording', '--out', page)
     html = page.read_text(encoding='utf-8')
     assert '"name":"undamped"' in html
     words = ' '.join(re.sub('<[^>]*>', ' ', html).split())

@@ -7,8 +7,8 @@
 import csv
 import json
 import struct
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,14 +17,13 @@ from engine_mount.signals.formats.content import Stated
 BEGIN = 1_700_000_000  # s since 1970, of formats that tell a date
 
 
-@dataclass(frozen=True)
-class Made:
+class Made(NamedTuple):
     """A file: its place, the names of columns and of that of times, what must be stated, has it units."""
 
     path: Path
     names: dict
     time: str = ''
-    stated: Stated = field(default_factory=Stated)
+    stated: Stated = Stated()
     units: bool = True
 
 

@@ -64,19 +64,10 @@ def check_belongs(loop: ControlLoop, table_stamp: int | None, air_gap_stamp: int
         raise ForceTableError('no displacement was received; activate mount_driver first')
     if loop.first <= table_stamp <= loop.last:
         return
-    if table_stamp > loop.last:
-        reason = (
-            f'the newest displacement is of {_seconds(loop.last)}: the time of the measurements went back, '
-            'or they stand still'
-        )
-    elif loop.broken:
-        reason = f'the measurements were interrupted or went back, and came anew at {_seconds(loop.first)}'
-    else:
-        reason = (
-            f'mount_control has received the measurements since {_seconds(loop.first)} only, when it was '
-            'configured, and cannot know that they have come without a break since the table'
-        )
-    raise ForceTableError(f'current_force_table is of {_seconds(table_stamp)}, but {reason}; {_REMEDY}')
+    raise ForceTableError(
+        f'current_force_table is of {_seconds(table_stamp)}, but mount_control has received the measurements '
+        f'without a break within {_seconds(loop.first)} .. {_seconds(loop.last)} only; {_REMEDY}'
+    )
 
 
 def check_rate(loop: ControlLoop, sample_rate: float) -> None:

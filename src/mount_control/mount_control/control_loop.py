@@ -51,7 +51,7 @@ _UNANSWERED = {Judgement.IGNORE, Judgement.EARLY, Judgement.INACTIVE}
 
 @dataclass
 class SampleCounts:
-    """What came in since activation, and since it was configured the messages that could not be read."""
+    """What came in since activation."""
 
     samples: int = 0
     bridged: int = 0
@@ -59,7 +59,6 @@ class SampleCounts:
     ignored: int = 0
     invalid: int = 0
     implausible: int = 0
-    messages_malformed: int = 0
 
 
 class Answers(NamedTuple):
@@ -79,7 +78,6 @@ class ControlLoop:
         """The stamps (ns) between which the displacement came without a break; None before the first one."""
         self.measured_before = False
         """Whether the measurements are known to have come without a break before the first sample, too."""
-        self.broken = False  # whether `first` came after a break that was noticed
         self.steps: deque[int] = deque(maxlen=_KEPT_STEPS)  # ns, between the samples before `begin`
         self.controller: Controller | None = None  # None: nothing is answered
         self.judgement = Judgement.INACTIVE  # of the last sample
@@ -88,7 +86,6 @@ class ControlLoop:
         self.counts = SampleCounts()
         self.changes_made: deque[str] = deque()  # texts of the changes that hold from the last sample on
         self.foreign = ''  # which other sender there is, since the activation
-        self.nameless = False  # whether `foreign` only tells what came, not from whom
         self.writer_doubt = ''  # which other sender there may be at present
         self._changes: deque[tuple[ControlLaw, str]] = deque()
         self._intruded: deque[int] = deque(maxlen=_INTRUSIONS)  # stamps of samples that came too soon, ns
@@ -101,11 +98,9 @@ class ControlLoop:
         self._longest_bridge = round(parameters.longest_bridge * 1e9)  # ns
         self._range = parameters.displacement_range  # m
         self.plausibility = Plausibility(parameters)
-        self.counts = SampleCounts(messages_malformed=self.counts.messages_malformed)
-        self.interrupted = False
-        self.foreign, self.nameless = '', False
-        self.last_fault = 0  # stamp (ns) of the last sample at which the controller's memory was spoiled
-        self._faults = 0
+        self.counts = SampleCounts()
+        self.refusal = ''  # why the table no longer holds since the activation
+        self.foreign = ''
         self._used = self._compared = _NEVER  # stamps of the last samples that controller, plausibility took
         self._horizon = 0
         """So far (ns) behind `_used` a sample is the usual next one; 0 while there is anything to look at."""
@@ -131,10 +126,9 @@ class ControlLoop:
     def on_publisher_conflict(self, confirmed: str, suspected: str) -> None:
         """Answer with 0 A: until the next activation for a `confirmed` one, and while one is `suspected`.
 
-        The first name stays. May come from another thread.
+        May come from another thread.
         """
-        if confirmed and (self.nameless or not self.foreign):
-            self.foreign, self.nameless = confirmed, False
+        self.foreign = confirmed or self.foreign
         self.writer_doubt = suspected
         self._horizon = 0
 
@@ -167,11 +161,8 @@ class ControlLoop:
             else:
                 missing = self._missing(elapsed)
                 self.counts.bridged += missing
-        current = controller.advance(displacement, missing)
         self.trace = controller.trace_record
-        if controller.counts[-1] != self._faults:
-            self._faults, self.last_fault = controller.faults, stamp
-        return current
+        return controller.advance(displacement, missing)
 
     def _refusal(self, stamp: int, displacement: float, elapsed: int) -> Judgement | None:
         """Return why a sample that is not the usual next one is not to be controlled, None where it is."""
@@ -181,8 +172,8 @@ class ControlLoop:
         assert self.first is not None
         assert self.last is not None
         if not self.first <= self._activation <= self.last:
-            self.interrupted = True
-        if self.interrupted:
+            self.refusal = _INTERRUPTED
+        if self.refusal:
             return Judgement.INTERRUPTED
         if stamp <= self._activation:
             return Judgement.EARLY
@@ -209,7 +200,6 @@ class ControlLoop:
             self.first, self.last = 0 if self.measured_before else stamp, stamp
         elif abs(stamp - self.last) > _STREAM_BREAK:
             self.first = self.last = stamp
-            self.broken = True
             self.steps.clear()
         elif stamp > self.last:
             if self.controller is None:
@@ -224,7 +214,6 @@ class ControlLoop:
         found = self._intruded
         found.append(stamp)
         if len(found) == _INTRUSIONS and stamp - found[0] <= _INTRUSION_PERIOD and not self.foreign:
-            self.nameless = True
             self.foreign = (
                 f'{len(found)} displacement samples within {_INTRUSION_PERIOD * 1e-9:g} s were repeated, '
                 f'older than the one before or less than {self._closest * 1e-6:g} ms behind it: end one of '
@@ -304,11 +293,6 @@ class ControlLoop:
         """The record type of the traces since `begin`."""
         assert self.controller is not None
         return self.controller.compiled.trace
-
-    @property
-    def refusal(self) -> str:
-        """Why the table no longer holds since the activation, or empty."""
-        return _INTERRUPTED if self.interrupted else ''
 
     @property
     def damping_active(self) -> bool:

@@ -77,20 +77,16 @@ def resample(
     Raises `ForceTableError` where it does not rise from the first touch, reaches beyond any magnet, or the
     offset current lies outside.
     """
-    if not 0.0 <= normal_force[0] <= _FIRST_TOUCH:
+    if not (0.0 <= normal_force[0] <= _FIRST_TOUCH and normal_force[-1] <= _HIGHEST_FORCE):
         raise ForceTableError(
-            f'current_force_table starts at {normal_force[0]:.2f} N (limit {_FIRST_TOUCH:g} N), '
-            'not at the first touch of the pads; activate mount_init again'
+            f'current_force_table reaches from {normal_force[0]:.2f} to {normal_force[-1]:g} N (limits: '
+            f'first touch of the pads within 0 .. {_FIRST_TOUCH:g} N, end up to {_HIGHEST_FORCE:g} N); '
+            'activate mount_init again'
         )
     if not (np.all(np.diff(normal_force) > 0.0) and np.all(np.diff(current) > 0.0)):
         raise ForceTableError(
             'current and normal force of the current_force_table must rise strictly; '
             'activate mount_init again'
-        )
-    if not normal_force[-1] <= _HIGHEST_FORCE:
-        raise ForceTableError(
-            f'current_force_table ends at {normal_force[-1]:g} N (limit {_HIGHEST_FORCE:g} N), more than '
-            'the magnet can pull; activate mount_init again'
         )
     if not 0.0 < offset_current < highest_current:
         raise ForceTableError(

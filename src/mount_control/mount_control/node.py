@@ -1,44 +1,36 @@
 """ROS 2 node of the controller: a displacement message arrives, a setpoint leaves."""
 
-import contextlib
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.parameter import Parameter
 
 from mount_control.activation import Activation, AirGap, check_rate
 from mount_control.control_loop import OFF, ControlLoop, SampleCounts
 from mount_control.controller import load_compiled_law
-from mount_control.diagnosis import ControlFigures, counted_since, verdict
+from mount_control.diagnosis import counted_since, verdict
 from mount_control.policy.contract import trace_fields
 from mount_control.settings import (
     FRICTION,
     check_policies,
     control_settings,
-    defaults,
     parameter_sets,
     run_time_parameters,
-    without_effect,
 )
 from mount_models.arithmetic.compiled import log_compilation
-from mount_models.damper import damper_text
-from mount_models.quantity import ParameterError
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
 from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
 from mount_ros.messages.force_table import from_bytes
-from mount_ros.messages.scalars import MessageError, ScalarsLayout
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import Change, SpecimenValues, declare
 from mount_ros.nodes.process import run_node
-from mount_ros.timing import LatencyHistogram
 
 _MEASURED_BEFORE = (
     'measured_before',
@@ -48,9 +40,6 @@ _MEASURED_BEFORE = (
         'break since before the present table was made, so that it holds'
     ),
 )
-_KEPT_DURATIONS = 100_000  # chosen: many more than come between two verdicts
-
-T = TypeVar('T')
 
 
 class MountControl(SafeLifecycleNode):
@@ -63,14 +52,12 @@ class MountControl(SafeLifecycleNode):
         for prefix, parameters in parameter_sets():
             declare(self, parameters, prefix)
         self.declare_parameter(*_MEASURED_BEFORE)
-        self.add_pre_set_parameters_callback(_spelled_out)
         self._of_specimen = SpecimenValues(self)
         self.loop = ControlLoop()
         self._activation = Activation()
         self._foreign = False  # whether another node publishes what this one subscribes to
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
-        self._durations: deque[float] = deque(maxlen=_KEPT_DURATIONS)  # s, since the last verdict
         self._order = threading.Lock()  # no answer is made while an activation begins or ends
 
     def configure(self) -> None:
@@ -78,12 +65,8 @@ class MountControl(SafeLifecycleNode):
         self._specimen = chosen_specimen(values['parameters_file'], values['specimen'])
         for prefix, parameters in FRICTION.items():
             self._of_specimen.give(parameters, prefix, self._specimen.friction)
-        self.set_parameters([self.get_parameter('damper')])  # with the points of a file, see _spelled_out
         self._settings = control_settings(self._values(), self._specimen)
-        usual = defaults()
-        self._warn_without_effect(name for name, value in self._values().items() if value != usual.get(name))
-        self._parameter_changes = 0
-        self._foreign, self._unread_reason = False, ''
+        self._foreign = False
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
@@ -106,17 +89,12 @@ class MountControl(SafeLifecycleNode):
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
-        self._latency = LatencyHistogram()
         self._counted = SlidingWindow(SampleCounts())
-        self._heard = time.monotonic()
+        self._received = time.monotonic()
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
         self.data_path.publisher_watch.report()
-        self.get_logger().info(
-            f'takes the table of {air_gap.stamp * 1e-9:.3f} s: up to {max(table.normal_force):.0f} N, offset '
-            f'current {air_gap.offset_current:.3f} A; policy {self._settings.parameters.policy}'
-        )
         if self.lockstep and waiting:
             self._on_displacement(waiting)  # the electronics wait for an answer to what came before
 
@@ -143,10 +121,6 @@ class MountControl(SafeLifecycleNode):
 
     def apply_changes(self, changes: Mapping[str, Change]) -> None:
         self._settings = control_settings(self._values(), self._specimen)
-        self._parameter_changes += len(changes)
-        self._warn_without_effect(changes)
-        texts = (f'{name} from {change.old} to {change.new}' for name, change in changes.items())
-        self.get_logger().info(f'continues with {", ".join(texts)}')
         text = change_text(self.get_name(), changes)
         if self.loop.controller is not None:
             self.loop.change(self._settings, text)
@@ -155,32 +129,22 @@ class MountControl(SafeLifecycleNode):
 
     def judge(self) -> Verdict:
         loop, now = self.loop, time.monotonic()
-        while self._durations:
-            self._latency.add(self._durations.popleft())
         counts = replace(loop.counts)
-        figures = ControlFigures(
-            lately=counted_since(self._counted.earlier(now, counts), counts),
-            silence=0.0 if self.lockstep else now - self._heard,
-            longest_silence=self._settings.parameters.longest_bridge,
-            step_median=self._latency.quantile(0.5),
-            step_p99=self._latency.quantile(0.99),
-            foreign_is_fatal=self.lockstep,  # then a supervisor ends the graph
-            unread_reason=self._unread_reason,
-            values={
-                'policy': self._settings.parameters.policy,
-                'damper': self.get_parameter('damper').value,
-                'parameter_changes': self._parameter_changes,
-            },
+        figures = {
+            'policy': self._settings.parameters.policy,
+            'damper': self.get_parameter('damper').value,
+            'fatal': bool(loop.foreign) and self.lockstep,  # then a supervisor ends the graph
+        }
+        return verdict(
+            loop,
+            counted_since(self._counted.earlier(now, counts), counts),
+            0.0 if self.lockstep else now - self._received,
+            self._settings.parameters.longest_bridge,
+            figures,
         )
-        return verdict(loop, figures)
 
     def _on_displacement(self, raw: bytes) -> None:
-        begin = time.monotonic()
-        try:
-            stamp, (displacement,), _ = self._displacement.unpack(raw)
-        except MessageError as error:
-            self._note_unread(error)
-            return
+        stamp, (displacement,), _ = self._displacement.unpack(raw)
         with self._order:
             loop = self.loop
             current = loop.step(stamp, displacement)
@@ -193,57 +157,25 @@ class MountControl(SafeLifecycleNode):
                 self._send_trace(self._trace.pack_record(stamp, loop.trace.tobytes()))
             while loop.changes_made:
                 self._send_change(stamp, loop.changes_made.popleft())
-        self._heard = begin
-        self._durations.append(time.monotonic() - begin)
+        self._received = time.monotonic()
 
     def _send_change(self, stamp: int, text: str) -> None:
         self._send_event(string_message(dated(stamp, text)))
 
     def _on_air_gap(self, raw: bytes) -> None:
-        self._activation.air_gap = self._read(self._air_gap_of, raw)
+        self._activation.air_gap = None  # whatever comes, what came before does not hold any more
+        if not self._foreign:
+            stamp, numbers, _ = self._gap_layout.unpack(raw)
+            offset = numbers[self._gap_layout.names.index('offset_current')]
+            self._activation.air_gap = AirGap(stamp, offset)
 
     def _on_table(self, raw: bytes) -> None:
-        self._activation.table = self._read(from_bytes, raw)
-
-    def _read(self, unpack: Callable[[bytes], T], raw: bytes) -> T | None:
-        """Return the content of a message; None where it is unreadable or may be another node's."""
-        if self._foreign:
-            return None
-        try:
-            return unpack(raw)
-        except MessageError as error:
-            self._note_unread(error)
-            return None
-
-    def _air_gap_of(self, raw: bytes) -> AirGap:
-        stamp, numbers, _ = self._gap_layout.unpack(raw)
-        return AirGap(stamp, numbers[self._gap_layout.names.index('offset_current')])
-
-    def _note_unread(self, error: ValueError) -> None:
-        self.loop.counts.messages_malformed += 1
-        self._unread_reason = str(error)
-        self.get_logger().error(str(error), throttle_duration_sec=1.0)
-
-    def _warn_without_effect(self, names: Iterable[str]) -> None:
-        if sentence := without_effect(names, self._settings.parameters.policy):
-            self.get_logger().warning(sentence)
+        self._activation.table = None
+        if not self._foreign:
+            self._activation.table = from_bytes(raw)
 
     def _values(self) -> dict[str, Any]:
         return {name: self.get_parameter(name).value for name in self.get_parameters_by_prefix('')}
-
-
-def _spelled_out(parameters: list[Parameter]) -> list[Parameter]:
-    """Return parameters about to be set with the points of a damper's file instead of its path.
-
-    So it is read once, and event and session hold what it said. What cannot be read is refused afterwards.
-    """
-    spelled = []
-    for parameter in parameters:
-        if parameter.name == 'damper' and isinstance(parameter.value, str):
-            with contextlib.suppress(ParameterError):
-                parameter = Parameter('damper', value=damper_text(parameter.value))
-        spelled.append(parameter)
-    return spelled
 
 
 def main() -> None:

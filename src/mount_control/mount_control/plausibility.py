@@ -5,7 +5,6 @@ stay undetected: friction opposes the motion whatever the sign, and the band-pas
 """
 
 import math
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -22,15 +21,6 @@ _ORDER = 4  # of the difference that leaves noise and takes motion away: at 50 H
 _NOISE_OF_DIFFERENCE = math.sqrt(70.0 * 2.0 / math.pi)  # mean of |4th difference| of white noise of 1
 _SHARE = 10.0  # 1/s, chosen: of each sample in the mean, over about 0.1 s
 _CUT = 4.0  # chosen: of the limit; no single reading counts for more
-
-
-class Doubt(IntEnum):
-    """Why a displacement is not believed."""
-
-    NONE = 0
-    STEP = 1
-    STUCK = 2
-    NOISE = 3
 
 
 class Limits(NamedTuple):
@@ -94,26 +84,20 @@ class Plausibility:
     def sentence(self) -> str:
         """What was last not believed, with value, limit and remedy; empty where everything was."""
         value, limits = float(self._record['value']), self._parameters
-        sentences = {
-            Doubt.NONE: '',
-            Doubt.STEP: (
-                f'displacement moved at {value:.2f} m/s (limit {limits.displacement_velocity:g} m/s): '
-                'check the displacement sensor, its seat and its cable'
-            ),
-            Doubt.STUCK: (
-                f'displacement repeated {1e3 * value:.4f} mm for {1e3 * limits.displacement_stuck:.0f} ms, '
-                f'without the noise of its sensor (limit {1e3 * limits.displacement_stuck:g} ms): '
-                'check the displacement sensor'
-            ),
-            Doubt.NOISE: (
-                f'noise of the displacement ({1e6 * value:.0f} um) is above '
-                f'{1e6 * limits.displacement_noise:g} um: check the displacement sensor and its shield'
-            ),
-        }
-        return sentences[Doubt(int(self._record['doubt']))]
+        sentences = (
+            '',
+            f'displacement moved at {value:.2f} m/s (limit {limits.displacement_velocity:g} m/s): '
+            'check the displacement sensor, its seat and its cable',
+            f'displacement repeated {1e3 * value:.4f} mm for {1e3 * limits.displacement_stuck:.0f} ms, '
+            f'without the noise of its sensor (limit {1e3 * limits.displacement_stuck:g} ms): '
+            'check the displacement sensor',
+            f'noise of the displacement ({1e6 * value:.0f} um) is above '
+            f'{1e6 * limits.displacement_noise:g} um: check the displacement sensor and its shield',
+        )
+        return sentences[self._record['doubt']]
 
 
-_NONE, _STEP, _STUCK, _NOISE = (int(doubt) for doubt in Doubt)
+_NONE, _STEP, _STUCK, _NOISE = range(4)  # why a displacement is not believed
 
 
 @compiled

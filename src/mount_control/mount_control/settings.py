@@ -72,16 +72,14 @@ def parameter_sets() -> list[tuple[str, Any]]:
 
 def run_time_parameters() -> frozenset[str]:
     """Return the names of what the configured controller takes from the next sample on: the policies' own."""
-    sets = ((policy.Parameters(), prefix_of(name)) for name, policy in POLICIES.items())
-    return frozenset(name for parameters, prefix in sets for name in flattened(parameters, prefix))
+    sets = (flattened(policy.Parameters(), prefix_of(name)) for name, policy in POLICIES.items())
+    return frozenset().union(*sets)
 
 
 def defaults() -> dict[str, Any]:
     """Return {parameter: default} of all parameters that choose the settings."""
-    values = {}
-    for prefix, parameters in parameter_sets():
-        values.update(flattened(parameters, prefix))
-    return values
+    sets = (flattened(parameters, prefix) for prefix, parameters in parameter_sets())
+    return {name: value for each in sets for name, value in each.items()}
 
 
 def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSettings:
@@ -93,7 +91,11 @@ def control_settings(values: Mapping[str, Any], specimen: Specimen) -> ControlSe
     sample_time_ns(parameters.sample_rate)  # refuses what the electronics cannot count
     policy, own = policy_parameters(values)
     design = policy.design(own, 1.0 / parameters.sample_rate)
-    check_fits(parameters, specimen)
+    if parameters.highest_current > specimen.current_limit:
+        raise SpecimenError(
+            f'highest_current ({parameters.highest_current:.3f} A) must not exceed current_limit '
+            f'({specimen.current_limit:.3f} A) of the specimen {specimen.name!r}; lower highest_current'
+        )
     friction = _identified(specimen, FrictionCoefficients(), values, 'friction')
     contact = _identified(specimen, FrictionContact(), values, 'contact')
     _check_friction(friction, contact)
@@ -128,15 +130,6 @@ def without_effect(names: Iterable[str], chosen: str) -> str:
                 f'{"it" if len(idle) == 1 else "them"} out'
             )
     return ''
-
-
-def check_fits(parameters: ControlParameters, specimen: Specimen) -> None:
-    """Raise `SpecimenError` if the controller may ask for more current than was calibrated."""
-    if parameters.highest_current > specimen.current_limit:
-        raise SpecimenError(
-            f'highest_current ({parameters.highest_current:.3f} A) must not exceed current_limit '
-            f'({specimen.current_limit:.3f} A) of the specimen {specimen.name!r}; lower highest_current'
-        )
 
 
 def _identified(specimen: Specimen, defaults: P, values: Mapping[str, Any], prefix: str) -> P:

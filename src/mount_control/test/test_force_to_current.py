@@ -1,5 +1,7 @@
 """Normal force to coil current through the table of an activation."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,16 +43,6 @@ def test_beyond_the_table_its_last_current_holds(table):
     assert highest_force(table.currents) == pytest.approx(304.8, abs=FORCE_STEP)
 
 
-def test_a_table_that_does_not_start_at_the_touch_is_refused(table_rows):
-    currents, forces, offset = table_rows
-    with pytest.raises(ForceTableError, match=r'starts at 2\.60 N \(limit 1 N\).*activate mount_init again'):
-        resample(currents[1:], forces[1:], offset, 3.0)
-    with pytest.raises(ForceTableError, match='starts at -3'):
-        resample(currents, forces - 3.0, offset, 3.0)
-    with pytest.raises(ForceTableError, match='starts at nan'):
-        resample(currents, np.r_[np.nan, forces[1:]], offset, 3.0)
-
-
 @pytest.mark.parametrize('offset', [0.0, -0.1, 3.0, 3.5, float('nan')])
 def test_an_offset_current_outside_its_limits_is_refused(table_rows, offset):
     currents, forces, _ = table_rows
@@ -62,17 +54,24 @@ def test_a_force_that_is_not_a_number_gives_0_ampere(table):
     assert current_for(table.currents, table.limits, float('nan')) == 0.0
 
 
-@pytest.mark.parametrize('highest', [1e9, float('inf')])
-def test_a_table_beyond_any_magnet_is_refused_before_its_places_are_made(table_rows, highest):
-    currents, forces, offset = table_rows
-    with pytest.raises(ForceTableError, match=r'ends at (1e\+09|inf) N \(limit 10000 N\).*mount_init again'):
-        resample(currents, np.r_[forces[:-1], highest], offset, 3.0)
+TOUCH = r'(limits: first touch of the pads within 0 .. 1 N, end up to 10000 N); activate mount_init again'
 
 
-def test_a_table_that_does_not_rise_is_refused(table_rows):
-    currents, forces, offset = table_rows
-    for row in (currents[::-1], np.r_[currents[:-1], np.nan]):
-        with pytest.raises(ForceTableError, match='must rise strictly'):
-            resample(row, forces, offset, 3.0)
-    with pytest.raises(ForceTableError, match='must rise strictly'):
-        resample(currents, np.r_[forces[:3], np.nan, forces[4:]], offset, 3.0)
+@pytest.mark.parametrize(
+    ('row', 'places', 'value', 'sentence'),
+    [
+        (1, 0, 2.6, f'reaches from 2.60 to 304.8 N {TOUCH}'),
+        (1, 0, -3.0, 'reaches from -3.00'),
+        (1, 0, np.nan, 'reaches from nan'),
+        (1, -1, 1e9, 'to 1e+09 N'),
+        (1, -1, np.inf, 'to inf N'),  # before the places of the table are made
+        (1, 3, np.nan, 'must rise strictly'),
+        (0, -1, np.nan, 'must rise strictly'),
+        (0, 3, 0.5, 'must rise strictly'),
+    ],
+)
+def test_a_table_that_cannot_be_is_refused(table_rows, row, places, value, sentence):
+    rows = [row.copy() for row in table_rows[:2]]
+    rows[row][places] = value
+    with pytest.raises(ForceTableError, match=re.escape(sentence)):
+        resample(*rows, table_rows[2], 3.0)

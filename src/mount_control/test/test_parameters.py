@@ -53,15 +53,3 @@ def test_the_lead_must_stay_below_an_eighth_of_a_period():
     )
     assert _refusal(lead_time=0.013, eigenfrequency=10.0) == expected
     assert _checked(lead_time=0.0124, eigenfrequency=10.0)
-
-
-@pytest.mark.parametrize(
-    ('frequency', 'samples'), [(8.0, 125), (7.9, 127), (2.0, 500), (20.0, 50), (3.0, 333)]
-)
-def test_a_period_is_counted_in_whole_samples(frequency, samples):
-    assert switched_viscous.Parameters(eigenfrequency=frequency).period_samples(SAMPLE_TIME) == samples
-
-
-def test_another_switching_is_refused_with_the_known_ones():
-    assert _checked(switching='always').switching == 'always'
-    assert _refusal(switching='never') == "switching 'never' is unknown; known are enabled, always"

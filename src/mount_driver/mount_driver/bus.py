@@ -31,11 +31,11 @@ _RECEIVE_BUFFER = 4 * 1024 * 1024  # bytes; the kernel gives what net.core.rmem_
 _CAN_FD_MTU = 72  # bytes: what the kernel shows for an interface in FD mode
 _MOST_UNREADABLE = 1000  # without a pause, chosen: then the bus itself is taken for broken
 _LOOPBACK = '127.0.0.1'
+_ANCILLARY = 64  # bytes: room for the time of arrival
 _LARGEST_DATAGRAM = 4096  # bytes; a frame takes about 200
 _SO_ATTACH_FILTER = 26  # Linux, asm-generic/socket.h
 _SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h: the kernel adds the time of arrival
 _TIME = struct.Struct('@ll')  # s, ns
-_ROOM_FOR_TIME = socket.CMSG_SPACE(_TIME.size)
 
 
 class CanLinkError(OSError):
@@ -149,7 +149,7 @@ class LoopbackMulticastBus(can.BusABC):
         try:
             if not self._poll.poll(None if timeout is None else max(timeout, 0.0) * 1e3):
                 return None, False
-            datagram, ancillary, _, _ = self._socket.recvmsg(_LARGEST_DATAGRAM, _ROOM_FOR_TIME)
+            datagram, ancillary, _, _ = self._socket.recvmsg(_LARGEST_DATAGRAM, _ANCILLARY)
         except BlockingIOError:
             return None, False
         except OSError as error:

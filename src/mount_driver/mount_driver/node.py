@@ -110,8 +110,9 @@ class MountDriver(SafeLifecycleNode):
         before = self._heat
         if before is None:
             return HeatWatch(settings.heating, settings.coil_celsius_before)
-        same = before.heating == settings.heating
-        return before if same else HeatWatch(settings.heating, before.known_celsius)
+        if before.heating == settings.heating:
+            return before
+        return HeatWatch(settings.heating, before.celsius if before.known else nan)
 
     def _take_specimen(self) -> None:
         self._law = RippleLaw()

@@ -9,7 +9,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
-from e2e.p05 import e2e_p05_check
+from e2e.p05 import e2e_p05_check, e2e_p05_protect
 
 from mount_driver.can_library import Database
 from mount_driver.layout import MessageLayout, Scaling
@@ -162,7 +162,11 @@ class MountCodec:
         current, answered_counter, enable = setpoint
         limits = self.current
         raw = round(min(max(current, limits.low), limits.high) * limits.steps)
-        return self.setpoint.pack((0, alive_counter, raw, answered_counter, enable))
+        # As `MessageLayout.pack` does, without its call.
+        data = bytearray(self.setpoint.pack_bits(enable, answered_counter, raw, alive_counter, 0))
+        data.reverse()
+        e2e_p05_protect(data, self.setpoint.data_id, increment_counter=False)
+        return data
 
     def _setpoint_of(self, raw: tuple[int, ...]) -> Setpoint | None:
         """Return the setpoint of raw numbers, None where its current exceeds the DBC's limit."""

@@ -111,7 +111,7 @@ def anew(watch):
 
 
 def told(watch):
-    return HeatWatch(CoilHeating(), 20.0 if watch is None else watch.known_celsius)
+    return HeatWatch(CoilHeating(), 20.0 if watch is None else watch.celsius)
 
 
 @pytest.mark.parametrize(
@@ -130,11 +130,11 @@ def test_a_coil_of_unknown_history_is_derated_until_its_temperature_is_reported_
     for _ in range(30):
         watch.warm(9.0, 0.1)
     assert watch.current_limit == pytest.approx(1.73, abs=0.02)
-    assert math.isnan(watch.known_celsius)
+    assert not watch.known
     watch.take_reported(30.0)
     assert (watch.celsius, watch.current_limit) == (80.0, 3.0)
     watch.take_reported(20.0)
-    assert watch.known_celsius == 80.0
+    assert (watch.known, watch.celsius) == (True, 80.0)
 
 
 def test_a_ramp_fits_into_what_an_activation_has_to_spare_and_a_coil_at_its_limit_is_spared_nothing():

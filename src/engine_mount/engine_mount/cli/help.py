@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 
 _WORDS = {
@@ -32,6 +33,11 @@ class Group(TyperGroup):
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""
         return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]
+
+
+def group(name: str, text: str) -> typer.Typer:
+    """Return a command with sub-commands, and its help `text`."""
+    return typer.Typer(cls=Group, name=name, help=text, no_args_is_help=True, rich_markup_mode='markdown')
 
 
 def _worded(parameter: Any, ctx: Any) -> Any:

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from engine_mount.cli.terminal import note, terminal
+from engine_mount.cli.terminal import terminal
 from engine_mount.recordings.screen import Bar, Line, Screen, Table
 
 _PLAIN_PERIOD = 10.0  # s, chosen
@@ -30,7 +30,7 @@ class TerminalScreen(Screen):
 
     def note(self, sentence: str, word: str = 'note') -> None:
         """Print a sentence with its word in colour."""
-        note(self.console, sentence, word)
+        self.console.print(Text.assemble((word, 'yellow'), f' {sentence}'), soft_wrap=True)
 
     def table(self, table: Table) -> None:
         """Draw a table as wide as its texts; long ones on the left are folded."""

@@ -11,11 +11,6 @@ def terminal(**options: Any) -> Console:
     return Console(markup=False, emoji=False, highlight=False, **options)
 
 
-def note(console: Console, sentence: str, word: str = 'note') -> None:
-    """Print a sentence that should not be overlooked, in one line."""
-    console.print(Text.assemble((word, 'yellow'), f' {sentence}'), soft_wrap=True)
-
-
 def refuse(reason: object) -> None:
     """Print to standard error why a command does not do what was asked, in one line."""
     console = terminal(stderr=True)

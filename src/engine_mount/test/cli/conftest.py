@@ -1,11 +1,8 @@
 """What the tests of this package share: small pictures, and the command as a user runs it."""
 
-import contextlib
-import io
-
+import command_line
 import pytest
 
-from engine_mount.cli.command import main
 from engine_mount.experiments.harness import drawing
 
 
@@ -20,27 +17,9 @@ def small_pictures():
 
 @pytest.fixture(scope='session')
 def command():
-    """Return what runs the command and returns all that it printed; `codes`: how it may end."""
-
-    def command(*words, codes=(0,)):
-        printed = io.StringIO()
-        with (
-            contextlib.redirect_stdout(printed),
-            contextlib.redirect_stderr(printed),
-            pytest.raises(SystemExit) as ended,
-        ):
-            main([str(word) for word in words])
-        assert ended.value.code in codes, printed.getvalue()
-        return printed.getvalue()
-
-    return command
+    return command_line.command
 
 
 @pytest.fixture(scope='session')
-def refused(command):
-    """Return what runs the command, which must refuse, and returns its sentence in one line."""
-
-    def refused(*words, codes=(1, 2)):
-        return ' '.join(command(*words, codes=codes).replace('│', ' ').split())
-
-    return refused
+def refused():
+    return command_line.refused

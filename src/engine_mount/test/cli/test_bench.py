@@ -31,7 +31,7 @@ def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain, tmp_path
     (tmp_path / 'rclpy.py').write_text('raise SystemExit("foreign code ran")')
     run = run_relay(BenchOrder(1, 1.0, 1000.0, domain, 0))
     assert 0.0 < run.latency < run.latency_p99
-    assert 0.0 < run.cpu < 2.0
+    assert run.missing < 0.5
     assert not [child for child in psutil.Process().children() if 'relay' in ' '.join(child.cmdline())]
 
 

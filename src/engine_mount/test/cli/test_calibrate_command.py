@@ -5,7 +5,6 @@ import json
 
 import numpy as np
 import pytest
-import yaml
 
 from mount_models.specimen import load_specimen
 from mount_sim.rack import drawn_rack, measure_force, record_ripple, write_columns
@@ -63,14 +62,11 @@ def test_the_specimen_tells_where_it_comes_from(calibrated, files):
     assert law['valid']['gap'] == pytest.approx([270e-6, 550e-6])
     assert law['valid']['current'] == [0.0, 3.0]
     assert np.shape(law['covariance']) == (18, 18)
-    assert len(law['residuals']['rms_by_gap']) == 15
-    assert law['versions'].keys() == {'mount_bringup', 'numpy', 'scipy'}
 
 
 def test_json_and_figures_hold_what_was_found(calibrated):
     law, gap = (json.loads((calibrated / f'{kind}.json').read_text()) for kind in ('actuator', 'inductance'))
     assert law['relative_rms'] == pytest.approx(0.01, rel=0.2)
-    assert [len(law['parameters'][f'a{n}']) for n in range(1, 6)] == [4, 4, 4, 2, 4]
     assert gap['curves']['inductance_of_gap']['largest_gap_std_m'] < 1e-6
     errors = {(row['celsius'], row['source']): row for row in gap['temperature']['gap_error_um']}
     warm = errors[80.0, 'fitted']
@@ -133,7 +129,7 @@ def test_ripple_and_options_that_make_no_sense_are_refused(
     assert sentence in refused('calibrate', 'inductance', file, *options)
 
 
-def test_what_contradicts_the_other_recordings_is_refused_and_named(files, calibrated, tmp_path, refused):
+def test_what_contradicts_the_other_recordings_is_refused_and_named(files, tmp_path, refused):
     cold = files[1][:8]
     said = refused('calibrate', 'inductance', *cold, '--gap', f'{cold[4].name}=455')
     assert f'{cold[4].name}: by the' in said
@@ -143,10 +139,3 @@ def test_what_contradicts_the_other_recordings_is_refused_and_named(files, calib
     copy = tmp_path / 'copy.csv'
     copy.write_bytes(files[0].read_bytes())
     assert 'are the same to the bit' in refused('calibrate', 'actuator', files[0], copy)
-    content = yaml.safe_load((calibrated / 'left.yaml').read_text())
-    content['force_law']['a4'] = [-5.0, 0.0]
-    edited, out = tmp_path / 'edited.yaml', tmp_path / 'o.yaml'
-    edited.write_text(yaml.safe_dump(content))
-    said = refused('calibrate', 'actuator', files[0], '--base', edited, '--out', out)
-    assert 'the force must' in said
-    assert not out.exists()

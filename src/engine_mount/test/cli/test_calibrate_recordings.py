@@ -1,6 +1,5 @@
 """Calibrations from MCAP recordings, as a rack makes them in the topics of a drive."""
 
-import math
 import time
 
 import numpy as np
@@ -32,34 +31,24 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     """Record one held gap; every `spoil`-th ripple has no slopes, the coil grows warmer by `warming` K/s."""
     columns = record_ripple(RACK, gap, celsius, duration=1.5, peak_current=2.5)
     current = columns['current_a']
-    rate, flux = columns['current_rate_a_per_s'], columns['flux_rate_t_per_s']
+    slopes = np.stack([columns['current_rate_a_per_s'], columns['flux_rate_t_per_s']], axis=1)
     if spoil:
-        rate[::spoil] = flux[::spoil] = np.nan
+        slopes[::spoil] = np.nan
     noise = 1.0 + 0.01 * np.random.default_rng([5, round(gap * 1e9)]).standard_normal(current.size)
     pull = noise * np.array([magnetic_force(RACK.actuator, i, gap) for i in current.tolist()])
-    writer = BagWriter(folder)
-    begin = time.time_ns()
-    try:
-        for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
-            writer.add_topic(f'/{topic.name}', topic.type)
-        writer.write(f'/{SESSION.name}', string_message('scenario: rack'), begin)
-        ripples, temperatures = ScalarsLayout(COIL_RIPPLE), OneNumberLayout(temperature)
-        forces = OneNumberLayout(wrench)
-        rows = zip(current.tolist(), rate.tolist(), flux.tolist(), pull.tolist(), strict=True)
-        for sample, (i, of_current, of_flux, force) in enumerate(rows):
-            stamp = sample * 1_000_000
-            at = begin + stamp
-            ripple = ripples.pack(stamp, (i, math.nan), (of_current, of_flux))
-            writer.write(f'/{COIL_RIPPLE.name}', ripple, at)
-            writer.write(f'/{SIM_CLAMP_FORCE.name}', forces.pack(stamp, force), at)
-            if sample % status_every(SAMPLE_RATE) == 0:
-                writer.write(
-                    f'/{COIL_TEMPERATURE.name}',
-                    temperatures.pack(stamp, celsius + warming * 1e-9 * stamp),
-                    at,
-                )
-    finally:
-        writer.close()
+    writer, begin, stamps = BagWriter(folder), time.time_ns(), 1_000_000 * np.arange(current.size)
+    for topic in (SESSION, COIL_RIPPLE, COIL_TEMPERATURE, SIM_CLAMP_FORCE):
+        writer.add_topic(f'/{topic.name}', topic.type)
+    writer.write(f'/{SESSION.name}', string_message('scenario: rack'), begin)
+    currents = np.stack([current, np.full(current.size, np.nan)], axis=1)
+    rows = ScalarsLayout(COIL_RIPPLE).pack_rows(stamps, currents, slopes)
+    forces = OneNumberLayout(wrench).pack_rows(stamps, pull)
+    topics = [f'/{COIL_RIPPLE.name}', f'/{SIM_CLAMP_FORCE.name}']
+    writer.write_columns(topics, [rows, forces], begin + stamps)
+    for stamp in stamps[:: status_every(SAMPLE_RATE)].tolist():
+        raw = OneNumberLayout(temperature).pack(stamp, celsius + warming * 1e-9 * stamp)
+        writer.write(f'/{COIL_TEMPERATURE.name}', raw, begin + stamp)
+    writer.close()
     return folder
 
 
@@ -99,17 +88,6 @@ def test_gap_and_temperature_of_a_recording_are_its_name_and_its_topic(tmp_path)
     (file,) = bag.glob('*.mcap')
     (of_file,) = read_ripple([file], Mapping(), FileValues({file: 350e-6}), AREA)
     np.testing.assert_array_equal(of_file.inductance, ripple.inductance)
-
-
-def test_force_points_are_means_over_small_steps_of_the_current(tmp_path):
-    bag = record(tmp_path / 'held_349um', 349e-6)
-    points = read_force([bag], Mapping(), NOTHING)
-    assert 50 < points.current.size <= 100
-    assert (np.diff(points.current) > 0.0).all()
-    assert np.ptp(points.gap) == 0.0
-    assert points.gap[0] == pytest.approx(349e-6)
-    truth = np.array([magnetic_force(RACK.actuator, i, 349e-6) for i in points.current.tolist()])
-    np.testing.assert_allclose(points.force, truth, rtol=0.02)
 
 
 def test_a_recording_without_what_is_needed_is_refused(tmp_path):

@@ -76,12 +76,10 @@ def test_the_default_controller_passes_with_the_same_bytes_whatever_the_jobs(che
     ('setting', 'caught'),
     [
         ('mount_sim.mount=friction_off', {('gap', 'peak_over_undamped'), ('rack', 'friction_error_percent')}),
-        ('mount_control.policy=switched_viscous', {('gap', 'peak_over_undamped')}),
         (
             'mount_control.continuous_viscous.damping_coefficient=650',
             {('gap', 'peak_over_undamped'), ('rack', 'cycle_loss_over_hydromount')},
         ),
-        ('mount_control.continuous_viscous.lead_time=0.01', {('rack', 'friction_error_percent')}),
         ('mount_sim.faults=[coil_open@3.8]', {('gap', 'peak_over_undamped')}),
     ],
 )

@@ -89,40 +89,16 @@ def test_a_scale_without_a_unit_never_multiplies_the_unit_of_the_header(rig, rea
     for scale in (0.98, 0.0001, 2.0 * factor):
         with pytest.raises(SignalError, match=r'its header says (g|mm|kN) \(.* each\), the scale says'):
             read(file, mapping(quantity, scale))
-
-
-@pytest.mark.parametrize(('read', 'quantity', 'factor', 'values'), FAMILIES)
-def test_a_unit_beside_it_makes_a_scale_a_calibration(rig, read, quantity, factor, values):
-    file, mapping = rig
-    unit = {1e-3: 'mm', GRAVITY: 'g', 1e3: 'kN'}[factor]
-    path = mapping(quantity, 0.98)
+    unit, path = {1e-3: 'mm', GRAVITY: 'g', 1e3: 'kN'}[factor], mapping(quantity, 0.98)
     path.write_text(path.read_text().replace('scale', f'unit: {unit}, scale'))
-    if read is not invert:
+    if read is not invert:  # with its unit beside it a scale is a calibration
         assert read(file, path) == pytest.approx(0.98 * values, rel=1e-9, abs=1e-9 * np.abs(values).max())
 
 
 MOTION = {'Zeit': 1e3 * TIME, 'way': WAY / INCH, 'cell': FORCE / POUND, 'load': LOAD / POUND / 1e3}
-MOTION_SAID = ['time=Zeit:ms', 'displacement=way:in', 'friction_force=cell:lbf', 'normal_force=load:kip']
-GAP, CURRENT = (grid.ravel() for grid in np.meshgrid(np.linspace(300, 500, 6), np.linspace(0.2, 3.0, 9)))
-PULL = 300.0 * (CURRENT / 3.0) ** 2 * (300.0 / GAP)
-FORCES = {'Spalt': GAP / 25.4, 'Strom': 1e3 * CURRENT, 'Kraft': PULL / POUND}
-FORCES_SAID = ['gap=Spalt:mil', 'current=Strom:mA', 'force=Kraft:lbf']
 
 
-def test_rigs_and_racks_are_read_in_imperial_units(tmp_path):
-    found = read_recording(write_csv(tmp_path / 'rig.csv', MOTION), friction_mapping(MOTION_SAID))
-    assert found.dt == pytest.approx(1e-3)
-    assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
-    assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
-    assert found.normal_force[:, 1] == pytest.approx(LOAD, rel=1e-9)
-    mapping = rack_mapping(FORCES_SAID, Mapping(), Stated())
-    points = read_force([write_csv(tmp_path / 'force.csv', FORCES)], mapping, NOTHING)
-    assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
-    assert points.current == pytest.approx(CURRENT, rel=1e-9)
-    assert points.force == pytest.approx(PULL, rel=1e-9)
-
-
-def test_titles_of_rigs_and_racks_tell_quantity_and_unit(tmp_path):
+def test_titles_of_rigs_tell_quantity_and_unit(tmp_path):
     titled = {
         'time [ms]': 1e3 * TIME, 'displacement [mm]': 1e3 * WAY, 'friction_force (kip)': FORCE / POUND / 1e3,
         'normal_force_n': LOAD,
@@ -131,10 +107,6 @@ def test_titles_of_rigs_and_racks_tell_quantity_and_unit(tmp_path):
     assert found.dt == pytest.approx(1e-3)
     assert found.displacement == pytest.approx(WAY, rel=1e-9, abs=1e-12)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
-    titled = {'gap [mm]': 1e-3 * GAP, 'current_a': CURRENT, 'force_kn': 1e-3 * PULL}
-    points = read_force([write_csv(tmp_path / 'F.csv', titled)], Mapping(), NOTHING)
-    assert points.gap == pytest.approx(1e-6 * GAP, rel=1e-9)
-    assert points.force == pytest.approx(PULL, rel=1e-9)
 
 
 def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs(tmp_path):
@@ -146,18 +118,3 @@ def test_a_mapping_file_says_units_axes_offsets_and_times_of_rigs(tmp_path):
     found = read_recording(tmp_path / 'rig.csv', friction_mapping([], mapping_in_file(tmp_path / 'rig.yaml')))
     assert found.displacement == pytest.approx(WAY - WAY.mean(), abs=1e-9)
     assert found.force == pytest.approx(FORCE, rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ('said', 'words'),
-    [
-        ('displacement=way:lbf', 'is in lbf, as you say: that is of force, but displacement is of length'),
-        ('friction_force=load_cell:N', "has no column 'load_cell'"),
-        ('normal_force=load', 'no unit is said; values from'),
-        ('displacement=way:km', r'a range of 78\.7\d m is more than the 1 m'),
-    ],
-)
-def test_what_cannot_be_is_refused(tmp_path, said, words):
-    options = {one.partition('=')[0]: one for one in (*MOTION_SAID, said)}
-    with pytest.raises(SignalError, match=words):
-        read_recording(write_csv(tmp_path / 'rig.csv', MOTION), friction_mapping(options.values()))

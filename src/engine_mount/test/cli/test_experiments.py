@@ -158,17 +158,6 @@ def test_the_saw_tooth_gives_back_the_coefficients_of_its_pads(tmp_path):
     assert outcome.figures['simplified_error_slow_macroslip'] is None  # no stroke was so slow
 
 
-def test_other_pads_change_what_holds(tmp_path):
-    light = {**SHORT_SAWTOOTH, 'lowest_normal_force': 40.0, 'highest_normal_force': 40.0, 'force_noise': 0.1}
-    law = 1
-    printed = experiment(sawtooth.NAME, out=tmp_path / 'printed', **light).claims[law]
-    negative = experiment(
-        sawtooth.NAME, out=tmp_path / 'negative', **light, **{'friction.b_offset': -14.0}
-    ).claims[law]
-    assert (printed.reference, printed.holds) == ('Sec. 4, Eq (12)', Holds.PARTLY)
-    assert negative.holds is Holds.YES
-
-
 def test_the_force_characteristic_meets_the_published_accuracy_of_the_fit(tmp_path):
     outcome = experiment(force_characteristic.NAME, out=tmp_path)
     check(outcome)

@@ -1,35 +1,21 @@
 """A recorded drive under all three mounts: made up, and the real one where it lies."""
 
 import json
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from engine_mount.experiments import page, recorded_drive
-from engine_mount.experiments.harness.experiment import ExperimentError, Holds
-from engine_mount.experiments.harness.measures import rms_in_bands
+from engine_mount.experiments import recorded_drive
+from engine_mount.experiments.harness.experiment import ExperimentError
 from engine_mount.experiments.recorded_drive import (
-    BANDS,
     ELASTOMER,
     FRICTION,
     HYDRO,
-    rms_in_bands_within,
 )
 from engine_mount.experiments.registry import experiment
-from engine_mount.signals.excitation import acceleration_at, recorded_signal
 from engine_mount.signals.sources.source import SourceError
-from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.scenario import STEP_TIME, RecordedScenario
 
 pytestmark = pytest.mark.slow
-
-REPOSITORY = Path(__file__).resolve().parents[4]
-I280 = REPOSITORY.parent / 'shared' / 'data' / 'motorway_i280'
-needs_i280 = pytest.mark.skipif(
-    not I280.is_dir(), reason='the recorded I-280 drive is not committed (../shared/data)'
-)
 
 
 @pytest.fixture(scope='module')
@@ -72,27 +58,6 @@ def test_the_chassis_moves_as_recorded_and_damping_works_in_the_burst_alone(driv
     assert forces[HYDRO] > 1.1 * forces[ELASTOMER]
 
 
-def test_a_drive_without_damping_says_so(tmp_path):
-    times = np.arange(0.0, 13.0, 0.005)
-    np.savetxt(tmp_path / 'calm.csv', np.column_stack([times, 0.1 * np.sin(90 * times)]), delimiter=',',
-               header='t,az', comments='')  # fmt: skip
-    outcome = experiment(
-        recorded_drive.NAME, out=tmp_path / 'out', file=str(tmp_path / 'calm.csv'), column='az'
-    )
-    json.dumps(outcome.figures, allow_nan=False)
-    assert outcome.figures['times_on'] == 0
-    assert 'Damping went on 0 times' in outcome.pages[0].read_text()
-    assert outcome.claims[1].holds is Holds.NOT_COMPARABLE
-
-
-def test_a_part_of_the_time_has_the_rms_of_that_part():
-    time = np.arange(20000) * SAMPLE_TIME
-    values = np.where(time < 10.0, 1.0, 3.0) * np.sin(2 * np.pi * 8.0 * time)
-    assert rms_in_bands_within(values, time > 11.0)[1] == pytest.approx(3.0 / np.sqrt(2), rel=0.03)
-    assert rms_in_bands_within(values, time < 9.0)[1] == pytest.approx(1.0 / np.sqrt(2), rel=0.03)
-    assert rms_in_bands_within(values, np.zeros(len(values), bool)) is None
-
-
 def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
     out, file = tmp_path / 'out', str(tmp_path / 'none.csv')
     with pytest.raises(ExperimentError, match=r'needs a recorded vertical .* --set recorded_drive\.file='):
@@ -100,26 +65,3 @@ def test_what_cannot_be_driven_is_refused_before_anything_is_made(tmp_path):
     with pytest.raises(SourceError, match='no such file'):
         experiment(recorded_drive.NAME, out=out, file=file)
     assert not out.exists()
-
-
-def test_alone_its_own_page_is_the_page(driven, tmp_path):
-    page.write_page([driven], tmp_path / 'page.md')
-    assert (tmp_path / 'page.md').read_text() == driven.pages[0].read_text()
-    assert (tmp_path / 'figures' / driven.pictures[0].name).exists()
-
-
-@needs_i280
-def test_the_committed_page_tells_of_this_recording():
-    signal = recorded_signal(RecordedScenario(str(I280), 'accelerometer.2', scale=-1.0))
-    values = acceleration_at(signal, STEP_TIME)[:][:: round(SAMPLE_TIME / STEP_TIME)]
-    text = (REPOSITORY / 'docs' / 'explanation' / 'recorded_drive.md').read_text()
-    told = re.findall(r'([\d.]+) m/s\^2 from', text)
-    assert [float(number) for number in told] == pytest.approx(rms_in_bands(values, BANDS), abs=0.001)
-
-
-@needs_i280
-def test_the_first_seconds_of_the_i280_switch_damping_on_as_the_whole_drive_does(tmp_path):
-    outcome = experiment(
-        recorded_drive.NAME, out=tmp_path, file=str(I280), column='accelerometer.2', scale=-1.0, duration=12.5
-    )
-    assert outcome.figures['switched_on_s'] == pytest.approx([5.927, 6.661, 10.045], abs=0.002)

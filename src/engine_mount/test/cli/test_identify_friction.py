@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from engine_mount.experiments.harness.rack_recording import record_friction_rack
 from engine_mount.identification.friction import ladder
 from engine_mount.identification.friction.files import friction_mapping as said
 from engine_mount.identification.friction.files import read_recording
-from engine_mount.identification.friction.laws import simple_laws
 from engine_mount.identification.friction.screening import subtract_zero
 from engine_mount.recordings.place import recording_hash
 from engine_mount.settings.chosen import chosen_control
@@ -29,7 +27,6 @@ from mount_sim.rack import (
     write_csv,
 )
 
-RIG = Path(__file__).resolve().parents[5] / 'shared' / 'data' / 'friction_rig'
 SPEEDS = (0.002, 0.004, 0.006, 0.010)
 
 
@@ -75,12 +72,8 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch, command
     assert held_out in told['recordings']
     assert told['valid']['normal_force'] == pytest.approx([40.0, 120.0], rel=0.01)
     assert told['residuals']['held_out']['80.csv'] < 0.05
-    for names, matrix in told['covariance'].items():
-        assert np.shape(matrix) == (len(names.split(', ')),) * 2
-        assert (np.diag(matrix) >= 0.0).all()
     drive = chosen_control({'mount_control': {'parameters_file': str(written)}})
     assert drive.friction._asdict() == pytest.approx(result['coefficients'])
-    assert drive.contact._asdict() == pytest.approx(result['contact'])
     assert (tmp_path / 'f.png').stat().st_size > 10_000
 
 
@@ -192,39 +185,15 @@ def test_the_damper_json_is_converted_to_si_and_its_force_zero_removed(tmp_path)
     assert read_recording(rig_file(tmp_path), clamp='none').normal_force[0] == pytest.approx([1.0, 1.0])
 
 
-@pytest.mark.skipif(not RIG.is_dir(), reason='the measured friction damper is not committed (../shared/data)')
-def test_the_measured_damper_is_predicted_at_another_clamp():
-    first, second = (subtract_zero(read_recording(RIG / name))[0] for name in (
-        'ds1_1Hz80lbtension.json', 'ds2_0.5Hz36lbtension0.5amplitude.json'))  # fmt: skip
-    (rung,) = ladder.fit_ladder(simple_laws([first])[-1:], [first], [second])
-    assert rung.held_out_error < 0.20
-
-
-def _rig_file(folder, swapped=False):
-    """A test of the measured damper, with its columns 1 and 2 swapped or not."""
-    time = np.arange(2048) / 1024.0
-    motion = np.clip(time - 0.2, 0.0, None)
-    x = np.sin(2.0 * np.pi * motion)
-    force = 0.5 * np.tanh(20.0 * np.cos(2.0 * np.pi * motion) * (motion > 0.0)) + 0.01 * x
-    columns = [time, x, force, 0.0 * x, 600.0 + 0.0 * x, 650.0 + 0.0 * x]
-    if swapped:
-        columns[1], columns[2] = columns[2], columns[1]
-    path = folder / f'rig_{swapped}.json'
-    path.write_text(json.dumps({'data': np.column_stack(columns).tolist()}))
-    return path
-
-
 def test_channels_are_heard_for_json_too(tmp_path):
-    as_made = read_recording(_rig_file(tmp_path), clamp='none')
-    swapped = _rig_file(tmp_path, swapped=True)
+    file = rig_file(tmp_path)
+    as_made = read_recording(file, clamp='none')
+    table = np.array(json.loads(file.read_text())['data'])
+    file.write_text(json.dumps({'data': table[:, [0, 2, 1, 3, 4, 5]].tolist()}))
     for texts in (
         ['displacement=2:inch', 'friction_force=1:kip'],
         ['displacement=friction_force_kip:inch', 'friction_force=displacement_in:kip'],
     ):
-        found = read_recording(swapped, said(texts), clamp='none')
+        found = read_recording(file, said(texts), clamp='none')
         np.testing.assert_array_equal(found.displacement, as_made.displacement)
         np.testing.assert_array_equal(found.force, as_made.force)
-    in_mm = read_recording(_rig_file(tmp_path), said(['displacement=1:mm']), clamp='none')
-    np.testing.assert_allclose(in_mm.displacement, as_made.displacement / 25.4)
-    clamped = read_recording(_rig_file(tmp_path), said(['normal_force=4']))
-    np.testing.assert_allclose(clamped.normal_force, 600.0 * 4.4482216152605)

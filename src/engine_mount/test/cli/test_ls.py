@@ -8,8 +8,6 @@ import pytest
 import engine_mount
 from engine_mount.cli.commands.record import _print_losses
 from engine_mount.cli.screen import TerminalScreen
-from engine_mount.settings.changes import changed_parameters
-from mount_models.specimen import default_specimen
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
 from mount_ros.messages.scalars import ScalarsLayout
@@ -71,13 +69,6 @@ def test_a_recording_is_told_with_what_was_not_at_its_default(bags, tmp_path, co
     assert 'replay of bench' in command('info', tmp_path / 'again')
     assert 'replay of bench' in command('ls', tmp_path)
     assert 'not whole' in command('info', bags / 'broken')
-
-
-def test_friction_of_the_shipped_specimen_is_no_change():
-    identified = default_specimen().friction['b_offset']
-    assert changed_parameters({'mount_control': {'friction.b_offset': identified}}) == {}
-    changed = changed_parameters({'mount_control': {'friction.b_offset': -14.0}})
-    assert changed == {'mount_control': {'friction.b_offset': (-14.0, identified)}}
 
 
 def recorded(folder, messages):

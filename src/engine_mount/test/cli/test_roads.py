@@ -72,7 +72,6 @@ def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, 
 @pytest.mark.parametrize(
     ('words', 'sentence'),
     [
-        ('', '--road needs a speed'),
         ('--speed 120', 'is it in km/h? Write 120/3.6'),
         ('--speed 20 --scenario bench', 'or the file'),
     ],

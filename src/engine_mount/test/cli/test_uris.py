@@ -1,7 +1,6 @@
 """The commands on recordings by URI: as on the same recording by path, and beside nothing of the cache."""
 
 import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -57,12 +56,6 @@ def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner, com
     name = 'gap_0' if inner else 'gap'
     assert made(tmp_path) == [f'{name}_{what}' for what in ('0s_1s', 'recovered', 'report', 'report.html')]
     assert not [path for path in (tmp_path / 'copies').rglob('*') if 'recovered' in path.name]
-
-
-def test_a_run_by_uri_becomes_a_reference(tmp_path, command):
-    shutil.copytree(REFERENCE, 'references/gap')
-    words = ('--reference', 'new', '--reason', 'a test', '--folder', 'references')
-    assert 'new reference' in command('accept', RUN, *words)
 
 
 def test_ls_lists_this_machine_alone(refused):

@@ -114,8 +114,6 @@ def test_8_per_cent_less_conductivity_misleads_both_gaps_as_published():
             r'crossing current \(1\.100 A\) must lie within 1\.169 \.\. 1\.755 A',
         ),
         (crossing_current_from_gap, 249e-6, 'air gap'),
-        (gap_per_inductance, 53e-3, 'rest inductance'),
-        (gap_per_crossing_current, 1.8, 'crossing current'),
     ],
 )
 def test_beyond_the_calibration_each_function_refuses_in_a_sentence(function, value, sentence):

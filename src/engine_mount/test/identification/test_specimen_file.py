@@ -63,7 +63,7 @@ def no_space(*_):
     [
         ({'turns_area': math.nan}, SpecimenError, 'turns_area'),
         ({'turns_area': -1.0}, SpecimenError, 'turns_area'),
-        ({'provenance': {'parts': 3}}, SpecimenError, 'provenance'),
+        ({'provenance': {'parts': 3}}, SpecimenError, 'parts'),
         ({'name': 'right'}, OSError, 'no space'),
     ],
 )

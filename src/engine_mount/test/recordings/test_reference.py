@@ -76,39 +76,6 @@ def accepted(tmp_path, references):
     ).folder
 
 
-# Meeting a reference.
-
-
-def test_an_equal_replay_has_no_differences(tmp_path, accepted):
-    assert differences_from_reference(accepted, _run(tmp_path / 'replay', topics=ANSWERS)) == []
-
-
-def test_the_last_answer_at_deactivation_need_not_be_replayed(tmp_path):
-    reference = tmp_path / 'reference'
-    write_answers(reference, answers(COUNT))
-    writer = BagWriter(tmp_path / 'longer')
-    original = engine_mount.open(reference)
-    for topic in ANSWERS:
-        writer.add_topic(f'/{topic.name}', topic.type)
-        series = original[topic.name]
-        for index in range(len(series)):
-            writer.write(f'/{topic.name}', series.payloads[index], int(series.receive_times[index]))
-    last = START + (COUNT - 1) * 1_000_000
-    off = joint_state(last, list(CURRENT_SETPOINT.names), np.array([0.0]), np.empty(0))
-    writer.write('/current_setpoint', off, last + 300_000)
-    writer.close()
-    assert differences_from_reference(tmp_path / 'longer', reference) == []
-
-
-def test_a_replay_that_switches_later_is_told_in_words(tmp_path, accepted):
-    told = differences_from_reference(accepted, _run(tmp_path / 'replay', shift=3, topics=ANSWERS))
-    assert told[0] == 'switched on 3 ms later in B, at 0.083 s'
-    assert told[1].startswith('current_setpoint.coil_current differs by at most 0.8')
-
-
-# Accepting.
-
-
 def test_a_reference_holds_what_a_replay_needs_and_no_more(accepted):
     recording = engine_mount.open(accepted)
     counts = {name: topic.message_count for name, topic in recording.topics.items()}

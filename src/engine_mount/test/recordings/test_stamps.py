@@ -37,34 +37,6 @@ def test_counts(indices, expected):
     assert counts(indices) == expected
 
 
-def counts_at(positions):
-    """Counts of samples at times given in periods."""
-    found = stamp_statistics(np.rint(np.asarray(positions) * PERIOD).astype(np.int64), RATE)
-    assert found.expected == found.present - found.duplicated + found.lost
-    return found.expected, found.present, found.lost, found.duplicated
-
-
-def moved(**stamps):
-    positions = np.arange(6000.0)
-    for name, position in stamps.items():
-        positions[int(name[1:])] = position
-    return positions
-
-
-@pytest.mark.parametrize(
-    'positions',
-    [
-        moved(_1000=1000.9),
-        moved(_1000=999.2),
-        moved(_1000=1001.7),
-        moved(_1000=1001.6, _2000=2000.7, _3000=2999.3),
-    ],
-    ids=['late', 'early', 'later than the next', 'several'],
-)
-def test_a_stamp_beside_its_place_is_neither_lost_nor_twice(positions):
-    assert counts_at(positions) == (6000, 6000, 0, 0)
-
-
 @settings(deadline=None, derandomize=True)
 @given(st.lists(st.integers(0, 200), min_size=1, max_size=100))
 def test_expected_is_the_span_and_the_counts_add_up(indices):

@@ -37,11 +37,6 @@ class HeatWatch:
         else:
             self._set(hottest_by_current(heating, HIGHEST_CURRENT))
 
-    @property
-    def known_celsius(self) -> float:
-        """The temperature for a watch that follows this one, degC; NaN where it is not known."""
-        return self.celsius if self.known else nan
-
     def begin(self) -> None:
         """Let another activation begin: it has its own current to spare."""
         self._spare = _SPARE

@@ -17,7 +17,8 @@ _REMEDIES = {
 """Bits of the status that switch the coil off."""
 
 _TIMEOUT = 1_000_000_000  # ns, chosen: without a status for so long the coil stays at 0 A
-_FRAMES, _WINDOW = 3, 10  # chosen: so many frames of a second sender within so many s take the coil to 0 A
+_FRAMES = 3  # chosen: so many frames of a second sender within `_WINDOW` take the coil to 0 A
+_WINDOW = 10_000_000_000  # ns, chosen
 
 
 class SenderWatch:
@@ -37,10 +38,10 @@ class SenderWatch:
             return ''
         self._times.extend([now] * min(strangers - self._counted, _FRAMES))
         self._counted = strangers
-        if len(self._times) < _FRAMES or now - self._times[0] > _WINDOW * 1_000_000_000:
+        if len(self._times) < _FRAMES or now - self._times[0] > _WINDOW:
             return ''
         return (
-            f'{_FRAMES} frames {self._message} within {_WINDOW} s (limit {_FRAMES}) had a counter or content '
+            f'{_FRAMES} frames {self._message} within 10 s (limit {_FRAMES}) had a counter or content '
             f'that does not go on with the others: a second sender is on the bus, or old frames are sent '
             f'again; {self._remedy}'
         )

@@ -47,7 +47,6 @@ _SURE = 24  # readings: so many sound ones bring a mean of `_FARTHEST` back belo
 _CERTAIN = 48  # readings over the zones, chosen: enough without a later one, as an engine may be damped once
 _JOINT = _ZONES = 32
 _JUMP = 0.03  # 1, chosen: another 35 K from one status to the next; a coil takes a minute for it
-_NOTHING_KNOWN = ('missing', 'voltage')  # findings with which no reading is compared
 
 
 class RippleWatchParameters(NamedTuple):
@@ -134,7 +133,7 @@ class RippleWatch:
             sentence = self._lasting(finding, now)
             if sentence:
                 return sentence
-        if not valid or finding in _NOTHING_KNOWN:
+        if not valid or finding in ('missing', 'voltage'):
             return ''
         return self._judge_inductance(current, flux_volts / current_rate, now)
 

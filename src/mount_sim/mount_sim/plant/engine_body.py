@@ -171,7 +171,7 @@ def check_hold(engine: RigidEngine, supports: Mapping[str, Support], step_time: 
         raise ParameterError(
             f'the engine on {", ".join(supports)} has natural frequencies of {modes[0]:.3g} .. '
             f'{modes[-1]:.3g} Hz, which must lie within {_LOWEST_MODE:g} .. {highest:.5g} Hz: below, nothing '
-            'holds it against heave, roll or pitch; give another place a mount (mounts), or the torque rod a '
-            'lever (engine.rod_lever); above, its motion would grow without end: set engine.*, '
+            'holds it against heave, roll or pitch; give another place a mount (mounts), or the torque rod '
+            'a lever (engine.rod_lever); above, its motion would grow without end: set engine.*, '
             'vehicle.elastomer.* and places closer to their defaults'
         )

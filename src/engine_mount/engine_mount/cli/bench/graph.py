@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from statistics import median, quantiles
@@ -19,9 +18,7 @@ from engine_mount.cli.bench.bench import BenchOrder, Comparison, Figures, Report
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (
-    CONTROL,
     DRIVER,
-    INIT,
     RECORDER,
     SIM,
     SIMULATED,
@@ -40,7 +37,6 @@ _TIMEOUT = 10.0  # s, chosen: for a process that was asked to end
 _ROWS = (
     ('latency', 'setpoint latency', 's'),
     ('latency_p99', 'setpoint latency, p99', 's'),
-    ('cpu', 'driver, init, control', 'cores'),
     ('missing', 'unanswered samples', '1'),
 )
 """Field of `ChainRun`, what it is, unit."""
@@ -53,14 +49,12 @@ class ChainRun(NamedTuple):
     """Median from a sample's frame to the frame that answers it."""
     latency_p99: float
     """99 % of them are below."""
-    cpu: float
-    """Share of one core that the processes between the frames used."""
     missing: float
     """Share of the samples that were not answered."""
 
 
 def measure(order: BenchOrder, report: Report) -> Figures:
-    """Return latency and processor time of the graph, separate and composed, beside the empty nodes."""
+    """Return the latency of the graph, separate and composed, beside the empty nodes."""
     kinds = {
         'graph': partial(_run_graph, order, Grouping.APART),
         'relay': partial(run_relay, order),
@@ -89,8 +83,7 @@ def run_relay(order: BenchOrder) -> ChainRun:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(order.domain)}
     processes = [psutil.Popen([*program, part, str(port)], env=environment) for part in ('ends', 'middle')]
     try:
-        with _processor_share(processes) as cpu:
-            samples, late = relay.measure(port, order.seconds, order.sample_rate)
+        samples, late = relay.measure(port, order.seconds, order.sample_rate)
     finally:
         for process in processes:
             process.send_signal(signal.SIGINT)
@@ -98,7 +91,7 @@ def run_relay(order: BenchOrder) -> ChainRun:
         for process in left:
             process.kill()
     percent = quantiles(late, n=100)
-    return ChainRun(percent[49], percent[98], cpu[0], 1.0 - len(late) / samples)
+    return ChainRun(percent[49], percent[98], 1.0 - len(late) / samples)
 
 
 def _run_graph(order: BenchOrder, grouping: Grouping) -> ChainRun:
@@ -121,32 +114,11 @@ def _run_graph(order: BenchOrder, grouping: Grouping) -> ChainRun:
             supervisor.start(lambda told: session_text({'parameters': told}), lambda words: None)
             _serve(supervisor, _SETTLING)
             before = {name: int(supervisor.figures(DRIVER).get(name, 0)) for name in ('samples', 'setpoints')}
-            with _processor_share(_node_processes()) as cpu:
-                _serve(supervisor, order.seconds)
+            _serve(supervisor, order.seconds)
             after, bus = supervisor.figures(DRIVER), supervisor.figures(SIM)
     samples, answered = (int(after[name]) - before[name] for name in ('samples', 'setpoints'))
     latencies = float(bus['latency_median_s']), float(bus['latency_p99_s'])
-    return ChainRun(*latencies, cpu[0], 1.0 - answered / max(1, samples))
-
-
-def _node_processes() -> list[psutil.Process]:
-    """Return the processes of driver, initialisation and control that this one has started."""
-    modules = [f'from {node.name}.node' for node in (DRIVER, INIT, CONTROL)]
-    children = psutil.Process().children()
-    return [child for child in children if any(name in ' '.join(child.cmdline()) for name in modules)]
-
-
-@contextlib.contextmanager
-def _processor_share(processes: Sequence[psutil.Process]) -> Iterator[list[float]]:
-    """Give a list that holds at the end which share of one core all threads of the processes used."""
-    begin, used = monotonic(), _processor_time(processes)
-    share: list[float] = []
-    yield share
-    share.append((_processor_time(processes) - used) / (monotonic() - begin))
-
-
-def _processor_time(processes: Sequence[psutil.Process]) -> float:
-    return sum(times.user + times.system for times in (process.cpu_times() for process in processes))
+    return ChainRun(*latencies, 1.0 - answered / max(1, samples))
 
 
 def _serve(supervisor: Supervisor, seconds: float) -> None:

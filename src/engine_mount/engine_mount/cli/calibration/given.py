@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
 
-_GAPS, _TEMPERATURES = (20.0, 5000.0), (-60.0, 250.0)  # um, degC
-
 
 def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'Mapping':
     """Return the columns of a rack's quantities, of a mapping and of `--column`, which goes before it."""
@@ -40,8 +38,8 @@ def gaps_of(settings: list[str], files: list[Path]) -> dict[Path, float]:
     """Return {file: air gap in m} of `--gap FILE=UM`."""
     gaps = per_file(settings, files, '--gap')
     for file, gap in gaps.items():
-        guess = '; was it meant in mm?' if _within(1e3 * gap, _GAPS) else ''
-        if not _within(gap, _GAPS):
+        if not 20.0 <= gap <= 5000.0:
+            guess = '; was it meant in mm?' if 0.02 <= gap <= 5.0 else ''
             raise typer.BadParameter(
                 f'--gap {file.name}={gap:g}: an air gap must lie within 20 .. 5000 um{guess}'
             )
@@ -58,15 +56,11 @@ def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) ->
         raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
     celsius = per_file(single, files, '--coil-temperature')
     for value in (*celsius.values(), *common):
-        if not _within(value, _TEMPERATURES):
+        if not -60.0 <= value <= 250.0:
             raise typer.BadParameter(
                 f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
             )
     return FileValues(gaps_of(gaps, files), celsius, common[0] if common else None)
-
-
-def _within(value: float, limits: tuple[float, float]) -> bool:
-    return limits[0] <= value <= limits[1]
 
 
 def _number(text: str, where: str) -> float:

@@ -11,8 +11,8 @@ from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option
 from engine_mount.cli.completion import named
 
 EPILOG = """Groups: `calls` (what one sample costs in core and in a replay), `storage` (loading a
-recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency and processor time of the graph in
-real time, beside a chain of empty nodes).
+recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency of the graph in real time,
+beside a chain of empty nodes).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
 

@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from engine_mount.cli.calibration.given import gaps_of, given_ripple, rack_mapping
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
@@ -21,15 +19,9 @@ from engine_mount.cli.commands.options import (
     stated,
 )
 from engine_mount.cli.fetching import local
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, group
 
-app = typer.Typer(
-    cls=Group,
-    name='calibrate',
-    help='Calibrate an actuator from rack recordings: force law, gap curves, their files.',
-    no_args_is_help=True,
-    rich_markup_mode='markdown',
-)
+app = group('calibrate', 'Calibrate an actuator from rack recordings: force law, gap curves, their files.')
 
 _ACTUATOR_EPILOG = (
     EXIT_CODES

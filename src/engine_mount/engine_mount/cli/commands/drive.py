@@ -97,7 +97,7 @@ def drive(
     decimal: Decimal = '',
     delimiter: Delimiter = '',
     scale: Scale = None,
-    road: Annotated[str, option('measured road: height over distance, a table or OpenCRG', 'FILE')] = '',
+    road: Annotated[str, option('road: height over distance, a table or OpenCRG', 'FILE')] = '',
     lateral: Lateral = 0.0,
     speed: SpeedText = '',
     distance: Distance = '',
@@ -181,6 +181,8 @@ def drive(
         from engine_mount import road as read_road
         from engine_mount.drives.external_excitation import measured_road
 
+        if not speed:
+            raise typer.BadParameter('--road needs a speed: --speed 60/3.6 (m/s)')
         if len(column or []) > 1:
             raise typer.BadParameter('--column is given once for a road: the column of its height')
         height = ''.join(column or [])

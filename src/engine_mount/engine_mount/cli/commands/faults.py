@@ -12,7 +12,6 @@ from engine_mount.cli.commands.options import (
     Listing,
     Page,
     Priority,
-    flag,
     option,
     write_figures,
 )
@@ -38,7 +37,6 @@ _DRIVE = (sys.executable, '-P', '-c', 'from engine_mount.cli.command import main
 def faults(
     only: Annotated[str, option('these faults only', 'NAME,...', named('case'))] = '',
     show: Listing = False,
-    third: Annotated[bool, flag('--third', 'a representative third of them')] = False,
     out: Annotated[Path | None, option('runs of the graphs; default: a new one in bags', 'FOLDER')] = None,
     json_file: JsonFile = None,
     page: Page = None,
@@ -59,9 +57,7 @@ def faults(
     unknown = [name for name in wanted if name not in MATRIX]
     if unknown:
         raise typer.BadParameter(f'{", ".join(unknown)}: no such fault; --list tells which there are')
-    chosen = [
-        case for case in MATRIX.values() if (not wanted or case.name in wanted) and (not third or case.third)
-    ]
+    chosen = [case for case in MATRIX.values() if (not wanted or case.name in wanted)]
     if show:
         rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]
         screen.table(Table('', 'll', rows, ('name', 'fault: what is required')))

@@ -2,8 +2,6 @@
 
 from typing import Annotated
 
-import typer
-
 from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -19,15 +17,9 @@ from engine_mount.cli.commands.options import (
     stated,
 )
 from engine_mount.cli.fetching import local
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, group
 
-app = typer.Typer(
-    cls=Group,
-    name='identify',
-    help='Identify parameters from recordings of a rack.',
-    no_args_is_help=True,
-    rich_markup_mode='markdown',
-)
+app = group('identify', 'Identify parameters from recordings of a rack.')
 
 EPILOG = (
     EXIT_CODES

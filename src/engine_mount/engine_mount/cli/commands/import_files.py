@@ -32,8 +32,8 @@ Examples:
 
 `engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
-Of several files each is imported; `engine-mount merge --different-sessions` joins what they became, and
-`engine-mount cut` takes a part.
+Of several files each is imported; `rosbags-convert --src A B --dst C --dst-storage mcap` joins what
+they became, and `engine-mount cut` takes a part.
 """
 
 

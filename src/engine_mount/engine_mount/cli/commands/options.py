@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from engine_mount.signals.mapping import Mapping
 
 
+PANELS = {'foreign file': 'Foreign file', 'recorded': 'Foreign file', 'road': 'Measured road'}
+
+
 def option(
     text: str,
     metavar: str | None = None,
@@ -21,8 +24,14 @@ def option(
     least: float | None = None,
     most: float | None = None,
 ) -> Any:
-    """Return an option with its help `text`, the placeholder of its value, and limits."""
-    return typer.Option(*names, help=text, metavar=metavar, autocompletion=complete, min=least, max=most)
+    """Return an option with its help `text`, the placeholder of its value, and limits.
+
+    Options whose text begins with a word of `PANELS` and a colon stand together in the help.
+    """
+    return typer.Option(
+        *names, help=text, metavar=metavar, autocompletion=complete, min=least, max=most,
+        rich_help_panel=PANELS.get(text.partition(':')[0]),
+    )  # fmt: skip
 
 
 def flag(name: str, text: str) -> Any:
@@ -80,15 +89,6 @@ Settings = Annotated[
     list[str] | None,
     option('any parameter of any node; may be repeated', '[NODE.]NAME=VALUE', setting, '--set'),
 ]
-OtherThanRecorded = Annotated[
-    list[str] | None,
-    option(
-        'a parameter other than recorded, of mount_control or mount_init; may be repeated',
-        '[NODE.]NAME=VALUE',
-        setting,
-        '--set',
-    ),
-]
 Priority = Annotated[
     int, option('real-time priority of the 1 kHz loop where permitted; 0: none', least=0, most=90)
 ]
@@ -118,11 +118,11 @@ MapFile = Annotated[
     Path | None,
     option('foreign file: YAML file that says columns, units and times of a measuring system', 'FILE'),
 ]
-Dbc = Annotated[Path | None, option('CAN log, or MDF with raw frames: database that decodes them', 'FILE')]
-Decimal = Annotated[str, option('text table that can be read in two ways: "." or ","', 'SIGN')]
+Dbc = Annotated[Path | None, option('foreign file: database that decodes raw CAN frames', 'FILE')]
+Decimal = Annotated[str, option('foreign file: decimal sign of a table that can be read in two ways', 'SIGN')]
 Delimiter = Annotated[
     str,
-    option('text table that can be read in two ways: what separates its cells, as ";", tab or blank', 'SIGN'),
+    option('foreign file: what separates the cells of such a table, as ";", tab or blank', 'SIGN'),
 ]
 Scale = Annotated[
     float | None,

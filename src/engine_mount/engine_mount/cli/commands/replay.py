@@ -8,8 +8,8 @@ from engine_mount.cli.commands.options import (
     Domain,
     JsonFile,
     NewFolder,
-    OtherThanRecorded,
     RecordingPlace,
+    Settings,
     changes_of,
     flag,
     option,
@@ -39,7 +39,7 @@ def replay(
     lockstep: Annotated[
         bool, flag('--lockstep', 'control through its real node over topics, sample by sample')
     ] = False,
-    settings: OtherThanRecorded = None,
+    settings: Settings = None,
     table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,

@@ -16,15 +16,9 @@ from engine_mount.cli.commands.options import (
     argument,
     option,
 )
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, group
 
-app = typer.Typer(
-    cls=Group,
-    name='road',
-    help='Measured roads: class and waviness; a road from a recorded acceleration.',
-    no_args_is_help=True,
-    rich_markup_mode='markdown',
-)
+app = group('road', 'Measured roads: class and waviness; a road from a recorded acceleration.')
 
 _SHOW_EPILOG = """Exit code: 0 when the file is a road, 1 with the reason when not.
 

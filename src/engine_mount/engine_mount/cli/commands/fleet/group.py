@@ -2,18 +2,10 @@
 
 from collections.abc import Callable
 
-import typer
-
 from engine_mount.cli.commands.fleet import asking, making
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, group
 
-app = typer.Typer(
-    cls=Group,
-    name='fleet',
-    help='Many recordings: catalogue, what if, questions.',
-    no_args_is_help=True,
-    rich_markup_mode='markdown',
-)
+app = group('fleet', 'Many recordings: catalogue, what if, questions.')
 
 _COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
     (making.index, making.INDEX_EPILOG),

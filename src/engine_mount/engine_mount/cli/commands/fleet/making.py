@@ -10,8 +10,8 @@ import typer
 
 from engine_mount.cli.commands.options import (
     JsonFile,
-    OtherThanRecorded,
     Scheduler,
+    Settings,
     Workers,
     argument,
     changes_of,
@@ -128,7 +128,7 @@ def replay(
         argument('catalogues, or folders and URIs below which recordings lie', 'CATALOGUE|URI...'),
     ],
     out: Annotated[Path, option('folder of the result, new or interrupted', 'RESULT')],
-    settings: OtherThanRecorded = None,
+    settings: Settings = None,
     closed_loop: Annotated[
         bool, flag('--closed-loop', 'simulate engine and mount anew over recorded accelerations')
     ] = False,
