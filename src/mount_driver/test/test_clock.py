@@ -38,7 +38,7 @@ def usual_delays(count, seed=1):
     return delays
 
 
-@pytest.mark.parametrize('ppm', [-200, -50, 50, 200])
+@pytest.mark.parametrize('ppm', [-200, 50])
 def test_the_drift_of_the_electronics_is_followed(ppm):
     clock = ElectronicsClock(EPOCH)
     errors, stamps = run(usual_delays(60_000), drift=ppm * 1e-6, clock=clock)
