@@ -13,10 +13,10 @@ from mount_driver.protocol import MountCodec
 def endless_drive(command):
     """Return the function that starts a drive without an end: the process, and its folder.
 
-    One process for each node, as in the car, but in lock-step: what is tested needs no fast machine.
+    One process for each node and in real time, as in the car.
     """
-    options = ('--apart', '--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.timeline.start=2.9')
-    return lambda: command.start_drive('--lockstep', *options)
+    options = ('--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.timeline.start=2.9')
+    return lambda: command.start_drive('--priority', '0', *options)
 
 
 @pytest.fixture

@@ -18,6 +18,8 @@ from mount_bringup.graph.nodes import SIMULATED
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
+pytestmark = pytest.mark.real_time  # each drive has a process for each node
+
 
 def _nodes(parent: int) -> dict[str, psutil.Process]:
     """Return {node: process} of those that the command has started and that still run."""
@@ -86,7 +88,6 @@ def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
 
 
 @pytest.mark.slow
-@pytest.mark.real_time
 def test_a_control_that_stands_still_costs_answers_the_coil_goes_to_0_ampere_and_the_drive_says_so(
     command, bus_listener, repeat_if_late
 ):

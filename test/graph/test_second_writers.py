@@ -37,6 +37,8 @@ node.create_subscription(kind, '/displacement', take, qos, raw=True)
 rclpy.spin(node)
 """
 
+pytestmark = pytest.mark.real_time  # each drive has a process for each node
+
 
 @pytest.mark.parametrize(
     ('topic', 'sentence'),

@@ -82,7 +82,7 @@ def remove_abandoned(folder: Path = SHARED_MEMORY, youngest: float = _YOUNGEST) 
             files = [file for file in every if file.exists()]
             for file in files:
                 fcntl.flock(held.enter_context(open(file, 'rb')), fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if time.time() - max(file.stat().st_mtime for file in files) >= youngest:
+            if files and time.time() - max(file.stat().st_mtime for file in files) >= youngest:
                 for file in files:
                     file.unlink()
 
