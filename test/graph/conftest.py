@@ -16,7 +16,7 @@ def endless_drive(command):
     One process for each node and in real time, as in the car.
     """
     options = ('--scenario', 'bench', '--duration', '600', '--set', 'mount_sim.timeline.start=2.9')
-    return lambda: command.start_drive('--priority', '0', *options)
+    return lambda: command.start_drive('--priority', '0', '--restarts', '0', *options)
 
 
 @pytest.fixture
