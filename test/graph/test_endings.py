@@ -18,8 +18,6 @@ from mount_bringup.graph.nodes import SIMULATED
 
 LIMIT = 120.0  # s: other tests run at the same time, only a failure takes so long
 
-pytestmark = pytest.mark.real_time  # each drive has a process for each node
-
 
 def _nodes(parent: int) -> dict[str, psutil.Process]:
     """Return {node: process} of those that the command has started and that still run."""
@@ -33,6 +31,7 @@ def _nodes(parent: int) -> dict[str, psutil.Process]:
 
 
 @pytest.mark.slow
+@pytest.mark.real_time
 def test_ctrl_c_during_the_start_ends_every_node(endless_drive, bus_listener):
     process, out = endless_drive()
     wait_until(lambda: (out / 'log' / 'mount_control.log').exists(), 'the start of all nodes', LIMIT)
@@ -40,6 +39,7 @@ def test_ctrl_c_during_the_start_ends_every_node(endless_drive, bus_listener):
     assert not bus_listener or bus_listener[-1].current == 0.0
 
 
+@pytest.mark.real_time
 def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_recording(
     endless_drive, bus_listener
 ):
@@ -50,6 +50,7 @@ def test_ctrl_c_during_the_initialisation_ends_at_zero_current_with_a_closed_rec
 
 
 @pytest.mark.slow
+@pytest.mark.real_time
 def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while_it_damps(
     endless_drive, command, bus_listener, domain
 ):
@@ -64,6 +65,7 @@ def test_a_second_graph_on_the_domain_is_refused_and_ctrl_c_ends_the_first_while
 
 
 @pytest.mark.slow
+@pytest.mark.real_time
 def test_death_of_the_control_node_ends_the_drive_and_names_it(endless_drive, bus_listener):
     process, out = endless_drive()
     wait_until(lambda: _damping(bus_listener), 'damping', LIMIT)
@@ -76,6 +78,7 @@ def test_death_of_the_control_node_ends_the_drive_and_names_it(endless_drive, bu
 
 
 @pytest.mark.slow
+@pytest.mark.real_time
 def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
     process, _ = endless_drive()
     wait_until(lambda: len(bus_listener) > 100, 'setpoints', LIMIT)
@@ -88,6 +91,7 @@ def test_nodes_end_when_their_supervisor_is_killed(endless_drive, bus_listener):
 
 
 @pytest.mark.slow
+@pytest.mark.real_time
 def test_a_control_that_stands_still_costs_answers_the_coil_goes_to_0_ampere_and_the_drive_says_so(
     command, bus_listener, repeat_if_late
 ):
