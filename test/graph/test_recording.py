@@ -2,6 +2,7 @@
 
 import os
 import pty
+import random
 import signal
 import subprocess
 import threading
@@ -23,7 +24,7 @@ from mount_ros.topics import CURRENT_SETPOINT, DIAGNOSTICS, DISPLACEMENT, EVENT
 
 PERIOD = 1_000_000  # ns
 BEGIN = 7_000_000_000  # ns
-COUNT = 1500  # samples of each stream at 1 kHz, so more than one file of 1 s
+COUNT = 1500  # samples of each stream at 1 kHz
 
 
 def start_record(command, source, *options, stdin=subprocess.DEVNULL):
@@ -77,9 +78,11 @@ def samples(publishers, indices):
 
 @pytest.mark.real_time
 def test_record_holds_all_that_was_published_in_several_files_with_the_mark(domain_source, command):
-    process, publishers = start_record(command, domain_source, '--split', '500MB', '--split', '1s')
+    process, publishers = start_record(command, domain_source, '--split', '1MB')
     samples(publishers, range(COUNT))
-    publishers[EVENT].publish(String(data='a bump'))
+    texts = ['a bump', *(random.Random(seed).randbytes(500_000).hex() for seed in range(2))]  # more than one file of 1 MB
+    for text in texts:
+        publishers[EVENT].publish(String(data=text))
     code, output = end_record(process)
     assert code == 0, output
     assert 'Nothing is known to be lost: 3 topics are complete.' in output
@@ -90,7 +93,7 @@ def test_record_holds_all_that_was_published_in_several_files_with_the_mark(doma
     assert recording.warnings == []
     for name in ('displacement', 'current_setpoint'):
         assert recording[name].stamps.tolist() == [BEGIN + index * PERIOD for index in range(COUNT)]
-    assert [mark.text for mark in read_marks(recording['event'])] == ['a bump']
+    assert [mark.text for mark in read_marks(recording['event'])] == texts
 
 
 def test_record_ends_with_code_1_where_samples_are_missing(domain_source, command):

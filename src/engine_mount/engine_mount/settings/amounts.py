@@ -41,5 +41,5 @@ def duration_in_nanoseconds(text: str) -> int:
 def _amount(text: str, units: dict[str, int], wanted: str) -> int:
     match = _AMOUNT.fullmatch(text)
     if match is None or match[2] not in units:
-        raise ParameterError(f'{text!r} is no {wanted}; write as in 500MB or 60s, of {", ".join(units)}')
+        raise ParameterError(f'{text!r} is no {wanted}; units: {", ".join(units)}')
     return round(float(match[1]) * units[match[2]])
