@@ -80,7 +80,8 @@ def samples(publishers, indices):
 def test_record_holds_all_that_was_published_in_several_files_with_the_mark(domain_source, command):
     process, publishers = start_record(command, domain_source, '--split', '1MB')
     samples(publishers, range(COUNT))
-    texts = ['a bump', *(random.Random(seed).randbytes(500_000).hex() for seed in range(2))]  # more than one file of 1 MB
+    long_texts = (random.Random(seed).randbytes(500_000).hex() for seed in range(2))  # more than one file
+    texts = ['a bump', *long_texts]
     for text in texts:
         publishers[EVENT].publish(String(data=text))
     code, output = end_record(process)
