@@ -2,8 +2,8 @@
 
 In continuous integration a skip that `EXPECTED_SKIPS` does not name fails the run.
 
-A job in the background of a shell ignores Ctrl-C, one under nohup the end of its terminal, and so would all that
-the tests start and interrupt.
+A job in the background of a shell ignores Ctrl-C, one under nohup the end of its terminal, and so would all
+that the tests start and interrupt.
 
 Hypothesis draws the same examples in every run, so that a test passes or fails by the code alone;
 `pytest --hypothesis-profile=exploring` draws new ones, as many of each test as EXAMPLES says (100). No
