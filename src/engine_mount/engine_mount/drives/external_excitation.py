@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.place import recording_hash
+from engine_mount.recordings.recording import recording_hash
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated

@@ -26,8 +26,7 @@ from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.gap import DEFAULT_TABLE, chosen_gap
 from engine_mount.drives.inputs.input import ReplayInput, replay_input, without
 from engine_mount.drives.output import write_replay
-from engine_mount.recordings.place import open_mount
-from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.recording import Recording, open_mount
 from engine_mount.recordings.session import (
     SessionError,
     recorded_session,

@@ -19,8 +19,7 @@ from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import audit, control_spans
 from engine_mount.recordings.events import event_time, recorded_events, switching_places
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.place import open_run
-from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.recording import ReadingError, Recording, open_run
 from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.session import (
     duration_of,

@@ -19,7 +19,7 @@ from engine_mount.fleet.setpoints import (
     recorded_in,
 )
 from engine_mount.fleet.tables import Row
-from engine_mount.recordings.place import open_mount, open_run, recording_hash, recording_place
+from engine_mount.recordings.recording import open_mount, open_run, recording_hash, recording_place
 from engine_mount.recordings.session import versions_told
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import NoEffectError

@@ -20,7 +20,7 @@ from engine_mount.identification.friction.recording import FrictionRecording
 from engine_mount.identification.friction.result import FrictionIdentification, Pair, validate
 from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
 from engine_mount.identification.friction.screening import case_of, subtract_zero
-from engine_mount.recordings.place import recording_hash
+from engine_mount.recordings.recording import recording_hash
 from engine_mount.signals.mapping import Mapping
 from mount_models.specimen import chosen_specimen, friction_contact
 

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from engine_mount.identification.fitting import IdentificationError
-from engine_mount.recordings.place import recording_hash
+from engine_mount.recordings.recording import recording_hash
 from mount_models.specimen import SCHEMA_VERSION, Specimen, checked_specimen
 from mount_recorder.versions import versions
 

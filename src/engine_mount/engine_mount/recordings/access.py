@@ -12,8 +12,7 @@ from engine_mount.recordings.compare import Comparison
 from engine_mount.recordings.compare import compare as compare_recordings
 from engine_mount.recordings.difference import Tolerances
 from engine_mount.recordings.losses import Losses, as_json, as_table, latency_sentences, losses, sentences
-from engine_mount.recordings.place import open_run
-from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.recording import Recording, open_run
 from engine_mount.recordings.screen import Table
 
 Source: TypeAlias = str | os.PathLike[str] | Recording

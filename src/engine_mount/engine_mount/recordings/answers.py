@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import SeriesError
 from engine_mount.recordings.times import Times, distinct, is_in
 from mount_models.sampling import SETPOINT_TIMEOUT

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.recordings.bag_copy import BagCopy, read_messages
-from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, with_step
+from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, registered_topic, with_step
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.registry import registered_topic
 from mount_recorder.session import time_text
 from mount_ros.topics import EVENT, Delivery
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.difference import quantity_text, time_text
+from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
-from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import Series, SeriesError
 from engine_mount.recordings.times import TimeAxis
 from mount_recorder.automatic_marks import PAUSE

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.difference import Column, Places, SignalDifference, Tolerances, signal_difference
+from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import STAMP, Series, SeriesError
 from engine_mount.recordings.times import TimeAxis, Times, distinct, is_in
 from mount_ros.topics import (

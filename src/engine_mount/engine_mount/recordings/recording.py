@@ -2,6 +2,7 @@
 
 import contextlib
 import copy
+import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -19,6 +20,7 @@ from engine_mount.recordings.metadata import (
     TopicInformation,
     origin,
     read_metadata,
+    registered_topic,
 )
 from engine_mount.recordings.pieces import (
     declared_topics,
@@ -26,7 +28,6 @@ from engine_mount.recordings.pieces import (
     find_pieces,
     open_piece,
 )
-from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import Messages, Payloads, Series, SeriesError
 from engine_mount.recordings.times import NO_TIMES, TimeAxis, anchors
 from mount_recorder.metadata import METADATA_NAME
@@ -34,6 +35,7 @@ from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, JOINT_STATE
 
 # Times among columns: no field has such a name, behind the / is that of the property of a `Series`.
 _STAMPS, _RECEIVED, _SENT = '/stamps', '/receive_times', '/publish_times'
+_AT_ONCE = 1 << 20  # bytes read at once for a hash, chosen
 
 
 class ReadingError(ValueError):
@@ -47,6 +49,43 @@ def open_recording(path: str | os.PathLike[str]) -> 'Recording':
     there when topics are read.
     """
     return Recording(Path(path))
+
+
+def open_run(path: Path) -> 'Recording':
+    """Open the recording at `path` or, for the folder of a run, the one in it; raises `ReadingError`."""
+    return open_recording(recording_place(path))
+
+
+def open_mount(path: Path, mount: str = '') -> 'Recording':
+    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`."""
+    recording = open_run(path)
+    if not mount and len(recording.mounts) < 2:
+        return recording
+    if mount.strip('/') not in recording.mounts:
+        what = f'no mount {mount!r}' if mount else 'several mounts'
+        known = ', '.join(recording.mounts) or 'none with a name'
+        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --mount')
+    return recording.of_mount(mount.strip('/'))
+
+
+def recording_place(path: Path) -> Path:
+    """Return the recording in `path` if that is the folder of a run, else `path` itself."""
+    inside = path / 'recording'
+    return inside if inside.is_dir() else path
+
+
+def recording_hash(path: Path) -> str:
+    """Return the SHA-256 of a file; of a folder that of its MCAP files, in the order of their names.
+
+    Of a folder without any it is that of all its files.
+    """
+    digest = hashlib.sha256()
+    files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
+    for part in sorted(part for part in files if part.match('*.mcap*')) or sorted(files):
+        with part.open('rb') as stream:
+            while content := stream.read(_AT_ONCE):
+                digest.update(content)
+    return digest.hexdigest()
 
 
 class Recording:

@@ -17,7 +17,7 @@ from engine_mount.recordings.layout import (
     installed_definition,
     layout_of,
 )
-from engine_mount.recordings.registry import registered_topic
+from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.times import NO_TIMES, Times
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
-from engine_mount.recordings.registry import registered_topic
 from engine_mount.recordings.series import SeriesError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.registry import registered_topic
+from engine_mount.recordings.metadata import registered_topic
 from mount_recorder.stamp_watch import FARTHEST, LONGEST_PAUSE
 from mount_ros.topics import COIL_RIPPLE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 

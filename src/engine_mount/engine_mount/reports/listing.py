@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.events import read_marks
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.place import open_run
-from engine_mount.recordings.recording import ReadingError, Recording
+from engine_mount.recordings.recording import ReadingError, Recording, open_run
 from engine_mount.recordings.screen import Table
 from engine_mount.recordings.session import (
     duration_of,

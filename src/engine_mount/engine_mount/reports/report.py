@@ -7,8 +7,7 @@ from typing import Any
 
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.matching import ComparisonError, share_stamps
-from engine_mount.recordings.place import open_run
-from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.recording import Recording, open_run
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.sections import motion, overview, run
 from engine_mount.reports.sections.section import Section

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import open_run
 from mount_ros.topics import TOPICS, Topic
 
 _PERIOD = 0.01  # s, chosen

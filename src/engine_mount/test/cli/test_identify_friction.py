@@ -12,7 +12,7 @@ from engine_mount.identification.friction import ladder
 from engine_mount.identification.friction.files import friction_mapping as said
 from engine_mount.identification.friction.files import read_recording
 from engine_mount.identification.friction.screening import subtract_zero
-from engine_mount.recordings.place import recording_hash
+from engine_mount.recordings.recording import recording_hash
 from engine_mount.settings.chosen import chosen_control
 from mount_models.friction.coefficient import FrictionCoefficients, offset_coefficient
 from mount_models.friction.contact import FrictionContact

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from engine_mount.recordings.place import recording_hash
-from engine_mount.recordings.recording import open_recording
+from engine_mount.recordings.recording import open_recording, recording_hash
 from engine_mount.recordings.session import recorded_session
 from mount_sim.excitation.road import RandomRoad, random_road
 

@@ -27,7 +27,7 @@ def accept(
 ) -> None:
     """Make a run the reference that `make test` replays; the reason is kept with it."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.place import open_run
+    from engine_mount.recordings.recording import open_run
     from engine_mount.recordings.reference import ACCEPTED_NAME
     from engine_mount.recordings.reference import accept as accept_run
     from mount_recorder.versions import versions

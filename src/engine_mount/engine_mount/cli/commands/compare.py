@@ -62,7 +62,7 @@ def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Pat
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.difference import signal_table
     from engine_mount.recordings.matching import alignment_sentence
-    from engine_mount.recordings.place import open_run
+    from engine_mount.recordings.recording import open_run
 
     screen = TerminalScreen()
     recordings = open_run(local(a, screen)), open_run(local(b, screen))

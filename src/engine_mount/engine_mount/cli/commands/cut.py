@@ -43,7 +43,7 @@ def cut(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.cut import cut as cut_recording
     from engine_mount.recordings.events import event_time, find_event
-    from engine_mount.recordings.place import open_run
+    from engine_mount.recordings.recording import open_run
 
     if bool(event) == bool(begin or end):
         raise typer.BadParameter('give --from and --to (or one of them), or --event')

@@ -34,7 +34,7 @@ def recover(
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.place import recording_place
+    from engine_mount.recordings.recording import recording_place
     from engine_mount.recordings.recover import recover as recovered
 
     screen = TerminalScreen()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from engine_mount.drives.inputs.consumed_samples import MeasuredGap, ReplayError
 from engine_mount.drives.inputs.input import measured_gaps
-from engine_mount.recordings.place import open_run
+from engine_mount.recordings.recording import open_run
 from engine_mount.settings.chosen import Parameters, chosen_specimen
 from mount_init.parameters import InitParameters
 from mount_models.actuator import contact_force, current_force_table, offset_current

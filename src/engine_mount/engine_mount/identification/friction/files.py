@@ -18,7 +18,7 @@ from engine_mount.identification.friction.recording import (
     FrictionRecording,
     checked_recording,
 )
-from engine_mount.recordings.place import recording_place
+from engine_mount.recordings.recording import recording_place
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.headers import name_and_unit
 from engine_mount.signals.formats.measured import Measured, MeasuredColumn, Provenance
