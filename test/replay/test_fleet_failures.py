@@ -17,7 +17,7 @@ from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
 from engine_mount.fleet.tables import WritingError
 from engine_mount.signals.sources import remote
-from engine_mount.signals.sources.source import StoreAwayError
+from engine_mount.signals.sources.uris import StoreAwayError
 
 # The stores are those that the tests of engine_mount.signals fetch from.
 sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))

@@ -110,7 +110,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
 @pytest.mark.parametrize(
     ('broken', 'file'),
     [
-        ('engine_mount.reports.pictures.draw_drive', 'drive.png'),
+        ('engine_mount.reports.sections.motion.draw_drive', 'drive.png'),
         ('engine_mount.reports.report.make_report', 'report.html'),
     ],
 )

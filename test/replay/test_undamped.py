@@ -8,7 +8,7 @@ import pytest
 from command_line import command
 
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.recordings.cut import cut
+from engine_mount.recordings.edit import cut
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.undamped import UndampedError, undamped_of

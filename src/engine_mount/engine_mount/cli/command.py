@@ -1,5 +1,6 @@
 """The `engine-mount` command."""
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Annotated
@@ -17,6 +18,7 @@ from engine_mount.cli.commands import (
     drive,
     experiment,
     faults,
+    fleet,
     identify,
     import_files,
     ls,
@@ -25,11 +27,9 @@ from engine_mount.cli.commands import (
     replay,
     report,
     road,
-    version,
     view,
 )
-from engine_mount.cli.commands.fleet import group as fleet
-from engine_mount.cli.commands.identify_arguments import with_repeated_options
+from engine_mount.cli.commands.options import with_repeated_options
 from engine_mount.cli.help import Command, Group
 from engine_mount.cli.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
@@ -49,12 +49,31 @@ app = typer.Typer(
 )
 
 
+def _tell_versions(asked: bool) -> None:
+    """Print the versions of project, ROS, Python and numpy, and end; the session of a recording tells all."""
+    if not asked:
+        return
+    from mount_recorder.versions import versions
+
+    found = versions()
+    distribution = os.environ.get('ROS_DISTRO', 'jazzy')  # without one installed, rclpy is that of this
+    terminal().print(
+        f'engine-mount {found["mount_bringup"]}, ROS 2 {distribution} (rclpy {found["rclpy"]}), '
+        f'Python {found["python"]}, numpy {found["numpy"]}',
+        soft_wrap=True,
+    )
+    raise typer.Exit
+
+
 @app.callback()
 def _top(
     show_version: Annotated[
         bool,
         typer.Option(
-            '--version', is_eager=True, callback=version.tell, help='Tell what this is, and what it runs on.'
+            '--version',
+            is_eager=True,
+            callback=_tell_versions,
+            help='Tell what this is, and what it runs on.',
         ),
     ] = False,
 ) -> None:

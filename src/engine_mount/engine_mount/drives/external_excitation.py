@@ -15,7 +15,7 @@ from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.importing.channels import recorded_as
-from engine_mount.signals.importing.provenance import told_mapping, told_provenance
+from engine_mount.signals.importing.writing import told_mapping, told_provenance
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
 from engine_mount.signals.mapping import Mapping as ColumnMapping
 from engine_mount.signals.quantities import QUANTITIES

@@ -11,10 +11,10 @@ from std_srvs.srv import Trigger
 
 from engine_mount.drives.events import DriveEvents, line
 from engine_mount.drives.external_excitation import FOLDER
-from engine_mount.drives.keyboard import mark_keys
+from engine_mount.drives.record import mark_keys
 from engine_mount.recordings.screen import Screen
 from engine_mount.settings.chosen import Parameters
-from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.options import mounts_of, settings_of_mounts
 from engine_mount.settings.run_folder import RunFolder
 from engine_mount.signals.excitation import with_array
 from mount_bringup.graph.domain import can_port, domain_lock

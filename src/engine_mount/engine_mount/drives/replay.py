@@ -23,8 +23,7 @@ from engine_mount.drives.agreement import (
 )
 from engine_mount.drives.core import Progress, Replayed, replay_in_core
 from engine_mount.drives.inputs.consumed_samples import ReplayError
-from engine_mount.drives.inputs.gap import DEFAULT_TABLE, chosen_gap
-from engine_mount.drives.inputs.input import ReplayInput, replay_input, without
+from engine_mount.drives.inputs.input import DEFAULT_TABLE, ReplayInput, chosen_gap, replay_input, without
 from engine_mount.drives.output import write_replay
 from engine_mount.recordings.recording import Recording, open_mount
 from engine_mount.recordings.session import (
@@ -45,7 +44,7 @@ from engine_mount.settings.chosen import (
 )
 from engine_mount.settings.options import owned
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
-from engine_mount.signals.importing.provenance import SCENARIO
+from engine_mount.signals.importing.writing import SCENARIO
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law

@@ -18,7 +18,7 @@ from engine_mount.experiments.harness.experiment import (
     claim,
     holds_if,
 )
-from engine_mount.reports.drawing.style import HYDROMOUNT_COLOUR
+from engine_mount.reports.drawing.chart import HYDROMOUNT_COLOUR
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from engine_mount.reports.sections.periodic import (
     cycle_work,

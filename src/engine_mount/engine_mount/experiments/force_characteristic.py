@@ -15,8 +15,8 @@ from engine_mount.experiments.harness.experiment import (
     Values,
     claim,
 )
-from engine_mount.experiments.harness.fixed_gaps import RigMeasurements, measure_actuator
 from engine_mount.experiments.harness.measures import rms
+from engine_mount.experiments.harness.rack_recording import RigMeasurements, measure_actuator
 from mount_models.actuator import TABLE_1, ForceLaw, checked_force
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT

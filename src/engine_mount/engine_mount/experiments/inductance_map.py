@@ -15,7 +15,7 @@ from engine_mount.experiments.harness.experiment import (
     Values,
     claim,
 )
-from engine_mount.experiments.harness.fixed_gaps import (
+from engine_mount.experiments.harness.rack_recording import (
     RIG_CURRENTS,
     RIG_GAPS,
     RigMeasurements,

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.drives.bands import BELOW_ISOLATION
 from engine_mount.experiments.harness.closed_loop import PAPER, run_cases
 from engine_mount.experiments.harness.drawing import BLUE, GREY, HYDRO_LINE, OFF_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
@@ -20,6 +19,7 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import (
+    BELOW_ISOLATION,
     FIRST_FREQUENCY,
     RATE,
     first_extremum,
@@ -47,7 +47,7 @@ from engine_mount.experiments.policy_cases import (
     cases_of,
 )
 from engine_mount.experiments.policy_page import page_of
-from engine_mount.reports.drawing.style import COLOUR_OF
+from engine_mount.reports.drawing.chart import COLOUR_OF
 from engine_mount.reports.drive.signals import FloatArray
 from mount_models.arithmetic.compiled import compiled
 from mount_models.sampling import SAMPLE_TIME

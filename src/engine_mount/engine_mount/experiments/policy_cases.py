@@ -9,10 +9,10 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.drives.bands import BELOW_ISOLATION
 from engine_mount.experiments.harness.closed_loop import PAPER, Case, settings_of_run
 from engine_mount.experiments.harness.experiment import Order, Values, Workers
 from engine_mount.experiments.harness.measures import (
+    BELOW_ISOLATION,
     first_extremum,
     peak_and_rms,
     rms_in_bands,

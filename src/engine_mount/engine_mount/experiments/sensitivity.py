@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.patheffects import withStroke
 
-from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from engine_mount.experiments.harness.closed_loop import PAPER, Case, run_cases, settings_of_run
 from engine_mount.experiments.harness.drawing import new_panels
 from engine_mount.experiments.harness.experiment import (
@@ -23,7 +22,12 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
     table,
 )
-from engine_mount.experiments.harness.measures import peak_and_rms, sweep_parameters
+from engine_mount.experiments.harness.measures import (
+    BELOW_ISOLATION,
+    ISOLATION_BANDS,
+    peak_and_rms,
+    sweep_parameters,
+)
 from engine_mount.reports.drive.signals import FloatArray, Truth
 from engine_mount.reports.sections.periodic import harmonics, whole_periods
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER

@@ -4,7 +4,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from engine_mount.experiments.harness.closed_loop import drive_cases, paper_policy
 from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, OFF_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
@@ -18,7 +17,9 @@ from engine_mount.experiments.harness.experiment import (
     holds_if,
 )
 from engine_mount.experiments.harness.measures import (
+    BELOW_ISOLATION,
     FIRST_FREQUENCY,
+    ISOLATION_BANDS,
     RATE,
     Band,
     highest_per_band,
@@ -26,7 +27,7 @@ from engine_mount.experiments.harness.measures import (
     rms_in,
     sweep_parameters,
 )
-from engine_mount.reports.drawing.style import COLOURS
+from engine_mount.reports.drawing.chart import COLOURS
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER

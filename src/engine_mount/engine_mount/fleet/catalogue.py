@@ -30,7 +30,7 @@ from engine_mount.recordings.session import (
     versions_told,
 )
 from engine_mount.recordings.times import each_once, misdated
-from engine_mount.settings.changes import changed_parameters
+from engine_mount.settings.chosen import changed_parameters
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 from mount_sim.plant.mounts import seat_of, simulated_mounts, without_friction
 

@@ -18,9 +18,8 @@ from engine_mount.drives.drive import check_drive, parameters_of_session
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.fleet.places import places
 from engine_mount.fleet.runner import Done, run_tasks
-from engine_mount.recordings.cut import cut
-from engine_mount.settings.mounts import settings_of_mounts
-from engine_mount.settings.options import with_sample_rate
+from engine_mount.recordings.edit import cut
+from engine_mount.settings.options import settings_of_mounts, with_sample_rate
 from mount_bringup.settings import checked_settings
 from mount_control.policy.registry import POLICIES
 from mount_recorder.metadata import METADATA_NAME

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 from engine_mount.fleet.places import Place
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.fleet.tables import COLUMNS, Row, explained_errors, replaced, table_of, write_table
-from engine_mount.signals.sources.source import StoreAwayError
 from engine_mount.signals.sources.stores import local_copy
+from engine_mount.signals.sources.uris import StoreAwayError
 
 if TYPE_CHECKING:
     import pyarrow

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 from engine_mount.fleet.tables import NEEDED_FOR
 from engine_mount.signals.extras import required
-from engine_mount.signals.sources.source import Entry, SourceError
 from engine_mount.signals.sources.stores import entries
-from engine_mount.signals.sources.uris import is_uri, local_path, scheme_of, shown
+from engine_mount.signals.sources.uris import Entry, SourceError, is_uri, local_path, scheme_of, shown
 from mount_recorder.metadata import METADATA_NAME
 
 _RECORDED = re.compile(r'(?P<stem>.+?)\.(mcap|db3)(\.(zstd|lz4|zst))?')

@@ -22,8 +22,8 @@ from engine_mount.drives.inputs.consumed_samples import (
     looked_up,
     quiet_at_first,
 )
-from engine_mount.drives.inputs.gap import default_gap
 from engine_mount.drives.inputs.input import (
+    default_gap,
     displacement_of,
     has,
     parameters_of,
@@ -39,7 +39,7 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.times import each_once
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import check_effect, control_parameters
-from engine_mount.signals.importing.provenance import SCENARIO
+from engine_mount.signals.importing.writing import SCENARIO
 from mount_models.arithmetic.sums import each_interpolated
 from mount_ros.topics import (
     AIR_GAP,

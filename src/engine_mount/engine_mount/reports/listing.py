@@ -22,7 +22,7 @@ from engine_mount.recordings.session import (
     versions_sentence,
     versions_told,
 )
-from engine_mount.settings.changes import changed_parameters
+from engine_mount.settings.chosen import changed_parameters
 from engine_mount.settings.run_folder import RunFolder
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions

@@ -9,7 +9,7 @@ matplotlib.use('Agg')
 import numpy as np
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.style import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
+from engine_mount.reports.drawing.chart import COLOURS, LEVEL_COLOUR, SPAN_COLOUR
 from engine_mount.signals.roads.iso8608 import (
     CLASSES,
     FIRST_LIMIT,

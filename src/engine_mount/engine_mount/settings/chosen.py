@@ -1,8 +1,9 @@
-"""Controller, policy and specimen that the parameters of a run choose, as the nodes choose them."""
+"""Controller, policy and specimen that a run chooses, and its parameters that differ from their defaults."""
 
 from collections.abc import Mapping
 from typing import Any
 
+from mount_bringup.settings import Known, defaults_of_nodes
 from mount_control.policy.contract import Policy
 from mount_control.policy.registry import UNPREFIXED
 from mount_control.settings import (
@@ -16,7 +17,7 @@ from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
 from mount_models.quantity import ParameterError, with_flattened
-from mount_models.specimen import Specimen
+from mount_models.specimen import Specimen, default_specimen
 from mount_models.specimen import chosen_specimen as specimen_of
 
 Parameters = Mapping[str, Mapping[str, Any]]
@@ -78,3 +79,35 @@ def chosen_initialisation(
 def chosen_control(parameters: Parameters) -> ControlSettings:
     """Return what the controller of a run is set up with; a `ValueError` says what cannot be."""
     return control_settings(parameters.get('mount_control', {}), chosen_specimen(parameters, 'mount_control'))
+
+
+_OF_THE_RUN = {'uri', 'lockstep', 'interface', 'channel', 'port'}
+"""Parameters that a run chooses by itself."""
+
+
+def changed_parameters(parameters: Known) -> dict[str, dict[str, tuple[Any, Any]]]:
+    """Return {node: {parameter: (value, default)}} of a session that differ from the default.
+
+    Of friction and contact the default is what the shipped specimen says of this actuator.
+    """
+    defaults = defaults_of_nodes()
+    identified = default_specimen().friction
+    control = defaults['mount_control']
+    for name in control:
+        prefix, _, rest = name.partition('.')
+        if prefix in ('friction', 'contact') and rest in identified:
+            control[name] = identified[rest]
+    changed = {}
+    for node, values in parameters.items():
+        own = defaults.get(node, {})
+        names = [name for name in values if name in own and name not in _OF_THE_RUN]
+        changed[node] = {
+            name: (values[name], own[name]) for name in names if _differs(values[name], own[name])
+        }
+    return {node: pairs for node, pairs in changed.items() if pairs}
+
+
+def _differs(value: Any, default: Any) -> bool:
+    if isinstance(default, tuple):
+        return bool(value) and tuple(value) != default
+    return value != default and not (value != value and default != default)  # NaN is unknown

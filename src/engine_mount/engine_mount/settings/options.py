@@ -1,13 +1,14 @@
-"""Options `--set NODE.NAME=VALUE` and `--sample-rate` as settings of the nodes."""
+"""Options `--set NODE.NAME=VALUE` and `--sample-rate` as settings of nodes; in them the mounts of a car."""
 
 import difflib
 from collections.abc import Sequence
 from itertools import chain
 from typing import Any
 
-from mount_bringup.settings import NODES, Known, SettingError, defaults_of_nodes
+from mount_bringup.settings import NODES, OF_EACH, Known, SettingError, defaults_of_nodes, settings_of_mount
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.quantity import ParameterError
+from mount_sim.plant.mounts import mount_names
 
 Settings = dict[str, dict[str, Any]]
 
@@ -66,3 +67,21 @@ def with_sample_rate(settings: Known, sample_rate: float | None) -> Settings:
     for node in NODES if sample_rate is not None else ():
         completed.setdefault(node, {})['sample_rate'] = sample_rate
     return completed
+
+
+def mounts_of(settings: Known) -> tuple[str, ...]:
+    """Return the names of the mounts, none where there is one mount alone; raises `ParameterError`."""
+    names = mount_names(str(settings.get('mount_sim', {}).get('mounts', '')))
+    for node in settings:
+        mount, slash, name = node.rpartition('/')
+        if slash and (mount not in names or name not in OF_EACH):
+            raise ParameterError(
+                f'{node!r} is no node of this graph: its mounts are {", ".join(names) or "one alone"}, each '
+                f'with {", ".join(OF_EACH)}'
+            )
+    return names
+
+
+def settings_of_mounts(settings: Known) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return {mount: settings}; a mount alone has the name ''."""
+    return {name: settings_of_mount(settings, name) for name in mounts_of(settings) or ('',)}

@@ -1,8 +1,11 @@
 """Where a run puts what it makes: recording, figure, summary, logs."""
 
+import json
+from collections.abc import Mapping
 from datetime import datetime
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 
 class RunFolderError(ValueError):
@@ -41,3 +44,8 @@ def make_run_folder(wanted: Path | None, scenario: str) -> RunFolder:
             f'{wanted} cannot be created: {error.strerror}; choose another with --out'
         ) from None
     return folder
+
+
+def write_json(figures: Mapping[str, Any], file: Path) -> None:
+    """Write `figures`; raises `ValueError` for a number that JSON does not know, and `OSError`."""
+    file.write_text(json.dumps(figures, indent=2, allow_nan=False) + '\n', encoding='utf-8')

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from engine_mount.recordings.layout import LayoutError
 from engine_mount.recordings.mcap_records import HEAD
 from engine_mount.recordings.series import Payloads, Series, SeriesError
-from engine_mount.reports.drawing.chart import Chart, Curve, Panel, level_lines
+from engine_mount.reports.drawing.chart import COLOUR_OF, Chart, Curve, Panel, level_lines
 from engine_mount.reports.drawing.detail import browser_chart
-from engine_mount.reports.drawing.style import COLOUR_OF
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.view.alternatives import MOUNTS, Alternatives

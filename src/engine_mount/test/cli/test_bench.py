@@ -15,7 +15,7 @@ def test_figures_are_told_as_ratios_and_written(tmp_path, monkeypatch, command):
         'x': Comparison('a thing', 2e-6, 'another', 8e-6),
         'y': Comparison('growth', 1.0, 'none', 0.0, 'B'),
     }
-    monkeypatch.setattr(bench, 'import_module', lambda name: type('Module', (), {'measure': lambda *_: rows}))
+    monkeypatch.setattr(bench, 'import_module', lambda name: type('Module', (), {'calls': lambda *_: rows}))
     printed = command('bench', '--only', 'calls', '--json', tmp_path / 'figures.json')
     figures = json.loads((tmp_path / 'figures.json').read_text())
     assert figures['x'] == {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from engine_mount.cli.completion import KINDS, named, recordings, setting
+from engine_mount.cli.help import KINDS, named, recordings, setting
 
 COMMAND = Path(sys.executable).with_name('engine-mount')
 IN_BASH = """eval "$(engine-mount --show-completion bash)"

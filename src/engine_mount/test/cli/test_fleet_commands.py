@@ -9,7 +9,7 @@ import pytest
 
 from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
-from engine_mount.signals.sources.source import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
 CHANGE = ('--set', 'mount_control.highest_current=0.7')

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from engine_mount.cli.commands.identify_arguments import with_repeated_options
+from engine_mount.cli.commands.options import with_repeated_options
 from engine_mount.experiments.harness.rack_recording import record_friction_rack
 from engine_mount.identification.friction import ladder
 from engine_mount.identification.friction.files import friction_mapping as said

@@ -42,7 +42,7 @@ def test_status_ends_with_the_reason_when_its_model_fails(monkeypatch):
     feed = contextlib.nullcontext(SimpleNamespace(title='a graph'))
     monkeypatch.setattr(looking, 'open_feed', lambda **options: feed)
     monkeypatch.setattr(looking, 'running_model', lambda _, **options: contextlib.nullcontext(model))
-    monkeypatch.setattr('engine_mount.view.screen.status_screen', lambda *_: 'figures')
+    monkeypatch.setattr('engine_mount.view.view.status_screen', lambda *_: 'figures')
     with pytest.raises(FeedError, match='the view has ended: ValueError: broken'):
         view.status(domain=5)
 

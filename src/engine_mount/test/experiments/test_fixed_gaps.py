@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engine_mount.experiments.harness.fixed_gaps import (
+from engine_mount.experiments.harness.rack_recording import (
     RIG_CURRENTS,
     RIG_GAPS,
     measure_actuator,

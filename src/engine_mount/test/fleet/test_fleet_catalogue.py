@@ -12,7 +12,7 @@ import engine_mount
 from engine_mount.fleet.catalogue import index, rows_of
 from engine_mount.fleet.places import places
 from engine_mount.fleet.tables import COLUMNS, schema_of
-from engine_mount.signals.sources.source import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
 

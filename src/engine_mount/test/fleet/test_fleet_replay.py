@@ -20,7 +20,7 @@ from engine_mount.fleet.replay import count_outcomes, replay_fleet
 from engine_mount.fleet.setpoints import compare_setpoints, recorded_in
 from engine_mount.recordings.recording import open_run
 from engine_mount.settings.options import with_sample_rate
-from engine_mount.signals.sources.source import SourceError
+from engine_mount.signals.sources.uris import SourceError
 from mount_recorder.session import session_text
 
 REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'

@@ -9,9 +9,8 @@ from recorded_drive import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.cut import cut
+from engine_mount.recordings.edit import cut, recover
 from engine_mount.recordings.losses import losses
-from engine_mount.recordings.recover import recover
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.losses import Reception
 from mount_recorder.schemas import schema_text

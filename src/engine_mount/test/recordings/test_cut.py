@@ -8,7 +8,7 @@ from compared_drives import START, answers, write_answers
 
 import engine_mount
 from engine_mount.recordings.compare import compare
-from engine_mount.recordings.cut import CutError, cut
+from engine_mount.recordings.edit import CutError, cut
 from engine_mount.recordings.events import (
     EventError,
     event_time,

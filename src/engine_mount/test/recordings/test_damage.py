@@ -14,8 +14,8 @@ from recorded_drive import sample
 import engine_mount
 from engine_mount.recordings import ReadingError
 from engine_mount.recordings.audit import audit
+from engine_mount.recordings.edit import RecoveryError, recover
 from engine_mount.recordings.losses import as_json, as_table, losses, sentences
-from engine_mount.recordings.recover import RecoveryError, recover
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMENT, SIM_TRUTH
 

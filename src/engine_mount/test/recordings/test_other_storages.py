@@ -13,8 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 import engine_mount
 from engine_mount.recordings import ReadingError
 from engine_mount.recordings.audit import audit
-from engine_mount.recordings.cut import cut
-from engine_mount.recordings.recover import recover
+from engine_mount.recordings.edit import cut, recover
 from mount_ros.topics import DISPLACEMENT
 
 COUNT = 101

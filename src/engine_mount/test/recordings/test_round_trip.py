@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 import engine_mount
-from engine_mount.recordings.recover import recover
+from engine_mount.recordings.edit import recover
 from mount_recorder.bag_writer import BagWriter
 
 TOPICS = ('/displacement', '/mount_right/event', '/a')

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from engine_mount.reports.fleet.distributions import pairs_of, spread
-from engine_mount.reports.fleet.looks import Look, Signals
-from engine_mount.reports.fleet.readable import handy_unit, number, quantity
+from engine_mount.reports.fleet.looks import Look, Signals, handy_unit, number, quantity
 from engine_mount.reports.fleet.report import fleet_report
 
 pyarrow = pytest.importorskip('pyarrow')

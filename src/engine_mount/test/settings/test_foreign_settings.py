@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from ros_testing import mutated
 
 from engine_mount.recordings.session import SessionError, session_content, session_sample_rate
-from engine_mount.settings.mounts import settings_of_mounts
-from engine_mount.settings.options import settings_of_options
+from engine_mount.settings.options import settings_of_mounts, settings_of_options
 from mount_bringup.parameter_file import settings_in
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.settings import check_policies, control_settings, defaults

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engine_mount.settings.mounts import mounts_of, settings_of_mounts
+from engine_mount.settings.options import mounts_of, settings_of_mounts
 from mount_models.quantity import ParameterError
 
 MOUNTS = ('left', 'right')

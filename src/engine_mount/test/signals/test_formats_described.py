@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from foreign_files import make_csv, make_mcap, make_mdf
 
-from engine_mount.signals.formats.described import columns_table, described
+from engine_mount.signals.formats.measured import columns_table, described
 from engine_mount.signals.formats.reading import is_foreign, read
 
 TIMES = np.arange(11) / 100.0

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engine_mount.signals.formats import text as module
+from engine_mount.signals.formats.cells import name_and_unit
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.headers import name_and_unit
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.mapping import mapping_in_file
 from engine_mount.signals.selection import select

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import engine_mount
-from engine_mount.recordings.cut import cut
+from engine_mount.recordings.edit import cut
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read

@@ -53,7 +53,7 @@ class ChainRun(NamedTuple):
     """Share of the samples that were not answered."""
 
 
-def measure(order: BenchOrder, report: Report) -> Figures:
+def graph(order: BenchOrder, report: Report) -> Figures:
     """Return the latency of the graph, separate and composed, beside the empty nodes."""
     kinds = {
         'graph': partial(_run_graph, order, Grouping.APART),

@@ -8,7 +8,7 @@ import typer
 
 from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
 from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option, write_figures
-from engine_mount.cli.completion import named
+from engine_mount.cli.help import named
 
 EPILOG = """Groups: `calls` (what one sample costs in core and in a replay), `storage` (loading a
 recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency of the graph in real time,
@@ -49,7 +49,8 @@ def bench(
     with screen.console.status('measuring') as status:
         for name in only or GROUPS:
             status.update(f'measuring: {name}')
-            found |= import_module(f'engine_mount.cli.bench.{name}').measure(order, status.update)
+            measure = getattr(import_module(f'engine_mount.cli.bench.{GROUPS[name]}'), name)
+            found |= measure(order, status.update)
     rows = [
         (row.what, _text(row.ours, row.unit), row.beside, _text(row.other, row.unit), f'{row.ratio:.3g}')
         for row in found.values()

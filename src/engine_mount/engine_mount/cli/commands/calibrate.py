@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-from engine_mount.cli.calibration.given import gaps_of, given_ripple, rack_mapping
-from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
@@ -20,6 +18,17 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, group
+from engine_mount.cli.rack import (
+    EXIT_CODES,
+    Base,
+    Name,
+    Out,
+    gaps_of,
+    given_ripple,
+    progress,
+    publish,
+    rack_mapping,
+)
 
 app = group('calibrate', 'Calibrate an actuator from rack recordings: force law, gap curves, their files.')
 

@@ -41,7 +41,7 @@ def cut(
     The times of the messages stay as they were, so the first message may be a session from long before.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.recordings.cut import cut as cut_recording
+    from engine_mount.recordings.edit import cut as cut_recording
     from engine_mount.recordings.events import event_time, find_event
     from engine_mount.recordings.recording import open_run
 

@@ -30,8 +30,8 @@ from engine_mount.cli.commands.options import (
     stated,
     write_figures,
 )
-from engine_mount.cli.completion import named
 from engine_mount.cli.fetching import local
+from engine_mount.cli.help import named
 from mount_bringup.graph.nodes import RESTART_LIMIT
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while

@@ -13,7 +13,7 @@ from engine_mount.cli.commands.options import (
     option,
     write_figures,
 )
-from engine_mount.cli.completion import named, setting
+from engine_mount.cli.help import named, setting
 
 EPILOG = """Exit code: 0 when it ran, whatever came out; 1 when the order was refused.
 

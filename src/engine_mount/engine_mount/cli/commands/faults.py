@@ -15,7 +15,7 @@ from engine_mount.cli.commands.options import (
     option,
     write_figures,
 )
-from engine_mount.cli.completion import named
+from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
 

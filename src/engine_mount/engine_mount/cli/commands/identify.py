@@ -2,7 +2,6 @@
 
 from typing import Annotated
 
-from engine_mount.cli.calibration.publish import EXIT_CODES, Base, Name, Out, progress, publish
 from engine_mount.cli.commands.options import (
     Dbc,
     Decimal,
@@ -18,6 +17,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, group
+from engine_mount.cli.rack import EXIT_CODES, Base, Name, Out, progress, publish
 
 app = group('identify', 'Identify parameters from recordings of a rack.')
 

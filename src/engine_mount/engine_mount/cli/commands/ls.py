@@ -92,7 +92,7 @@ def info(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.recording import open_run
     from engine_mount.reports.listing import describe_recording
-    from engine_mount.signals.formats.described import columns_table, described
+    from engine_mount.signals.formats.measured import columns_table, described
     from engine_mount.signals.formats.reading import is_foreign, read
 
     screen = TerminalScreen()

@@ -1,17 +1,17 @@
 """Options that several sub-commands have."""
 
 from collections.abc import Mapping as Figures
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.completion import Completer, recordings, setting
+from engine_mount.cli.help import Completer, recordings, setting
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
-
 
 PANELS = {'foreign file': 'Foreign file', 'recorded': 'Foreign file', 'road': 'Measured road'}
 
@@ -71,7 +71,7 @@ def changes_of(settings: list[str] | None) -> dict[str, dict[str, Any]]:
 
 def write_figures(figures: Figures[str, Any], file: Path | None) -> None:
     """Write figures where a file is named."""
-    from engine_mount.reports.json_file import write_json
+    from engine_mount.settings.run_folder import write_json
 
     if file is not None:
         write_json(figures, file)
@@ -149,3 +149,27 @@ def stated(dbc: Path | None, decimal: str, delimiter: str) -> 'Stated':
     from engine_mount.signals.formats.content import Stated
 
     return Stated(dbc=dbc, decimal=decimal, delimiter=delimiter)
+
+
+SEVERAL = ('--train', '--held-out', '--file')
+
+
+def with_repeated_options(arguments: Sequence[str], several: Sequence[str] = SEVERAL) -> list[str]:
+    """Return `arguments` with an option of `several` repeated before each of the values that follow it.
+
+    Values end at the next word that begins with a dash. All else stays as it is.
+    """
+    result: list[str] = []
+    option, filled = '', True
+    for number, word in enumerate(arguments):
+        if word == '--':
+            return [*result, *arguments[number:]]
+        if word.startswith('-') and word != '-':
+            option, filled = (word, False) if word in several else ('', True)
+            result.append(word)
+        elif option and filled:
+            result += [option, word]
+        else:
+            result.append(word)
+            filled = True
+    return result

@@ -13,7 +13,7 @@ from engine_mount.cli.commands.options import (
     argument,
     option,
 )
-from engine_mount.cli.completion import named
+from engine_mount.cli.help import named
 
 if TYPE_CHECKING:
     from engine_mount.cli.screen import TerminalScreen

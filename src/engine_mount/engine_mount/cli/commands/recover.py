@@ -34,8 +34,8 @@ def recover(
 ) -> None:
     """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
     from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.recordings.edit import recover as recovered
     from engine_mount.recordings.recording import recording_place
-    from engine_mount.recordings.recover import recover as recovered
 
     screen = TerminalScreen()
     source = recording_place(local(recording, screen))

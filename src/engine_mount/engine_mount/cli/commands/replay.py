@@ -15,8 +15,8 @@ from engine_mount.cli.commands.options import (
     option,
     write_figures,
 )
-from engine_mount.cli.completion import named
 from engine_mount.cli.fetching import local
+from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when the setpoints are those recorded, or something was changed on purpose; 1 when
 they are not, or the order was refused.
@@ -51,7 +51,7 @@ def replay(
     Equal is to the last bit; parameters and tables can be other than recorded.
     """
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.inputs.gap import DEFAULT_TABLE
+    from engine_mount.drives.inputs.input import DEFAULT_TABLE
     from engine_mount.drives.replay import replay as run_replay
     from engine_mount.recordings.screen import Table
     from engine_mount.settings.run_folder import new_place

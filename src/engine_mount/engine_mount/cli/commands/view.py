@@ -83,8 +83,7 @@ def status(
 
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.view.feed import FeedError
-    from engine_mount.view.screen import status_screen
-    from engine_mount.view.view import open_feed, running_model, wait_for_state
+    from engine_mount.view.view import open_feed, running_model, status_screen, wait_for_state
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
 

@@ -14,7 +14,7 @@ import numpy as np
 from engine_mount.drives.loop import compiled_loop as loop
 from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns, coil_temperature
 from engine_mount.settings.chosen import Parameters, chosen_control, chosen_initialisation
-from engine_mount.settings.mounts import settings_of_mounts
+from engine_mount.settings.options import settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.settings import check_sample_rate
 from mount_control.control_loop import OFF, ControlLoop

@@ -21,7 +21,7 @@ from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching
 from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
 from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
 from engine_mount.settings.chosen import policy_of
-from engine_mount.settings.mounts import mounts_of
+from engine_mount.settings.options import mounts_of
 from mount_bringup.settings import checked_settings
 from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_RATE, SAMPLE_TIME

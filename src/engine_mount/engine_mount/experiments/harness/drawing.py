@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.style import (
+from engine_mount.reports.drawing.chart import (
     COLOURS,
     HYDROMOUNT_COLOUR,
     LEVEL_COLOUR,

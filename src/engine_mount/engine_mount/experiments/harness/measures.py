@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.drives.bands import BELOW_ISOLATION, ISOLATION_BANDS
 from engine_mount.experiments.harness.experiment import Values
 from engine_mount.reports.drive.signals import FloatArray, Truth
 from mount_models.sampling import SAMPLE_TIME
@@ -93,3 +92,9 @@ def first_extremum(displacement: FloatArray) -> float:
     moved = np.abs(part - part[0])
     clear = turning[moved[turning] > _CLEAR * moved.max()]
     return float(np.abs(part[clear[0]])) if clear.size else float(np.abs(part).max())
+
+
+BELOW_ISOLATION = (3.0, 14.0)
+"""Hz: the resonance of the engine on its mounts, where the mount has to damp (Fig. 14)."""
+ISOLATION_BANDS = ((14.0, 20.0), (20.0, 30.0), (30.0, 50.0))
+"""Hz: damping is off there (Fig. 14); the borders are chosen."""

@@ -19,8 +19,8 @@ from engine_mount.identification.friction.recording import (
     checked_recording,
 )
 from engine_mount.recordings.recording import recording_place
+from engine_mount.signals.formats.cells import name_and_unit
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.headers import name_and_unit
 from engine_mount.signals.formats.measured import Measured, MeasuredColumn, Provenance
 from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name

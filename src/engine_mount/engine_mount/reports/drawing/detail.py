@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.reports.drawing.chart import Array, Chart, Curve
-from engine_mount.reports.drawing.style import SPAN_COLOUR
+from engine_mount.reports.drawing.chart import SPAN_COLOUR, Array, Chart, Curve
 
 NUMBERS = 400_000
 """Of all long curves of a page together, chosen: 1.1 MB as text, in which 6 signals of 60 s fit whole."""

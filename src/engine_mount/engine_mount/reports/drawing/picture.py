@@ -12,9 +12,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.chart import DASHED, DOTTED, SOLID, Array, Chart, Curve, Limits, Panel
+from engine_mount.reports.drawing.chart import (
+    DASHED,
+    DOTTED,
+    SOLID,
+    SPAN_COLOUR,
+    Array,
+    Chart,
+    Curve,
+    Limits,
+    Panel,
+)
 from engine_mount.reports.drawing.detail import ranges
-from engine_mount.reports.drawing.style import SPAN_COLOUR
 
 _STYLES: dict[str, Any] = {SOLID: '-', DASHED: '--', DOTTED: ':'}
 _POINTS = 8000  # of a curve, chosen: 4 to a pixel of both kinds, lowest and highest

@@ -16,10 +16,9 @@ from engine_mount.reports.drive.summary import (
     summarise,
     summary_table,
 )
-from engine_mount.reports.json_file import write_json
 from engine_mount.settings.chosen import Parameters
-from engine_mount.settings.mounts import mounts_of, settings_of_mounts
-from engine_mount.settings.run_folder import RunFolder
+from engine_mount.settings.options import mounts_of, settings_of_mounts
+from engine_mount.settings.run_folder import RunFolder, write_json
 from mount_recorder.folders import recordings_of
 
 _COMMON = ('scenario', 'mode', 'samples', 'recordings', 'real_time_factor')  # to all mounts of a run
@@ -110,12 +109,13 @@ def _draw(
         file = file.with_name(f'{file.stem}_{recording.mount}{file.suffix}')
 
     def draw() -> None:
-        from engine_mount.reports import pictures  # after the drive: what draws takes a second to load
+        # after the drive: what draws takes a second to load
+        from engine_mount.reports.sections.motion import draw_drive
         from engine_mount.reports.sections.subject import Subject
 
         title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
         begin = figures['excitation_start_s']
-        pictures.draw_drive(Subject(recording), begin, title, file, file.with_suffix('.svg'))
+        draw_drive(Subject(recording), begin, title, file, file.with_suffix('.svg'))
         result.pictures.append(file)
 
     with screen.line(f'simulating the undamped mount, drawing {file.name}'):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import SeriesError
 from engine_mount.settings.chosen import Parameters
-from engine_mount.settings.mounts import mounts_of
+from engine_mount.settings.options import mounts_of
 from engine_mount.signals.excitation import build_excitation
 from mount_models.quantity import with_flattened
 from mount_models.sampling import sample_time_ns

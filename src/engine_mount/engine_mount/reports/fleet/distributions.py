@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from engine_mount.reports.drawing.chart import DASHED, Array, Chart, Curve, Panel
-from engine_mount.reports.drawing.style import COLOURS
-from engine_mount.reports.fleet.readable import handy_unit, number
+from engine_mount.reports.drawing.chart import COLOURS, DASHED, Array, Chart, Curve, Panel
+from engine_mount.reports.fleet.looks import handy_unit, number
 from engine_mount.reports.sections.section import Section, Table
 
 if TYPE_CHECKING:

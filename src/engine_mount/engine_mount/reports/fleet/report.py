@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from engine_mount.reports.fleet.distributions import pairs_of, spread
-from engine_mount.reports.fleet.looks import Look, look_section
-from engine_mount.reports.fleet.readable import quantity
-from engine_mount.reports.fleet.worst_table import worst_section
+from engine_mount.reports.fleet.looks import Look, look_section, quantity, worst_section
 from engine_mount.reports.report import Report
 from engine_mount.reports.sections.section import (
     BAD,

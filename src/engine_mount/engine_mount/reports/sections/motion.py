@@ -2,12 +2,25 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
-from engine_mount.reports.drawing.chart import Array, Chart, Curve, Dots, Panel, Span, level_lines
-from engine_mount.reports.drawing.style import DIFFERENCE_COLOUR, UNDAMPED_COLOUR
+from engine_mount.reports.drawing.chart import (
+    DIFFERENCE_COLOUR,
+    UNDAMPED_COLOUR,
+    Array,
+    Chart,
+    Curve,
+    Dots,
+    Limits,
+    Panel,
+    Span,
+    level_lines,
+)
+from engine_mount.reports.drawing.picture import draw_chart
 from engine_mount.reports.sections.periodic import (
     amplitude_density,
     cycle_work,
@@ -243,3 +256,23 @@ def _together(
     x = np.interp(time, moved.time[known], moved.values[known]) if known.any() else np.full(len(time), np.nan)
     both = np.isfinite(x) & np.isfinite(y)
     return x[both], y[both], time[both]
+
+
+_BEFORE, _AFTER = 0.4, 0.6  # s, chosen: shown in detail round the highest current
+_SHORTEST = 1.0  # s, chosen: a drive that never reached its excitation is shown from its end
+
+
+def draw_drive(subject: Subject, begin: float, title: str, *files: Path) -> None:
+    """Write the picture of a drive from `begin` (s) on to `files` (PNG, SVG), in the manner of Fig. 15.
+
+    Right, where there is a current, its highest moment in detail. Raises `ValueError` without any signal.
+    """
+    chart, setpoint = traces([subject]).chart, subject['setpoint']
+    if chart is None or chart.limits is None:
+        raise ValueError('neither displacement nor current was recorded')
+    end = chart.limits[1]
+    views: dict[str, Limits | None] = {'': (min(begin, end - _SHORTEST), end)}
+    strongest, at = (0.0, 0.0) if setpoint is None else setpoint.peak(begin)
+    if strongest > 0.0:
+        views['where the current is highest'] = (at - _BEFORE, at + _AFTER)
+    draw_chart(replace(chart, title=title), *files, views=views)

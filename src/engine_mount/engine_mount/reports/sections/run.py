@@ -11,8 +11,7 @@ from engine_mount.recordings.losses import as_table
 from engine_mount.recordings.losses import sentences as audit_sentences
 from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.drawing.chart import DASHED, Array, Chart, Curve, Panel, Span
-from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
+from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, DASHED, Array, Chart, Curve, Panel, Span
 from engine_mount.reports.sections.motion import TIME_LABEL
 from engine_mount.reports.sections.section import Section, Table, moment
 from engine_mount.reports.sections.subject import Signal, Subject, Tracking, shared_sentences

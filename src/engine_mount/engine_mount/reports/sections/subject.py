@@ -23,8 +23,7 @@ from engine_mount.recordings.session import (
     session_parameters,
 )
 from engine_mount.recordings.times import Times, each_once
-from engine_mount.reports.drawing.chart import Array, Curve
-from engine_mount.reports.drawing.style import COLOUR_OF, COLOURS
+from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, Array, Curve
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
 from engine_mount.reports.drive.undamped import Undamped, UndampedError, undamped_of

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from engine_mount.signals.extras import required
+from engine_mount.signals.formats.cells import is_unit_row, titles_and_units
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
-from engine_mount.signals.formats.headers import is_unit_row, titles_and_units
 from engine_mount.signals.signal import SignalError
 
 Row = tuple[Any, ...]

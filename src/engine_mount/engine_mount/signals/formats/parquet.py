@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from engine_mount.signals.extras import required
+from engine_mount.signals.formats.cells import name_and_unit
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
-from engine_mount.signals.formats.headers import name_and_unit
 
 _UNITS = (b'unit', b'units', b'Unit', b'Units')
 _NUMBERS = ('int', 'uint', 'float', 'double', 'halffloat', 'bool', 'timestamp', 'decimal')

@@ -14,10 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.signals.formats.cells import ALONE, BLANK, MISSING, cells_of, date_in, kind_of, number_in
+from engine_mount.signals.formats.cells import (
+    ALONE,
+    BLANK,
+    MISSING,
+    cells_of,
+    date_in,
+    is_unit_row,
+    kind_of,
+    number_in,
+    titles_and_units,
+)
 from engine_mount.signals.formats.content import Content, Leaf, Stated, with_dates
 from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment
-from engine_mount.signals.formats.headers import is_unit_row, titles_and_units
 from engine_mount.signals.signal import SignalError
 
 HEAD = 1 << 18

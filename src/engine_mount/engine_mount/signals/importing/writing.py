@@ -1,13 +1,17 @@
 """Signals written as a recording, message by message in the order of their stamps."""
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from dataclasses import asdict
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from engine_mount.recordings.metadata import units_text
+from engine_mount.signals.formats.measured import Provenance
 from engine_mount.signals.importing.channels import PREFIX, Channel
+from engine_mount.signals.mapping import Mapping
+from engine_mount.signals.sources.uris import is_local, name_of, shown
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_text
@@ -54,3 +58,23 @@ def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, beh
     times = np.concatenate(stamps)
     for place in np.argsort(times, kind='stable').tolist():
         writer.write(topics[place], messages[place], int(times[place]))
+
+
+Told = dict[str, Any]
+
+SCENARIO = 'imported'
+"""The scenario of such a recording, as its session tells it."""
+
+
+def told_provenance(came: Provenance) -> Told:
+    """Return what a session says of a file: its name, URI where it has one, hash, size, format, reader."""
+    uri = {} if is_local(came.uri) else {'uri': shown(came.uri)}
+    own = {'sha256': came.sha256, 'bytes': came.size, 'format': came.format, 'reader': came.reader}
+    return {'file': name_of(came.uri), **uri, **own}
+
+
+def told_mapping(mapping: Mapping, file: str = '') -> Told:
+    """Return what a session says of the mapping: the file, the measuring system, times that were said."""
+    times = {name: value for name, value in asdict(mapping.time).items() if value}
+    told = {'file': PurePosixPath(file).name, 'system': mapping.system, 'time': times}
+    return {name: value for name, value in told.items() if value}

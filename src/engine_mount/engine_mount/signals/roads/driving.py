@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.signals.even_grid import EvenSignal
-from engine_mount.signals.importing.provenance import told_provenance
+from engine_mount.signals.importing.writing import told_provenance
 from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.iso8608 import (
     LONGEST_WAVE,

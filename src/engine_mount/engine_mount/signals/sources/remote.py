@@ -16,8 +16,16 @@ from urllib.parse import unquote, urlsplit
 
 from engine_mount.signals.extras import MissingLibraryError, required
 from engine_mount.signals.sources.cache import cached_copy
-from engine_mount.signals.sources.source import Entry, SourceError, StoreAwayError
-from engine_mount.signals.sources.uris import checked, inside, name_of, scheme_of, shown
+from engine_mount.signals.sources.uris import (
+    Entry,
+    SourceError,
+    StoreAwayError,
+    checked,
+    inside,
+    name_of,
+    scheme_of,
+    shown,
+)
 
 T = TypeVar('T')
 Progress = Callable[[int, int], None]

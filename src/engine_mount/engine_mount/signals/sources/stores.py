@@ -6,8 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from engine_mount.signals.sources.source import Entry, SourceError
-from engine_mount.signals.sources.uris import is_local, local_path
+from engine_mount.signals.sources.uris import Entry, SourceError, is_local, local_path
 
 _kept: dict[Path, str] = {}
 """The copies that this process keeps, with their URIs."""

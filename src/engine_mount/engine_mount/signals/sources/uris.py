@@ -1,10 +1,31 @@
-"""Addresses of recordings: URIs and paths; a URI that holds a secret is refused."""
+"""Places by URI: how they are written and shown, a file in a store, and the errors of stores."""
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit, urlunsplit
 
-from engine_mount.signals.sources.source import SourceError
+
+class SourceError(OSError):
+    """A recording cannot be fetched; the text says from where, why, and what would help."""
+
+
+class StoreAwayError(SourceError):
+    """A store did not answer in any attempt; the text says how many there were."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file in a store: its URI, size in bytes, and what changes when its content does.
+
+    `modified` is in s since 1970 on a disk, else NaN; `etag` is the store's own mark, or its time of change.
+    """
+
+    uri: str
+    size: int
+    modified: float
+    etag: str
+
 
 SCHEMES = ('file', 's3', 'sftp', 'ssh', 'gs', 'http', 'https', 'memory')
 """What can be fetched; `memory` holds what the same process put there, for tests."""

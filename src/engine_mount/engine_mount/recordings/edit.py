@@ -1,15 +1,22 @@
-"""A piece of a recording as a recording of its own, with what it needs to be understood."""
+"""Cut pieces and sound remainders of recordings, as recordings of their own."""
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from engine_mount.recordings.bag_copy import BagCopy, read_messages
-from engine_mount.recordings.metadata import ZERO_KEY, TopicInformation, registered_topic, with_step
-from engine_mount.recordings.recording import Recording
+from engine_mount.recordings.metadata import (
+    ZERO_KEY,
+    TopicInformation,
+    custom_data,
+    registered_topic,
+    with_step,
+)
+from engine_mount.recordings.recording import Recording, open_recording
 from mount_recorder.session import time_text
 from mount_ros.topics import EVENT, Delivery
 
@@ -109,3 +116,70 @@ def _carried(topic: TopicInformation) -> slice:
         # Foreign ones may have several publishers that each say their part, as /tf_static does.
         return slice(None)
     return slice(0)
+
+
+Progress = Callable[[int, int], None]  # messages done, messages in all
+
+
+class RecoveryError(ValueError):
+    """Nothing of a recording can be recovered; the text says why."""
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What was kept and what is lost; `lost` is None where no summary or description counts the messages."""
+
+    folder: Path
+    kept: int
+    lost: int | None
+    kept_seconds: float  # from the first to the last message
+    complete: bool  # nothing of the file is lost
+    notes: tuple[str, ...]
+
+    def __str__(self) -> str:
+        kept = f'kept {self.kept} messages, {self.kept_seconds:.3f} s'
+        if self.complete:
+            return f'{kept}; nothing of the file is missing'
+        if self.lost is None:
+            return f'{kept}; lost what followed the last whole chunk: how much, the file cannot tell'
+        return f'{kept}; lost {self.lost} messages'
+
+
+def recover(
+    path: str | os.PathLike[str], out: str | os.PathLike[str], progress: Progress | None = None
+) -> Recovery:
+    """Write what is readable of the recording `path` to the new folder `out`.
+
+    Raises `ReadingError` where nothing can be opened, `RecoveryError` where no message is left.
+    """
+    recording = open_recording(path)
+    with BagCopy(out) as bag:
+        channels = {
+            (file, number): bag.channel_of(topic)
+            for file in recording.files
+            for number, topic in file.topics.items()
+        }
+        for file in recording.files:
+            for block in file.blocks(file.topics):
+                heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
+                for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
+                    bag.write(channels[file, number], raw, *head)
+                if progress is not None:
+                    progress(bag.added, recording.message_count)
+        if not bag.added:
+            reasons = '; '.join(recording.warnings) or 'it is empty'
+            raise RecoveryError(f'{path} holds no message that can be recovered: {reasons}')
+        origin = {'recovered_from': f'{recording.path.name}: {bag.added} messages'}
+        bag.complete(recording, {**custom_data(recording.information), **origin})
+    expected = recording.described_count
+    if recording.proven:
+        expected = sum(sum(file.message_counts.values()) for file in recording.files)
+    complete = recording.whole and (expected is None or expected <= bag.added)
+    return Recovery(
+        folder=bag.folder,
+        kept=bag.added,
+        lost=0 if complete else None if expected is None else max(0, expected - bag.added),
+        kept_seconds=bag.seconds,
+        complete=complete,
+        notes=tuple(recording.warnings),
+    )

@@ -1,1 +1,0 @@
-"""`engine-mount fleet`: many recordings, one file for each sub-command."""
