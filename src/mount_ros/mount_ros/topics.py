@@ -48,11 +48,6 @@ class Topic:
         return sample_rate if self.rate == SAMPLE_RATE else self.rate
 
     @property
-    def only_simulated(self) -> bool:
-        """Whether a car has no such topic: what the simulator alone knows, or instruments of a test rack."""
-        return self.name.startswith('sim/')
-
-    @property
     def names(self) -> tuple[str, ...]:
         """The names of the scalars in the order of the message."""
         return tuple(scalar.name for scalar in self.scalars)
