@@ -14,6 +14,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from ros_testing import wait_until
 from std_msgs.msg import String
 
+import mount_control
+import mount_models
+import mount_ros
 from mount_control.controller import ControlLaw, Controller
 from mount_control.node import MountControl
 from mount_control.policy import switched_viscous
@@ -31,7 +34,7 @@ from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
 
-SOURCES = Path(__file__).parents[2]
+OWN = tuple(str(Path(package.__file__).parent) for package in (mount_control, mount_models, mount_ros))
 MS = 1_000_000  # ns
 ACTIVATION = 5000 * MS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -200,12 +203,11 @@ def test_a_sample_passes_few_functions_and_its_setpoint_leaves_before_its_trace_
     active, sine, monkeypatch
 ):
     """Calls of the product's own functions, over 1000 samples, compiled ones and publishing among them."""
-    control, own, calls, until_setpoint = active(lockstep=False), str(SOURCES), [], []
+    control, calls, until_setpoint = active(lockstep=False), [], []
     layout, send = ScalarsLayout(topics.DISPLACEMENT), control._send_setpoint
 
     def note(frame, event, argument):
-        file = frame.f_code.co_filename
-        if event == 'call' and file.startswith(own) and file != __file__:
+        if event == 'call' and frame.f_code.co_filename.startswith(OWN):
             calls.append(frame.f_code.co_name)
 
     def send_and_note(raw):

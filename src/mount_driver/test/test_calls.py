@@ -12,13 +12,16 @@ from far_end import FarEnd, sample
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 
+import mount_driver
+import mount_models
+import mount_ros
 from mount_driver.exchange import Exchange
 from mount_driver.node import MountDriver
 from mount_driver.protocol import Status
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import CURRENT_SETPOINT
 
-OWN = str(Path(__file__).parents[2])
+OWN = tuple(str(Path(package.__file__).parent) for package in (mount_driver, mount_models, mount_ros))
 SAMPLES = 1000
 MOST_CALLS = 18  # three of them in mount_ros
 MOST_FILES = 9
@@ -47,7 +50,7 @@ class Calls:
             self._counting = True
         elif event == 'call' and code.co_name == 'send' and 'can' in Path(code.co_filename).parts:
             self._counting = False
-        elif event == 'call' and self._counting and code.co_filename.startswith((OWN, '<string')):
+        elif event == 'call' and self._counting and code.co_filename.startswith((*OWN, '<string')):
             self.of[Path(code.co_filename).name, code.co_qualname] += 1
 
 
