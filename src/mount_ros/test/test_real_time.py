@@ -34,6 +34,7 @@ class FakeThreads:
         if not self.permitted:
             raise PermissionError
         self.priorities[number] = priority
+        self.latest = number
 
     def of_python(self):
         return {WATCH, *BESIDE, 4, 5} & self.shown.keys()
@@ -130,8 +131,8 @@ def test_what_was_given_back_stays_so_until_an_activation_30_s_later(system):
     assert worked(whole, system, 0.75) == ''
     said = worked(whole, system, 0.9)
     assert re.search(r'thread data used 0\.\d\d of a core in 1\.\d s \(limit 0\.8\); lower the load', said)
-    whole.check()
     assert not system.prioritised()
+    assert system.latest == WATCH  # before, what spins would keep the watch from the processor
     whole.end(loop)
     assert whole.given_back
     whole.begin(loop)

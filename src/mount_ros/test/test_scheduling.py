@@ -52,13 +52,14 @@ class Spinning(SafeLifecycleNode):
         self.active_policy = 0, 0
         self.turn = iter(['configure', 'activate'])
     def configure(self):
-        path = self.open_data_path()
-        path.add_poll(lambda: True)  # never sleeps: there is always something to do
+        self.open_data_path().add_poll(self._spin)
+    def _spin(self):
+        # By the thread itself: beside it no other one of this node may have a turn until it is stepped down.
+        self.active_policy = max(self.active_policy, policy('data'))
+        return True  # never sleeps: there is always something to do
     def _turn(self):
         getattr(self, 'trigger_' + next(self.turn, 'nothing'), lambda: None)()
-        if self.real_time.held:
-            self.active_policy = max(self.active_policy, policy('data'))
-        if self.active and self.real_time.given_back:
+        if self.active and self.real_time.given_back and not self.real_time.held:
             print(self.active_policy, policy('data'), policy('MainThread'), flush=True)
             print(self.sentence, flush=True)
             os.kill(os.getpid(), 15)

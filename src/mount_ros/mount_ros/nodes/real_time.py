@@ -122,7 +122,8 @@ class RealTime:
                 self._threads.run(number, priority)
         except PermissionError:
             self.priority, wanted = 0, {}
-        for number in self._held.keys() - wanted.keys():
+        # The watch, the highest, last: a thread that spins would else keep it from the processor.
+        for number in sorted(self._held.keys() - wanted.keys(), key=self._held.__getitem__):
             self._threads.run(number, 0)
         self._held = wanted
 
