@@ -66,7 +66,7 @@ identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes
 pages: $(VENV)/.ready-dev ## write the pages of docs/reference that come from the code, and what the notebooks show
 	@for page in commands_page fleet_columns_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
 
-bench: $(VENV)/.ready ## performance figures as ratios, side by side in one run
+bench: $(VENV)/.ready-desk ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount bench
 
 lint: $(VENV)/.ready-dev ## style, types

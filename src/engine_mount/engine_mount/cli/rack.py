@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.commands.options import option, write_figures
+from engine_mount.cli.commands.options import OUTPUT, option, write_figures
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -23,7 +23,7 @@ def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'M
     return with_options(mapping.of(RACK), columns, known=RACK, stated=stated)
 
 
-def per_file(settings: list[str], files: list[Path], option: str) -> dict[Path, float]:
+def per_file(settings: list[str], files: list[Path], name: str) -> dict[Path, float]:
     """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
     values = {}
     for setting in settings:
@@ -32,9 +32,9 @@ def per_file(settings: list[str], files: list[Path], option: str) -> dict[Path, 
         if not equals or len(meant) != 1:
             what = 'no file' if not meant else f'{len(meant)} files'
             raise typer.BadParameter(
-                f'{option} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
+                f'{name} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
             )
-        values[meant[0]] = _number(text, f'{option} {setting}')
+        values[meant[0]] = _number(text, f'{name} {setting}')
     return values
 
 
@@ -79,7 +79,7 @@ def _number(text: str, where: str) -> float:
 
 Base = Annotated[Path | None, option('specimen that gives all other values; default: the shipped one')]
 Name = Annotated[str, option('name of the specimen; default: that of the base')]
-Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE')]
+Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE', panel=OUTPUT)]
 
 EXIT_CODES = 'Exit code: 0 when all that was asked for is written, 1 with the reason when not.\n\nExamples:'
 

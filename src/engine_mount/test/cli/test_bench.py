@@ -7,6 +7,7 @@ import pytest
 
 from engine_mount.cli.bench.bench import BenchOrder, Comparison
 from engine_mount.cli.bench.graph import run_relay
+from engine_mount.cli.bench.offline import imports
 from engine_mount.cli.commands import bench
 
 
@@ -36,6 +37,11 @@ def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain, tmp_path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('group', ['calls', 'storage'])
-def test_what_needs_no_graph_is_measured(group, command):
-    assert 'ratio' in command('bench', '--only', group)
+def test_one_sample_is_measured_beside_real_time(command):
+    assert 'ratio' in command('bench', '--only', 'calls')
+
+
+def test_an_import_is_measured_in_a_process_of_its_own():
+    found = imports(BenchOrder(1, 1.0, 1000.0, 0, 0), lambda what: None, seconds=10.0)
+    assert set(found) == {'import_csv', 'import_csv_memory', 'import_mf4', 'import_mf4_memory'}
+    assert found['import_mf4_memory'].other == 4 * 8 * 10_000

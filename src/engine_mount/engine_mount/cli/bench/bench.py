@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-GROUPS = {'calls': 'offline', 'storage': 'offline', 'fleet': 'offline', 'graph': 'graph'}
+GROUPS = {'calls': 'offline', 'imports': 'offline', 'graph': 'graph'}
 """What can be measured alone: the function of this name, and its module."""
 
 Report = Callable[[str], None]

@@ -10,9 +10,9 @@ from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
 from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option, write_figures
 from engine_mount.cli.help import named
 
-EPILOG = """Groups: `calls` (what one sample costs in core and in a replay), `storage` (loading a
-recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency of the graph in real time,
-beside a chain of empty nodes).
+EPILOG = """Groups: `calls` (cost of one sample in core and in a replay), `imports` (time and memory of the
+import of an hour from CSV and MDF4), `graph` (latency of the graph in real time, beside a chain of empty
+nodes).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
 
@@ -28,7 +28,7 @@ def bench(
     only: Annotated[
         list[str] | None, option('measure this group alone; may be repeated', 'GROUP', named('group'))
     ] = None,
-    rounds: Annotated[int, option('of each run of the graph; the median is told', least=1)] = 5,
+    rounds: Annotated[int, option('of each run of the graph; their median is the figure', least=1)] = 5,
     seconds: Annotated[float, option('length of a run in real time', least=1.0)] = 5.0,
     sample_rate: Annotated[float, option('samples per second of the graph and the chain', 'HZ')] = 1000.0,
     priority: Priority = 0,

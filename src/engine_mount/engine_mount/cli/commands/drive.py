@@ -5,6 +5,8 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import (
+    GRAPH,
+    OUTPUT,
     Columns,
     Dbc,
     Decimal,
@@ -116,32 +118,43 @@ def drive(
         ),
     ] = None,
     lockstep: Annotated[
-        bool, flag('--lockstep', 'the electronics wait for each answer: deterministic, faster')
+        bool, flag('--lockstep', 'the electronics wait for each answer: deterministic, faster', GRAPH)
     ] = False,
     apart: Annotated[
-        bool, flag('--apart', 'lock-step: each node in its own process, as in the car; slower')
+        bool, flag('--apart', 'lock-step: each node in its own process, as in the car; slower', GRAPH)
     ] = False,
     composed: Annotated[
-        bool, flag('--composed', 'driver, initialisation and control of the mount share a process')
+        bool, flag('--composed', 'driver, initialisation and control of the mount share a process', GRAPH)
     ] = False,
-    core: Annotated[bool, flag('--core', 'without middleware: plain function calls')] = False,
+    core: Annotated[bool, flag('--core', 'without middleware: plain function calls', GRAPH)] = False,
     duration: Annotated[
         float | None, option('length of the excitation, s; default: the recording, or 15 s', 'S')
     ] = None,
     sample_rate: Annotated[
-        float | None, option('how often the electronics measure, 500 .. 2000 Hz; default: 1000', 'HZ')
+        float | None,
+        option('how often the electronics measure, 500 .. 2000 Hz; default: 1000', 'HZ', panel=GRAPH),
     ] = None,
     seed: Annotated[int | None, option('seed of noise and road')] = None,
     settings: Settings = None,
     out: NewFolder = None,
     json_file: JsonFile = None,
     report: Annotated[
-        bool, typer.Option('--report/--no-report', help='draw the picture and write the page about the run')
+        bool,
+        typer.Option(
+            '--report/--no-report',
+            help='draw the picture and write the page about the run',
+            rich_help_panel=OUTPUT,
+        ),
     ] = True,
     split: Split = '',
     priority: Priority = 10,
     restarts: Annotated[
-        int, option('times that a node may be lost within a minute before the drive ends; 0: none', least=0)
+        int,
+        option(
+            'times that a node may be lost within a minute before the drive ends; 0: none',
+            least=0,
+            panel=GRAPH,
+        ),
     ] = RESTART_LIMIT,
     domain: Domain = None,
     namespace: Namespace = '',

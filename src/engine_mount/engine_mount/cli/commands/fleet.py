@@ -27,20 +27,9 @@ if TYPE_CHECKING:
 
     from engine_mount.cli.screen import TerminalScreen
 
-EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
+app = group('fleet', 'Many recordings: catalogue, what if, questions.')
 
-Examples:
-
-`engine-mount fleet example --out drives` - 200 recordings, some 7 s each
-
-`engine-mount fleet example --out few --recordings 24` - some of them, each kind of damage among them
-
-`engine-mount fleet example --out long --recordings 8 --seconds 600` - longer ones
-
-Ten drives in twenty variations (parameters, mounts, pieces); six are damaged, each in its own way. The same
-order makes the same bytes each time.
-"""
-INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which
+_INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which
 their rows tell; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
 
 Examples:
@@ -55,7 +44,7 @@ whose workers must reach the same places
 What did not change is not read again, what is gone leaves the catalogue. After Ctrl-C, or whatever ended it,
 the same command goes on where it stopped. Foreign files are imported first: `engine-mount import`.
 """
-REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why
+_REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why
 not; 1 when one could not be fetched, or the order was refused.
 
 Examples:
@@ -77,30 +66,7 @@ _GOES_ON = 'the same command goes on where it stopped'
 _LISTED = 10  # chosen: recordings that could not be fetched; all of them are in the table
 
 
-def example(
-    out: Annotated[Path, option('folder to create', 'FOLDER')],
-    recordings: Annotated[int, option('how many of the fleet, spread over it')] = 200,
-    seconds: Annotated[
-        float, option('length of the excitation of each drive, a sweep at most its own', 'S')
-    ] = 4.0,
-    workers: Workers = 0,
-) -> None:
-    """Make recordings of short simulated drives, a few of them damaged, to try a fleet on."""
-    from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.fleet.example import make_example
-
-    screen, failed = TerminalScreen(), 0
-    with screen.bar('driving') as show:
-        for count, done in enumerate(make_example(out, recordings, seconds, workers), 1):
-            show(count / recordings, detail=f'{count} of {recordings}')
-            if done.result is None:
-                failed += 1
-                screen.note(done.reason)
-    screen.say(f'recordings {recordings - failed} in {out}')
-    if failed:
-        raise typer.Exit(1)
-
-
+@app.command(cls=Command, epilog=_INDEX_EPILOG)
 def index(
     uris: Annotated[list[str], argument('folders or recordings, paths or URIs', 'URI...')],
     out: Annotated[Path, option('folder to make or to bring up to date', 'CATALOGUE')],
@@ -126,6 +92,7 @@ def index(
     write_figures(figures | {'wall_s': monotonic() - began}, json_file)
 
 
+@app.command(cls=Command, epilog=_REPLAY_EPILOG)
 def replay(
     places: Annotated[
         list[str],
@@ -197,7 +164,7 @@ def _note_question(screen: 'TerminalScreen', what: str, folder: Path, rows: str)
     screen.note(f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')
 
 
-QUERY_EPILOG = """Exit code: 0 when the question is answered, 1 with the reason when not.
+_QUERY_EPILOG = """Exit code: 0 when the question is answered, 1 with the reason when not.
 
 Examples:
 
@@ -211,7 +178,7 @@ Tables are `recordings` and `events` of a catalogue, `result` of a replay; their
 docs/reference/fleet_columns.md, and `describe result` lists them. A question is one SELECT: it writes
 nothing, and reads these tables and no other file.
 """
-WORST_EPILOG = """Exit code: 0 when the column is there, 1 with the reason when not.
+_WORST_EPILOG = """Exit code: 0 when the column is there, 1 with the reason when not.
 
 Examples:
 
@@ -221,7 +188,7 @@ Examples:
 
 `engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
-REPORT_EPILOG = """Exit code: 0 when the page is written, also where a recording could not be read again for
+_REPORT_EPILOG = """Exit code: 0 when the page is written, also where a recording could not be read again for
 its picture, which the page says; 1 when there is no result, or the page cannot be written.
 
 Examples:
@@ -231,9 +198,24 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
+_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
+
+Examples:
+
+`engine-mount fleet example --out drives` - 200 recordings, some 7 s each
+
+`engine-mount fleet example --out few --recordings 24` - some of them, each kind of damage among them
+
+`engine-mount fleet example --out long --recordings 8 --seconds 600` - longer ones
+
+Ten drives in twenty variations (parameters, mounts, pieces); six are damaged, each in its own way. The same
+order makes the same bytes each time.
+"""
+
 _NUMBERS = ('int', 'uint', 'float', 'double', 'decimal')
 
 
+@app.command(cls=Command, epilog=_QUERY_EPILOG)
 def query(
     folder: Annotated[Path, argument('catalogue or result', 'FOLDER')],
     sql: Annotated[str, argument('one SELECT', 'SQL')],
@@ -254,6 +236,7 @@ def query(
         _print_rows(answer, TerminalScreen())
 
 
+@app.command(cls=Command, epilog=_WORST_EPILOG)
 def worst(
     folder: Annotated[Path, argument('result or catalogue', 'FOLDER')],
     by: Annotated[str, option('column of numbers', 'COLUMN')],
@@ -275,6 +258,7 @@ def worst(
     write_figures({'by': by, 'worst': rows}, json_file)
 
 
+@app.command(cls=Command, epilog=_REPORT_EPILOG)
 def report(
     result: Annotated[Path, argument('folder of fleet replay', 'RESULT')],
     out: Annotated[Path | None, option('the page; default: report.html in RESULT', 'FILE')] = None,
@@ -297,6 +281,31 @@ def report(
         if look.reason:
             screen.note(f'{look.name}: no picture: {look.reason}')
     screen.say(f'report     {file}')
+
+
+@app.command(cls=Command, epilog=_EXAMPLE_EPILOG)
+def example(
+    out: Annotated[Path, option('folder to create', 'FOLDER')],
+    recordings: Annotated[int, option('how many of the fleet, spread over it')] = 200,
+    seconds: Annotated[
+        float, option('length of the excitation of each drive, a sweep at most its own', 'S')
+    ] = 4.0,
+    workers: Workers = 0,
+) -> None:
+    """Make recordings of short simulated drives, a few of them damaged, to try a fleet on."""
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.fleet.example import make_example
+
+    screen, failed = TerminalScreen(), 0
+    with screen.bar('driving') as show:
+        for count, done in enumerate(make_example(out, recordings, seconds, workers), 1):
+            show(count / recordings, detail=f'{count} of {recordings}')
+            if done.result is None:
+                failed += 1
+                screen.note(done.reason)
+    screen.say(f'recordings {recordings - failed} in {out}')
+    if failed:
+        raise typer.Exit(1)
 
 
 def _print_rows(answer: 'pyarrow.Table', screen: 'TerminalScreen') -> None:
@@ -338,19 +347,3 @@ def _json(answer: 'pyarrow.Table') -> str:
     )
     lines = ',\n'.join(json.dumps(row, ensure_ascii=False, allow_nan=False, default=str) for row in rows)
     return f'[\n{lines}\n]\n' if lines else '[]\n'
-
-
-app = group('fleet', 'Many recordings: catalogue, what if, questions.')
-
-_COMMANDS: tuple[tuple[Callable[..., None], str], ...] = (
-    (index, INDEX_EPILOG),
-    (replay, REPLAY_EPILOG),
-    (query, QUERY_EPILOG),
-    (worst, WORST_EPILOG),
-    (report, REPORT_EPILOG),
-    (example, EXAMPLE_EPILOG),
-)
-"""Function and epilog of each sub-command."""
-
-for _function, _epilog in _COMMANDS:
-    app.command(cls=Command, epilog=_epilog)(_function)

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
 
-PANELS = {'foreign file': 'Foreign file', 'recorded': 'Foreign file', 'road': 'Measured road'}
+FOREIGN, ROAD, GRAPH, OUTPUT = 'Foreign file', 'Measured road', 'Graph', 'Output'
+_BEGINNINGS = {'foreign file': FOREIGN, 'recorded': FOREIGN, 'road': ROAD, 'OpenCRG': ROAD}
 
 
 def option(
@@ -23,20 +24,25 @@ def option(
     *names: str,
     least: float | None = None,
     most: float | None = None,
+    panel: str | None = None,
 ) -> Any:
     """Return an option with its help `text`, the placeholder of its value, and limits.
 
-    Options whose text begins with a word of `PANELS` and a colon stand together in the help.
+    `panel` is the group in the help; options of files and roads have theirs by the beginning of their text.
     """
     return typer.Option(
         *names, help=text, metavar=metavar, autocompletion=complete, min=least, max=most,
-        rich_help_panel=PANELS.get(text.partition(':')[0]),
+        rich_help_panel=panel or _panel(text),
     )  # fmt: skip
 
 
-def flag(name: str, text: str) -> Any:
+def flag(name: str, text: str, panel: str | None = None) -> Any:
     """Return an option without a value, which is never negated."""
-    return typer.Option(name, help=text)
+    return typer.Option(name, help=text, rich_help_panel=panel or _panel(text))
+
+
+def _panel(text: str) -> str | None:
+    return next((panel for words, panel in _BEGINNINGS.items() if text.startswith(words)), None)
 
 
 def argument(text: str, metavar: str | None = None, complete: Completer | None = None) -> Any:
@@ -79,21 +85,24 @@ def write_figures(figures: Figures[str, Any], file: Path | None) -> None:
 
 RecordingPlace = Annotated[str, recording_argument()]
 RecordingPlaces = Annotated[list[str], recording_argument('RECORDING...')]
-NewFolder = Annotated[Path | None, option('folder to create; default: a new one in bags')]
-JsonFile = Annotated[Path | None, option('write all figures to this file', 'FILE', None, '--json')]
-Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE')]
-Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE')]
+NewFolder = Annotated[Path | None, option('folder to create; default: a new one in bags', panel=OUTPUT)]
+JsonFile = Annotated[
+    Path | None, option('write all figures to this file', 'FILE', None, '--json', panel=OUTPUT)
+]
+Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE', panel=OUTPUT)]
+Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE', panel=OUTPUT)]
 Listing = Annotated[bool, flag('--list', 'tell which there are')]
-Split = Annotated[str, option('largest file, such as 500MB; default: one file', 'SIZE')]
+Split = Annotated[str, option('largest file, such as 500MB; default: one file', 'SIZE', panel=OUTPUT)]
 Settings = Annotated[
     list[str] | None,
     option('any parameter of any node; may be repeated', '[NODE.]NAME=VALUE', setting, '--set'),
 ]
 Priority = Annotated[
-    int, option('real-time priority of the 1 kHz loop where permitted; 0: none', least=0, most=90)
+    int,
+    option('real-time priority of the 1 kHz loop where permitted; 0: none', least=0, most=90, panel=GRAPH),
 ]
-Domain = Annotated[int | None, option('ROS domain; default: ROS_DOMAIN_ID or 0')]
-Namespace = Annotated[str, option('namespace of the mount, such as mount_right')]
+Domain = Annotated[int | None, option('ROS domain; default: ROS_DOMAIN_ID or 0', panel=GRAPH)]
+Namespace = Annotated[str, option('namespace of the mount, such as mount_right', panel=GRAPH)]
 Columns = Annotated[
     list[str] | None,
     option(
