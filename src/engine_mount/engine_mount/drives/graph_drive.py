@@ -2,16 +2,11 @@
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 
-from rclpy.client import Client
-from std_srvs.srv import Trigger
-
 from engine_mount.drives.events import DriveEvents, line
 from engine_mount.drives.external_excitation import FOLDER
-from engine_mount.drives.record import mark_keys
 from engine_mount.recordings.screen import Screen
 from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.options import mounts_of, settings_of_mounts
@@ -110,25 +105,18 @@ def _parameters(
 def _watch(
     supervisor: Supervisor, events: DriveEvents, limit: float, screen: Screen, *, lockstep: bool
 ) -> None:
-    """Serve the graph to the end of the drive; in real time a key sets a mark."""
-    mark = supervisor.client(Trigger, f'{RECORDER.name}/mark')  # found by the time it is needed
+    """Serve the graph to the end of the drive; in real time the screen names the page about it."""
     first = supervisor.figures(SIM)
     scenario = supervisor.settings.parameters[SIM.name]['scenario']
-    # In lock-step the screen says nothing of the time in the stamps: no keys.
-    keys: AbstractContextManager[Callable[[float], int] | None] = nullcontext() if lockstep else mark_keys()
-    with keys as pressed, screen.bar(f'driving ({scenario})') as show:
+    with screen.bar(f'driving ({scenario})') as show:
         if not lockstep:
             where = f' --domain {supervisor.settings.domain}' if supervisor.settings.domain else ''
             where += f' --namespace {space}' if (space := supervisor.settings.namespace) else ''
             page = f'engine-mount view{where}, then http://127.0.0.1:8137'
             screen.say(line('look', f'in another terminal: {page}'))
-            if pressed is not None:
-                screen.say(line('mark', 'm or space'))
 
         def finished() -> bool:
             show(_share(first, supervisor.figures(SIM)), detail=events.damping)
-            if pressed is not None and pressed(0.0):
-                _set_mark(mark, screen)
             return supervisor.finished
 
         supervisor.wait_until(finished, limit, 'the end of the drive')
@@ -139,16 +127,3 @@ def _share(first: Mapping[str, str], now: Mapping[str, str]) -> float:
     begin = int(first.get('samples', 0))
     whole = int(now.get('samples_of_run', 1)) - begin
     return min(1.0, max(0.0, (int(now.get('samples', 0)) - begin) / whole)) if whole > 0 else 1.0
-
-
-def _set_mark(mark: Client, screen: Screen) -> None:
-    """Request a mark of the recorder."""
-
-    def answered(call: Any) -> None:
-        answer = call.result()
-        screen.say('marked' if answer.success else f'no mark was set: {answer.message}')
-
-    if mark.service_is_ready():
-        mark.call_async(Trigger.Request()).add_done_callback(answered)
-    else:
-        screen.say('no mark was set: the recorder is not there yet')

@@ -45,7 +45,6 @@ class Outcome:
     highest_current_a: float = 0.0  # on the bus while it lasted
     complaints: list[str] = field(default_factory=list)
     late: list[str] = field(default_factory=list)  # complaints about time alone
-    seen: bool = False  # the fault was injected
 
     @property
     def ok(self) -> bool:
@@ -71,7 +70,6 @@ def judge(case: FaultCase, course: Course, observed: Observers) -> Outcome:
     reports = [*since(observed.reports, begun, course.over), *course.printed]
     zero = _zero(case, begun, wanted)
     outcome = Outcome(
-        seen=True,
         zero_s=None if zero is None else round(zero - begun, 4),
         coil_current_a=round(truths[-1].coil_current, 3) if truths else None,
         highest_current_a=round(max((current for _, current in frames), default=0.0), 4),
@@ -98,7 +96,7 @@ def judge(case: FaultCase, course: Course, observed: Observers) -> Outcome:
         ]
         for error in errors[:1]:
             kind = outcome.late if _LATENESS.search(error.sentence) else outcome.complaints
-            kind.insert(0, f'{error.node} tells an error: {error.sentence}')
+            kind.insert(0, f'{error.node} reports an error: {error.sentence}')
     return outcome
 
 

@@ -1,4 +1,4 @@
-"""The matrix as a table in the terminal and as the page docs/reference/faults.md."""
+"""The matrix as the page docs/reference/faults.md."""
 
 import re
 from collections.abc import Mapping
@@ -6,12 +6,11 @@ from pathlib import Path
 
 from engine_mount.faults.case import SAFE, FaultCase, Reaction
 from engine_mount.faults.judge import AFTER_DETECTION, AFTER_OCCURRENCE, Outcome
-from engine_mount.recordings.screen import Table
 
 Rows = Mapping[FaultCase, Outcome]
 
 _RUN_FOLDER = re.compile(r'/\S*/(?=faults_\d+_\d+/)')  # of the machine that wrote the page
-HEADS = ('fault', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
+_HEADS = ('fault', 'what', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
 _INTRODUCTION = """# Faults
 
 What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make
@@ -40,13 +39,6 @@ sentence has a value, its limit and a remedy. And by its group:
 """
 
 
-def table(rows: Rows) -> Table:
-    """Return the outcomes as a table; those that are not as required are marked, with what is wrong."""
-    texts = [[*_cells(case, outcome)[:-1], outcome.recovery] for case, outcome in rows.items()]
-    marked = frozenset(place for place, outcome in enumerate(rows.values()) if not outcome.ok)
-    return Table('', 'llrrrll', texts, HEADS, marked=marked, ruled=True)
-
-
 def write_page(rows: Rows, file: Path) -> None:
     """Write the page about these outcomes; raises `OSError`."""
     parts = [_INTRODUCTION + ''.join(f'| {_title(each)} | {_required(each)} |\n' for each in Reaction)]
@@ -58,7 +50,7 @@ def write_page(rows: Rows, file: Path) -> None:
 
 
 def _section(reaction: Reaction, rows: Rows) -> str:
-    heads = '| fault | what | ' + ' | '.join(HEADS[1:]) + ' |\n' + '|---' * (len(HEADS) + 1) + '|\n'
+    heads = f'| {" | ".join(_HEADS)} |\n' + '|---' * len(_HEADS) + '|\n'
     lines = []
     for case, outcome in rows.items():
         name, *cells = _cells(case, outcome)

@@ -99,12 +99,19 @@ class _Session:
         self._tried: list[_Tried] = []
 
     def outcome(self, case: FaultCase) -> Outcome:
-        """Try a fault; once more, if it was not as required: a busy machine is late now and then."""
-        outcome = self._trial(case)
-        if outcome.ok:
-            return outcome
-        later = self._trial(case)
-        return later if later.seen or not outcome.seen else outcome
+        """Try a fault, in the graph that runs or in a fresh one."""
+        begin = time.time()
+        try:
+            graph = self._prepared(case)
+            begin = time.time()
+            outcome = try_fault(case, graph)
+        except GraphUnderTestError as error:
+            outcome = Outcome(complaints=[str(error)])
+        if self._graph is not None:
+            self._tried.append(_Tried(case, outcome, begin, time.time()))
+            if self._graph.ended:
+                self.end_graph()
+        return outcome
 
     def end_graph(self) -> None:
         """End the graph that runs, and add to the faults that it has seen what its end has shown."""
@@ -118,20 +125,6 @@ class _Session:
         for case, outcome, begin, end in tried:
             if not case.loses_samples:
                 outcome.complaints += _losses(graph.folder, begin, end)
-
-    def _trial(self, case: FaultCase) -> Outcome:
-        begin = time.time()
-        try:
-            graph = self._prepared(case)
-            begin = time.time()
-            outcome = try_fault(case, graph)
-        except GraphUnderTestError as error:
-            outcome = Outcome(complaints=[str(error)])
-        if self._graph is not None:
-            self._tried.append(_Tried(case, outcome, begin, time.time()))
-            if self._graph.ended:
-                self.end_graph()
-        return outcome
 
     def _prepared(self, case: FaultCase) -> GraphUnderTest:
         """Return a graph that damps without complaint, or that starts where the fault is one of the start."""

@@ -81,7 +81,7 @@ def test_a_fault_that_must_be_tolerated_may_not_switch_off_or_tell_an_error():
     assert judge(case(Reaction.TOLERATED), COURSE, observed(None)).ok
     assert 'damping should go on' in judge(case(Reaction.TOLERATED), COURSE, observed(10.1)).wrong
     wrong = judge(case(Reaction.TOLERATED), COURSE, observed(None, reports=(report(10.1),))).wrong
-    assert 'mount_driver tells an error' in wrong
+    assert 'mount_driver reports an error' in wrong
 
 
 def test_a_drive_that_has_ended_has_not_recovered_and_may_only_where_that_is_required():

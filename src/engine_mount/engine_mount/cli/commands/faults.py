@@ -19,8 +19,7 @@ from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
 
-The graphs run in real time, and a machine with other work makes them late: what was not as required is
-tried once more.
+The graphs run in real time, and a machine with other work makes them late: repeat a fault with `--only`.
 
 Examples:
 
@@ -47,7 +46,7 @@ def faults(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.faults.case import MATRIX
     from engine_mount.faults.graph import Place
-    from engine_mount.faults.page import table, write_page
+    from engine_mount.faults.page import write_page
     from engine_mount.faults.session import run_faults
     from engine_mount.recordings.screen import Table
     from engine_mount.settings.run_folder import make_run_folder
@@ -69,7 +68,6 @@ def faults(
             chosen, place, bar, lambda case, outcome: screen.say(f'{case.name}: {outcome.wrong or "ok"}')
         )
     told = {MATRIX[name]: outcome for name, outcome in outcomes.items()}
-    screen.table(table(told))
     write_figures({name: outcome.as_json() for name, outcome in outcomes.items()}, json_file)
     if page is not None:
         write_page(told, page)
