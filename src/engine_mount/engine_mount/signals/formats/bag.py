@@ -21,12 +21,6 @@ UNITS = {
 """Units by beginnings of paths, as the definitions of common_interfaces (Jazzy) and REP 103 say."""
 
 
-def is_recording(path: Path) -> bool:
-    """Return whether `path` is a bag: its folder, or one of its files, compressed or not."""
-    names = [file.name for file in path.iterdir()] if path.is_dir() else [path.name]
-    return any(kind in Path(name).suffixes for name in names for kind in ('.mcap', '.db3'))
-
-
 def open_bag(path: Path, stated: Stated) -> Content:
     """Return the fields of a recording of ROS 2, whole or in part; raises `SignalError`."""
     values: dict[tuple[str, str], FloatArray] = {}

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.signals.formats.bag import is_recording
 from engine_mount.signals.formats.content import Content, Stated
 from engine_mount.signals.formats.measured import Heading, Measured, Provenance, found
 from engine_mount.signals.signal import SignalError
@@ -67,6 +66,12 @@ def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ..
     """Return which columns the file or folder at `uri` has, without their values; raises as `read`."""
     with local_copy(str(uri)) as path:
         return _opened(path, stated or Stated()).headings
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether `path` is a bag: its folder, or one of its files, compressed or not."""
+    names = [file.name for file in path.iterdir()] if path.is_dir() else [path.name]
+    return any(kind in Path(name).suffixes for name in names for kind in ('.mcap', '.db3'))
 
 
 def is_foreign(path: Path) -> bool:
