@@ -15,7 +15,6 @@ from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.importing.channels import recorded_as
-from engine_mount.signals.importing.writing import told_mapping, told_provenance
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
 from engine_mount.signals.mapping import Mapping as ColumnMapping
 from engine_mount.signals.quantities import QUANTITIES
@@ -95,8 +94,8 @@ def recorded_acceleration(
     signal = selection.signals[_ACCELERATION]
     evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
     origin = {
-        **told_provenance(selection.provenance),
-        'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
+        **selection.provenance.for_session(),
+        'mapping': mapping.for_session(mapping_file.name if mapping_file else ''),
         'columns': selection.columns,
     }
     return ExternalExcitation(

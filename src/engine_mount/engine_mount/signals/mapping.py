@@ -6,7 +6,7 @@ One measuring system is one YAML file that a team shares; options of a command s
 import math
 from collections.abc import Mapping as Keys
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,12 @@ class Mapping:
     def only(self, columns: Keys[str, ColumnChoice]) -> 'Mapping':
         """Return the mapping with these columns alone."""
         return replace(self, columns=dict(columns), others={})
+
+    def for_session(self, file: str = '') -> dict[str, Any]:
+        """Return what a session says of it: its `file`, the measuring system, times that were said."""
+        times = {name: value for name, value in asdict(self.time).items() if value}
+        said = {'file': Path(file).name, 'system': self.system, 'time': times}
+        return {name: value for name, value in said.items() if value}
 
     def of(self, known: Quantities) -> 'Mapping':
         """Return the mapping of the `known` quantities alone, by the names that these have."""

@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.sources.uris import is_local, name_of, shown
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -20,6 +22,12 @@ class Provenance:
     size: int
     format: str
     reader: str
+
+    def for_session(self) -> dict[str, Any]:
+        """Return what a session says of a file: its name, any URI, hash, size, format, reader."""
+        uri = {} if is_local(self.uri) else {'uri': shown(self.uri)}
+        own = {'sha256': self.sha256, 'bytes': self.size, 'format': self.format, 'reader': self.reader}
+        return {'file': name_of(self.uri), **uri, **own}
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,22 +1,31 @@
-"""Signals in SI as they are recorded: those that drive something at its rate, others as sampled."""
+"""Signals in SI as the topics of a recording, message by message in the order of their stamps.
 
-from collections.abc import Mapping
+Those that drive something are written at its rate, others as sampled.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.signals.even_grid import EvenSignal, evenly_spaced
+from engine_mount.recordings.metadata import units_text
+from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 from engine_mount.signals.quantities import QUANTITIES, Quantity
 from engine_mount.signals.resampling import has_step, resampled
 from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_size
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
+from mount_recorder.bag_writer import BagWriter
+from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
+from mount_recorder.session import session_text
 from mount_ros import topics
-from mount_ros.messages.cdr import accelerometer
+from mount_ros.messages.cdr import accelerometer, string_message
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
-from mount_ros.topics import JOINT_STATE, Delivery, Scalar, Topic
+from mount_ros.topics import JOINT_STATE, SESSION, Delivery, Scalar, Topic
 
 DISPLACEMENT, ENGINE, CHASSIS = 'displacement', 'engine_displacement', 'chassis_displacement'
 ACCELERATION = 'acceleration'
@@ -26,6 +35,9 @@ LONGEST_GAP = 0.125
 """s: one period of the 8 Hz at which an engine moves on its mounts cannot be interpolated."""
 PREFIX = 'measured/'
 """The beginning of topics that only foreign recordings have."""
+SCENARIO = 'imported'
+"""The scenario of such a recording, as its session tells it."""
+_BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for each topic
 Times = NDArray[np.int64]
 
 
@@ -75,10 +87,19 @@ def channels_of(
     found: dict[str, tuple[Times, FloatArray]] = {}
     ends = (DISPLACEMENT,) if DISPLACEMENT in signals else (ENGINE, CHASSIS)
     if all(name in signals for name in ends):
-        found[DISPLACEMENT] = _displacement({name: signals[name] for name in ends}, notes)
+        sides = [signals[name] for name in ends]
+        stamps, (upper, *lower) = _resampled(sides, LOWEST_RATE, SHORTEST, notes)
+        found[DISPLACEMENT] = stamps, upper - sum(lower)
+        check_size(
+            ' and '.join(one.name for one in sides), found[DISPLACEMENT][1], 1.0 / SAMPLE_RATE,
+            ControlParameters().displacement_range, 'm',
+            'is its unit another one, its zero another offset (in a mapping file), or is this sample a fault '
+            'to cut out?',
+        )  # fmt: skip
     for name, signal in signals.items():
         if name == ACCELERATION:
-            found[name] = _acceleration(signal, notes)
+            stamps, (values,) = _resampled([signal], LOWEST_RATE_OF_ACCELERATION, 0.0, notes)
+            found[name] = stamps, values
         elif name != DISPLACEMENT:
             found[name] = _as_sampled(signal)
     wanted = {name: quantities.get(name) or QUANTITIES[name] for name in found}
@@ -87,66 +108,54 @@ def channels_of(
     ], list(dict.fromkeys(notes))
 
 
-def displacement_on_grid(
-    signals: Mapping[str, EvenSignal], sample_rate: float, notes: list[str]
-) -> tuple[Times, FloatArray]:
-    """Return stamps (ns) of `sample_rate` (Hz) and the displacement on them, in the unit of the signals.
+def write_channels(
+    folder: Path, channels: Sequence[Channel], session: dict[str, Any], progress: Callable[[float], None]
+) -> None:
+    """Write the recording `folder`; log times are the stamps. `progress` takes the share that is done."""
+    writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
+    begin = min(int(channel.stamps[0]) for channel in channels)
+    end = max(int(channel.stamps[-1]) for channel in channels)
+    try:
+        writer.add_topic(f'/{SESSION.name}', SESSION.type)
+        for channel in channels:
+            topic = channel.place.topic
+            # of topics that every command takes the registry tells the unit
+            units = {channel.place.field: channel.unit} if topic.name.startswith(PREFIX) else {}
+            writer.add_topic(f'/{topic.name}', topic.type, details=units_text(units))
+        writer.write(f'/{SESSION.name}', string_message(session_text(session)), begin)
+        for first in range(begin, end + 1, _BLOCK):
+            _write_block(writer, channels, first, first + _BLOCK)
+            progress(min(1.0, (first + _BLOCK - begin) / (end + 1 - begin)))
+    finally:
+        writer.close()
 
-    `signals` are {`displacement`: signal} or those of engine and chassis, whose difference it is. Adds what
-    was done to `notes`; raises `SignalError`.
+
+def _resampled(
+    signals: Sequence[Signal], lowest_rate: float, shortest: float, notes: list[str]
+) -> tuple[Times, list[FloatArray]]:
+    """Return stamps (ns) at the rate of a drive for as long as all signals last, and the values of each.
+
+    Adds what was done to `notes`; raises `SignalError`, also where they last for less than `shortest` (s).
     """
-    step, step_ns = 1.0 / sample_rate, sample_time_ns(sample_rate)
-    begin = max(even.begin for even in signals.values())
-    end = min(even.begin + round(even.length * SECOND) for even in signals.values())
-    count = round((end - begin) / step_ns) + 1
-    if count * step < SHORTEST:
-        spans = '; '.join(
-            f'{even.name}: {even.begin / 1e9:.3f} .. {even.begin / 1e9 + even.length:.3f} s'
-            for even in signals.values()
-        )
-        raise SignalError(f'no overlap of {SHORTEST:g} s or more: {spans}')
-    values = {
-        name: resampled(even, step, (begin - even.begin) / SECOND, count)[:] for name, even in signals.items()
-    }
-    for even in signals.values():
-        _note_resampling(even, sample_rate, notes)
-    stamps = np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64)
-    return stamps, values[DISPLACEMENT] if DISPLACEMENT in values else values[ENGINE] - values[CHASSIS]
-
-
-def rate_text(sample_rate: float) -> str:
-    """Return a sample rate (Hz) in words."""
-    return f'{sample_rate / 1000.0:g} kHz'
-
-
-def _note_resampling(even: EvenSignal, sample_rate: float, notes: list[str]) -> None:
-    if not has_step(even, 1.0 / sample_rate):
-        rates = f'from {even.rate:.4g} Hz to {rate_text(sample_rate)}'
-        notes.append(f'{even.name}: resampled {rates}, band-limited')
-
-
-def _displacement(signals: Mapping[str, Signal], notes: list[str]) -> tuple[Times, FloatArray]:
-    even = {name: evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE) for name, signal in signals.items()}
-    for one in even.values():
-        notes += one.notes
-    stamps, values = displacement_on_grid(even, SAMPLE_RATE, notes)
-    check_size(
-        ' and '.join(one.name for one in even.values()), values, 1.0 / SAMPLE_RATE,
-        ControlParameters().displacement_range, 'm',
-        'is its unit another one, its zero another offset (in a mapping file), or is this sample a fault to '
-        'cut out?',
-    )  # fmt: skip
-    return stamps, values
-
-
-def _acceleration(signal: Signal, notes: list[str]) -> tuple[Times, FloatArray]:
-    """Return the acceleration at the rate that its topic has."""
-    even = evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE_OF_ACCELERATION)
-    notes += even.notes
-    _note_resampling(even, SAMPLE_RATE, notes)
+    even = [evenly_spaced(signal, LONGEST_GAP, lowest_rate) for signal in signals]
+    notes += [note for one in even for note in one.notes]
     step, step_ns = 1.0 / SAMPLE_RATE, sample_time_ns(SAMPLE_RATE)
-    values = resampled(even, step, 0.0, round(even.length / step) + 1)[:]
-    return np.arange(even.begin, even.begin + values.size * step_ns, step_ns, dtype=np.int64), values
+    ends = [one.begin + round(one.length * SECOND) for one in even]
+    begin = max(one.begin for one in even)
+    count = round((min(ends) - begin) / step_ns) + 1
+    if count * step < shortest:
+        spans = '; '.join(
+            f'{one.name}: {one.begin / SECOND:.3f} .. {end / SECOND:.3f} s'
+            for one, end in zip(even, ends, strict=True)
+        )
+        raise SignalError(f'no overlap of {shortest:g} s or more: {spans}')
+    notes += [
+        f'{one.name}: resampled from {one.rate:.4g} Hz to {SAMPLE_RATE / 1000.0:g} kHz, band-limited'
+        for one in even
+        if not has_step(one, step)
+    ]
+    values = [resampled(one, step, (begin - one.begin) / SECOND, count)[:] for one in even]
+    return np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64), values
 
 
 def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:
@@ -159,3 +168,20 @@ def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:
             f'{signal.times[place + 1]:.6f} s; sort the samples, or cut the file there'
         )
     return stamps, signal.values
+
+
+def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, behind: int) -> None:
+    """Write the messages from `first` on and before `behind` (ns)."""
+    topics: list[str] = []
+    messages: list[bytes] = []
+    stamps = [np.zeros(0, np.int64)]
+    for channel in channels:
+        part = slice(*np.searchsorted(channel.stamps, [first, behind]))
+        if part.start < part.stop:
+            rows = channel.place.rows(channel.stamps[part], channel.values[part])
+            topics += [f'/{channel.place.topic.name}'] * len(rows)
+            messages += rows.view(f'V{rows.shape[1]}').ravel().tolist()
+            stamps.append(channel.stamps[part])
+    times = np.concatenate(stamps)
+    for place in np.argsort(times, kind='stable').tolist():
+        writer.write(topics[place], messages[place], int(times[place]))

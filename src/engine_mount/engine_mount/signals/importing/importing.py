@@ -1,31 +1,41 @@
 """A foreign file made into a recording that every command takes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from collections.abc import Mapping as Keys
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.channels import CHASSIS, DISPLACEMENT, ENGINE, Channel, channels_of
-from engine_mount.signals.importing.parts import parts_of
-from engine_mount.signals.importing.writing import (
+from engine_mount.signals.importing.channels import (
+    ACCELERATION,
+    CHASSIS,
+    DISPLACEMENT,
+    ENGINE,
+    LONGEST_GAP,
     SCENARIO,
-    Told,
-    told_mapping,
-    told_provenance,
+    SHORTEST,
+    channels_of,
     write_channels,
 )
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, mapping_in_file, with_options
 from engine_mount.signals.quantities import QUANTITIES, titled
 from engine_mount.signals.selection import Selection, select
-from engine_mount.signals.signal import SECOND, SignalError
+from engine_mount.signals.signal import FEWEST, SECOND, Signal, SignalError
 from engine_mount.signals.times import is_time
 from engine_mount.signals.units import is_unit
 from mount_recorder.session import new_session
 
+DRIVING = (DISPLACEMENT, ENGINE, CHASSIS, ACCELERATION)
+"""Quantities that controller or simulated car follow: a longer gap in one parts the recording."""
 _BY_TITLES = Mapping()
+Span = tuple[int, int]  # begin and end, ns
+Part = tuple[int, int, dict[str, Signal]]
+"""What of all signals lies between two gaps, from its begin to its end in ns on the clock of the signals."""
 
 
 @dataclass
@@ -63,30 +73,37 @@ def import_file(
     chosen = with_options(chosen, columns, time, rate, stated=stated)
     progress(0.0, 'reading')
     selection = read_file(file, chosen)
-    parts, cuts = parts_of(selection.signals)
+    parts, cuts = _parts_of(selection.signals)
     own = (note for signal in selection.signals.values() for note in signal.notes)
     notes = [*selection.notes, *own, *cuts]
     selection = replace(selection, signals={})  # else an hour is held to the end
     shift = 0
-    if parts[0].begin < SECOND:  # a replay dates the force table before the first sample
-        shift = SECOND - min(parts[0].begin, 0)
+    if parts[0][0] < SECOND:  # a replay dates the force table before the first sample
+        shift = SECOND - min(parts[0][0], 0)
         notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
     imported, written = Imported(), []
     while parts:
-        part = parts.pop(0)
-        signals = {name: replace(one, begin=one.begin + shift) for name, one in part.signals.items()}
+        begin, end, inside = parts.pop(0)
+        signals = {name: replace(one, begin=one.begin + shift) for name, one in inside.items()}
         channels, done = channels_of(signals, selection.quantities)
         notes += done
         written.append(channels)
-        imported.lengths.append((part.end - part.begin) / SECOND)
-    del part, signals
+        imported.lengths.append((end - begin) / SECOND)
+    del inside, signals
     imported.notes = list(dict.fromkeys(notes))
     for number, channels in enumerate(written):
         folder = Path(out)
         if len(written) > 1:
             folder = folder.with_name(f'{folder.name}_{number + 1}')
-        piece = f'{number + 1} of {len(written)}'
-        session = _session(told_mapping(chosen, name), selection, channels, imported.notes, piece)
+        told = {
+            'files': [selection.provenance.for_session()],
+            'piece': f'{number + 1} of {len(written)}',
+            'mapping': chosen.for_session(name),
+            'columns': selection.columns,
+            'topics': {f'/{one.place.topic.name}': f'{one.place.field} in {one.unit}' for one in channels},
+            'notes': imported.notes,
+        }
+        session = new_session({'scenario': SCENARIO, 'mode': 'import', 'imported': told})
 
         def show(share: float, begun: int = number) -> None:
             progress((begun + share) / len(written), 'writing')
@@ -97,20 +114,6 @@ def import_file(
             topic = f'/{channel.place.topic.name}'
             imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
     return imported
-
-
-def _session(
-    mapping: Told, selection: Selection, channels: Sequence[Channel], notes: Sequence[str], piece: str
-) -> dict[str, Any]:
-    imported = {
-        'files': [told_provenance(selection.provenance)],
-        'piece': piece,
-        'mapping': mapping,
-        'columns': selection.columns,
-        'topics': {f'/{one.place.topic.name}': f'{one.place.field} in {one.unit}' for one in channels},
-        'notes': list(notes),
-    }
-    return new_session({'scenario': SCENARIO, 'mode': 'import', 'imported': imported})
 
 
 def read_file(file: str | Path, mapping: Mapping) -> Selection:
@@ -141,3 +144,67 @@ def _columns_by_titles(file: str | Path, mapping: Mapping) -> dict[str, ColumnCh
             f'{listed(there)}'
         )
     return columns
+
+
+def _parts_of(signals: Keys[str, Signal]) -> tuple[list[Part], list[str]]:
+    """Return the parts of `signals` (SI) without gaps of more than `LONGEST_GAP`, and sentences on the cuts.
+
+    Raises `SignalError` where no part is as long as `SHORTEST`.
+    """
+    driving = [signal for name, signal in signals.items() if name in DRIVING]
+    spans = _spans(driving) if driving else [_whole(signals.values())]
+    long_enough = [span for span in spans if span[1] - span[0] >= SHORTEST * SECOND]
+    if not long_enough:
+        longest = max((end - begin for begin, end in spans), default=0) / SECOND
+        raise SignalError(
+            f'{", ".join(one.name for one in driving or signals.values())}: the longest part without a gap '
+            f'of more than {LONGEST_GAP:g} s is {longest:.3f} s long; {SHORTEST:g} s are needed'
+        )
+    notes = [
+        f'a gap of {(after - end) / SECOND:.3f} s at {(end - spans[0][0]) / SECOND:.3f} s: what follows it '
+        'is a drive of its own'
+        for (_, end), (after, _) in pairwise(spans)
+    ]
+    short = len(spans) - len(long_enough)
+    if short:
+        notes.append(f'{short} parts shorter than {SHORTEST:g} s between gaps are left out')
+    return [_part(signals, span) for span in long_enough], notes
+
+
+def _whole(signals: Collection[Signal]) -> Span:
+    begins = [one.begin + round(SECOND * float(one.times.min())) for one in signals]
+    ends = [one.begin + round(SECOND * float(one.times.max())) for one in signals]
+    return min(begins), max(ends)
+
+
+def _spans(signals: Sequence[Signal]) -> list[Span]:
+    """Return where all signals are without gaps, in order."""
+    own = [_whole([signal]) for signal in signals]
+    at, end = max(begin for begin, _ in own), min(end for _, end in own)
+    pauses: list[list[int]] = []
+    for signal in signals:
+        places = np.flatnonzero(np.diff(signal.times) > LONGEST_GAP)
+        sides = np.stack([signal.times[places], signal.times[places + 1]], axis=1)
+        pauses += (signal.begin + np.rint(SECOND * sides).astype(np.int64)).tolist()
+    spans = []
+    for before, after in [*sorted(pauses), [end, end]]:
+        if min(before, end) > at:
+            spans.append((at, min(before, end)))
+        at = max(at, after)
+    return spans
+
+
+def _part(signals: Keys[str, Signal], span: Span) -> Part:
+    """Return the samples between two times, both included; signals with too few there are left out."""
+    found = {}
+    for name, signal in signals.items():
+        begin, end = ((edge - signal.begin) / SECOND for edge in span)
+        slack = 0.5 / SECOND  # of the rounding to ns
+        inside = (signal.times >= begin - slack) & (signal.times <= end + slack)
+        if inside.all():
+            found[name] = signal
+        elif np.count_nonzero(inside) >= FEWEST:
+            times, values = signal.times[inside], signal.values[inside]
+            first = signal.begin + round(SECOND * float(times[0]))
+            found[name] = replace(signal, times=times - times[0], values=values, begin=first)
+    return *span, found

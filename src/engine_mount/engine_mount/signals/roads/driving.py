@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from engine_mount.signals.even_grid import EvenSignal
-from engine_mount.signals.importing.writing import told_provenance
 from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.iso8608 import (
     LONGEST_WAVE,
@@ -127,7 +126,7 @@ def wheel_height(
         )
     found = unevenness(profile)
     told: dict[str, object] = {
-        **told_provenance(profile.provenance),
+        **profile.provenance.for_session(),
         'length_m': round(profile.length, 3),
         'spacing_m': round(profile.spacing, 6),
         'iso_8608': f'{found.letter}, Gd {1e6 * found.roughness:.3g}e-6 m^3, waviness {found.waviness:.2f}',
