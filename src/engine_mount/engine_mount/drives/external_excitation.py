@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from engine_mount.recordings.recording import recording_hash
+from engine_mount.signals.channels import recorded_as
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.channels import recorded_as
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
 from engine_mount.signals.mapping import Mapping as ColumnMapping
 from engine_mount.signals.quantities import QUANTITIES

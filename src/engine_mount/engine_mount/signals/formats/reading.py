@@ -36,7 +36,7 @@ _SUFFIXES = {
 """Formats by suffix, where the first bytes do not tell."""
 _MODULES = {
     'npy': 'arrays', 'npz': 'arrays', 'array_folder': 'arrays', 'json': 'trees', 'matlab': 'trees',
-    'hdf5': 'trees', 'can_log': 'can_frames',
+    'hdf5': 'trees', 'parquet': 'trees', 'can_log': 'can_frames',
 }  # fmt: skip
 """Where `open_FORMAT` is, if not in a module called like the format."""
 

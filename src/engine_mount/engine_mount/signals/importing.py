@@ -8,10 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.formats.measured import listed
-from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.channels import (
+from engine_mount.signals.channels import (
     ACCELERATION,
     CHASSIS,
     DISPLACEMENT,
@@ -22,6 +19,9 @@ from engine_mount.signals.importing.channels import (
     channels_of,
     write_channels,
 )
+from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.measured import listed
+from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, mapping_in_file, with_options
 from engine_mount.signals.quantities import QUANTITIES, titled
 from engine_mount.signals.selection import Selection, select
