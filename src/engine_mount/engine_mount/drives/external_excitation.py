@@ -12,7 +12,7 @@ from engine_mount.recordings.recording import recording_hash
 from engine_mount.signals.channels import recorded_as
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
@@ -69,7 +69,7 @@ def recorded_acceleration(
     rate: float | None = None,
     scale: float | None = None,
     mapping_file: Path | None = None,
-    stated: Stated | None = None,
+    stated: Stated = NOT_STATED,
 ) -> ExternalExcitation:
     """Return the acceleration that `columns` (`COLUMN[:UNIT]`) choose in `file`, a path or URI, in m/s^2.
 

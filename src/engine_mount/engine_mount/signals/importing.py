@@ -19,7 +19,7 @@ from engine_mount.signals.channels import (
     channels_of,
     write_channels,
 )
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, mapping_in_file, with_options
@@ -59,7 +59,7 @@ def import_file(
     time: str = '',
     rate: float | None = None,
     mapping: Mapping | str | Path = _BY_TITLES,
-    stated: Stated | None = None,
+    stated: Stated = NOT_STATED,
     progress: Callable[[float, str], None] = lambda share, what: None,
 ) -> Imported:
     """Write a foreign `file`, path or URI, as the recording `out`, or one with a number for each part.

@@ -46,11 +46,6 @@ class Selection:
     provenance: Provenance
     notes: tuple[str, ...]
 
-    @property
-    def name(self) -> str:
-        """The name of the file."""
-        return name_of(self.provenance.uri)
-
 
 def select(
     source: str | Path | Measured, choices: Mapping | Keys[str, str], known: Quantities = QUANTITIES
@@ -82,7 +77,7 @@ def select_rows(
     there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
     uri = source.provenance.uri if isinstance(source, Measured) else str(source)
     for named in mapping.columns.values():
-        heading_of(there, named.column, uri)
+        found(named.column, there, uri)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
@@ -99,20 +94,6 @@ def select_rows(
     rows = {'time': first.times} if timed else {}
     rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
     return {name: values[inside] for name, values in rows.items()}
-
-
-def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
-    """Return the heading that `wanted` names; raises `SignalError`, also for an unknown unit behind it."""
-    try:
-        return found(wanted, there, uri)
-    except SignalError:
-        name, _, unit = wanted.rpartition(':')
-        if name in {text for one in there for text in (one.name, one.header)}:
-            try:
-                unit_of(unit)
-            except SignalError as error:
-                raise SignalError(f'{uri}, column {name!r}: {error}') from None
-        raise
 
 
 def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
@@ -136,7 +117,7 @@ def _select(
     uri = measured.provenance.uri
     signals, quantities, columns = {}, {}, {}
     for name, choice in mapping.choices.items():
-        column = measured.column(heading_of(measured.headings, choice.column, uri).name)
+        column = measured.column(choice.column)
         wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
         where = f'{name_of(uri)}, column {column.name!r}'
         base, notes = column.time, ()
@@ -146,14 +127,24 @@ def _select(
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
         is_known = _known(where, column, base, whole=whole)
         own = replace(column, values=column.values[is_known])
-        values, facts, more = _in_si(where, own, wanted, choice, mapping.option)
+        unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
+        values = unit.to_si(own.values)
+        values *= scale  # in place: it can be an hour
+        offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
+        if offset:
+            values -= offset
+            which = 'its mean' if choice.offset == MEAN else 'as said'
+            more.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
         times = base.times[is_known]
         begin = base.begin + round(SECOND * float(times[0]))
         if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
         signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
-        offset = {'offset': choice.offset} if choice.offset else {}
-        columns[name] = {**facts, 'times': base.told, 'samples': int(values.size), **offset}
+        columns[name] = {
+            'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
+            'times': base.told, 'samples': int(values.size),
+            **({'offset': choice.offset} if choice.offset else {}),
+        }  # fmt: skip
         quantities[name] = wanted
     return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
@@ -164,7 +155,7 @@ def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     wanted = [choice.column for choice in mapping.choices.values()]
     if timed and mapping.time.column:
         wanted.append(mapping.time.column)
-    names = {heading_of(there, text, str(source)).name for text in wanted}
+    names = {found(text, there, str(source)).name for text in wanted}
     guessed = timed and not mapping.time.column
     chosen = [one.name for one in there if one.name in names or (guessed and is_time(one))]
     return read(source, chosen, mapping.stated)
@@ -210,22 +201,6 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
         raise SignalError(f'{where}: {said} ({bad.size} such of {known.size}); repair it or cut it out')
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
     return known
-
-
-def _in_si(
-    where: str, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice, option: str
-) -> tuple[FloatArray, dict[str, Any], list[str]]:
-    """Return the values in SI, what a session tells of them, and sentences."""
-    unit, scale, notes = unit_of_column(where, column, wanted, choice, option)
-    values = unit.to_si(column.values)
-    values *= scale  # in place: it can be an hour
-    facts = {'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol}
-    offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
-    if offset:
-        values -= offset
-        which = 'its mean' if choice.offset == MEAN else 'as said'
-        notes.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
-    return values, facts, notes
 
 
 def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:

@@ -6,6 +6,7 @@ from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.sources.uris import is_local, name_of, shown
+from engine_mount.signals.units import unit_of
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -98,7 +99,8 @@ class Measured:
 def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
     """Return the heading meant by `wanted`: its name, header, last part of the name, or number from 0 on.
 
-    Names are tried in this order, then once more without regard to capitals; raises `SignalError`.
+    Names are tried in this order, then once more without regard to capitals; raises `SignalError`, also for
+    an unknown unit behind a name.
     """
     for fitting in _fitting(wanted, headings):
         if len(fitting) == 1:
@@ -107,6 +109,12 @@ def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
             raise SignalError(
                 f'{uri}: column {wanted!r} is ambiguous: {listed(fitting)}; name one of these in full'
             )
+    name, _, unit = wanted.rpartition(':')
+    if any(name in (one.name, one.header) for one in headings):
+        try:
+            unit_of(unit)
+        except SignalError as error:
+            raise SignalError(f'{uri}, column {name!r}: {error}') from None
     raise SignalError(f'{uri} has no column {wanted!r}; its columns are {listed(headings)}')
 
 

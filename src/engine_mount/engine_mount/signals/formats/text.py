@@ -53,7 +53,13 @@ def open_text(path: Path, stated: Stated) -> Content:
 
     def prepare(numbers: Sequence[int]) -> None:
         places = list(dict.fromkeys([*numbers, *dates]))
-        columns.update(zip(places, _read(path, codec, dialect, first, places, titles), strict=True))
+        blocks = [
+            _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
+            for number, block in (_samples(path, codec, dialect, first) if places else ())
+        ]
+        if places and not blocks:
+            raise SignalError(f'{path} holds no samples; needed are lines below the titles')
+        columns.update(zip(places, map(np.concatenate, zip(*blocks, strict=True)), strict=True))
 
     leaves = [
         Leaf(
@@ -180,19 +186,6 @@ def _left_out(lines: Sequence[str]) -> list[str]:
 
 
 # Samples.
-
-
-def _read(
-    path: Path, codec: str, dialect: Dialect, first: int, places: Sequence[int], titles: Sequence[str]
-) -> list[NDArray[Any]]:
-    """Return the columns at `places`; raises `SignalError` with line, column and cell."""
-    blocks = [
-        _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
-        for number, block in (_samples(path, codec, dialect, first) if places else ())
-    ]
-    if places and not blocks:
-        raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [np.concatenate([block[number] for block in blocks]) for number in range(len(places))]
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:
