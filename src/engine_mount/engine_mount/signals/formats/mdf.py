@@ -28,8 +28,7 @@ def open_mdf(path: Path, stated: Stated) -> Content:
             f'{path} is no readable MDF file: byte 64 is {head[64:68].hex() or "missing"} where its '
             'header block begins with HD or ##HD; is it cut off, or another format?'
         )
-    notes: list[str] = []
-    frames = None
+    notes, reader = list[str](), 'asammdf'
     with readable(path, 'MDF file'):
         # By a stream, for a path would be mapped whole into memory; of a logger that never closed its file
         # asammdf completes a copy. Frames are decoded by the user's database, by one within the file only
@@ -45,19 +44,13 @@ def open_mdf(path: Path, stated: Stated) -> Content:
         leaves = _leaves(file, path, begin, notes)
         raw = any(channel.name == FRAME for group in file.groups for channel in group.channels)
         if raw and stated.dbc is not None:
-            frames = frames_in_mdf(file, path, stated.dbc, notes)
-    content = Content(path, f'MDF {file.version}', 'asammdf', leaves, notes)
-    if frames is not None:
-        own = len(leaves)
-        decoded, decode = frames.leaves(begin)
-        content.leaves = [*leaves, *decoded]
-        content.reader = 'asammdf, cantools'
-        content.prepare = lambda numbers: decode([number - own for number in numbers if number >= own])
-    elif raw and not leaves:
-        raise SignalError(f'{path} holds raw CAN frames; {NO_DATABASE}')
-    elif raw:
-        notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
-    return content
+            leaves += frames_in_mdf(file, path, stated.dbc, notes).leaves(begin)
+            reader = 'asammdf, cantools'
+        elif raw and not leaves:
+            raise SignalError(f'{path} holds raw CAN frames; {NO_DATABASE}')
+        elif raw:
+            notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
+    return Content(path, f'MDF {file.version}', reader, leaves, notes)
 
 
 def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:

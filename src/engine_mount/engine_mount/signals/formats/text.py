@@ -26,7 +26,7 @@ from engine_mount.signals.formats.cells import (
     titles_and_units,
 )
 from engine_mount.signals.formats.content import Content, Leaf, Stated, with_dates
-from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment
+from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment, is_content
 from engine_mount.signals.signal import SignalError
 
 HEAD = 1 << 18
@@ -119,7 +119,7 @@ def _titles(
     path: Path, dialect: Dialect, above: Sequence[str]
 ) -> tuple[list[str], list[str], int, list[str]]:
     """Return titles, units or [], the number of the first line of samples, and notes."""
-    plain = [text for text in above if text.strip() and not is_comment(text)]
+    plain = [text for text in above if is_content(text)]
     found = [_as_titles(text, dialect) for text in plain]
     units = found.pop() if len(found) > 1 and found[-2] and is_unit_row(found[-1]) else []
     if found and found[-1]:
@@ -149,9 +149,9 @@ def _as_titles(text: str, dialect: Dialect) -> list[str]:
     if dialect.delimiter == BLANK and len(cells) != width:
         cells = _GAPS.split(text.strip())
     while len(cells) > width and not cells[-1]:
-        cells = cells[:-1]
+        cells.pop()
     if len(cells) == width - 1 and dialect.kinds[-1] == 'missing':
-        cells = [*cells, '']
+        cells.append('')
     words = [cell for cell in cells if kind_of(cell, dialect.decimal) not in ('number', 'missing')]
     return cells if len(cells) == width and words else []
 
