@@ -26,8 +26,8 @@ FOLDER = 'given'
 """In the folder of a run: the files that its simulator reads."""
 _ACCELERATION = 'acceleration'
 _QUANTITY = {_ACCELERATION: QUANTITIES[_ACCELERATION]}
-_OWN = recorded_as(QUANTITIES[_ACCELERATION])
-_OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
+_TOPIC, _FIELD = recorded_as(QUANTITIES[_ACCELERATION])
+_OWN_COLUMN = f'/{_TOPIC.name}.{_FIELD}'
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from mount_recorder.mcap_writer import LONG_CHUNK_SIZE
 from mount_recorder.session import session_text
 from mount_ros import topics
 from mount_ros.messages.cdr import accelerometer, string_message
-from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import JOINT_STATE, SESSION, Delivery, Scalar, Topic
 
 DISPLACEMENT, ENGINE, CHASSIS = 'displacement', 'engine_displacement', 'chassis_displacement'
@@ -41,39 +41,26 @@ _BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for ea
 Times = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class RecordedAs:
-    """The topic and the field of its messages that hold a quantity."""
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """What is written in a `field` of a topic: stamps (ns, rising) and values (n,) in the SI unit `unit`."""
 
     topic: Topic
     field: str
-
-    def rows(self, stamps: Times, values: FloatArray) -> Rows:
-        """Return the messages of `stamps` (ns) and `values` (n,), SI, as bytes."""
-        if self.topic.type == JOINT_STATE:
-            return ScalarsLayout(self.topic).pack_rows(stamps, values[:, None])
-        return OneNumberLayout(accelerometer).pack_rows(stamps, values)
-
-
-@dataclass(frozen=True, eq=False)
-class Channel:
-    """What is written under one topic: stamps (ns, rising) and values (n,) in the SI unit `unit`."""
-
-    place: RecordedAs
     unit: str
     stamps: Times
     values: FloatArray
 
 
-def recorded_as(wanted: Quantity) -> RecordedAs:
-    """Return where a quantity is recorded: displacement and acceleration where every command takes them."""
+def recorded_as(wanted: Quantity) -> tuple[Topic, str]:
+    """Return topic and field of a quantity: displacement and acceleration where every command takes them."""
     if wanted.name == DISPLACEMENT:
-        return RecordedAs(topics.DISPLACEMENT, topics.DISPLACEMENT.names[0])
+        return topics.DISPLACEMENT, topics.DISPLACEMENT.names[0]
     if wanted.name == ACCELERATION:
-        return RecordedAs(topics.SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
+        return topics.SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z'
     scalar = Scalar(wanted.name, wanted.unit.symbol)
     topic = Topic(PREFIX + wanted.name, JOINT_STATE, Delivery.STREAM, 0.0, wanted.sentence, (scalar,))
-    return RecordedAs(topic, wanted.name)
+    return topic, wanted.name
 
 
 def channels_of(
@@ -104,7 +91,7 @@ def channels_of(
             found[name] = _as_sampled(signal)
     wanted = {name: quantities.get(name) or QUANTITIES[name] for name in found}
     return [
-        Channel(recorded_as(wanted[name]), wanted[name].unit.symbol, *pair) for name, pair in found.items()
+        Channel(*recorded_as(wanted[name]), wanted[name].unit.symbol, *pair) for name, pair in found.items()
     ], list(dict.fromkeys(notes))
 
 
@@ -118,9 +105,9 @@ def write_channels(
     try:
         writer.add_topic(f'/{SESSION.name}', SESSION.type)
         for channel in channels:
-            topic = channel.place.topic
+            topic = channel.topic
             # of topics that every command takes the registry tells the unit
-            units = {channel.place.field: channel.unit} if topic.name.startswith(PREFIX) else {}
+            units = {channel.field: channel.unit} if topic.name.startswith(PREFIX) else {}
             writer.add_topic(f'/{topic.name}', topic.type, details=units_text(units))
         writer.write(f'/{SESSION.name}', string_message(session_text(session)), begin)
         for first in range(begin, end + 1, _BLOCK):
@@ -178,10 +165,14 @@ def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, beh
     for channel in channels:
         part = slice(*np.searchsorted(channel.stamps, [first, behind]))
         if part.start < part.stop:
-            rows = channel.place.rows(channel.stamps[part], channel.values[part])
-            topics += [f'/{channel.place.topic.name}'] * len(rows)
+            topic, own, values = channel.topic, channel.stamps[part], channel.values[part]
+            if topic.type == JOINT_STATE:
+                rows = ScalarsLayout(topic).pack_rows(own, values[:, None])
+            else:
+                rows = OneNumberLayout(accelerometer).pack_rows(own, values)
+            topics += [f'/{topic.name}'] * len(rows)
             messages += rows.view(f'V{rows.shape[1]}').ravel().tolist()
-            stamps.append(channel.stamps[part])
+            stamps.append(own)
     times = np.concatenate(stamps)
     for place in np.argsort(times, kind='stable').tolist():
         writer.write(topics[place], messages[place], int(times[place]))

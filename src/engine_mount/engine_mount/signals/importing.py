@@ -100,7 +100,7 @@ def import_file(
             'piece': f'{number + 1} of {len(written)}',
             'mapping': chosen.for_session(name),
             'columns': selection.columns,
-            'topics': {f'/{one.place.topic.name}': f'{one.place.field} in {one.unit}' for one in channels},
+            'topics': {f'/{one.topic.name}': f'{one.field} in {one.unit}' for one in channels},
             'notes': imported.notes,
         }
         session = new_session({'scenario': SCENARIO, 'mode': 'import', 'imported': told})
@@ -111,7 +111,7 @@ def import_file(
         write_channels(folder, channels, session, show)
         imported.recordings.append(folder)
         for channel in channels:
-            topic = f'/{channel.place.topic.name}'
+            topic = f'/{channel.topic.name}'
             imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
     return imported
 

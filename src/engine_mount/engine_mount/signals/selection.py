@@ -55,12 +55,14 @@ def select(
     Samples without a number (NaN) are left out, with a note. Raises `SignalError` with file, column, value,
     guess and remedy, or `SourceError`.
     """
-    return _select(source, _mapping(choices, known), known)
+    if not isinstance(choices, Mapping):
+        choices = with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
+    return _select(source, choices, known)
 
 
 def select_rows(
     source: str | Path | Measured,
-    choices: Mapping | Keys[str, str],
+    mapping: Mapping,
     known: Quantities,
     needed: Collection[str],
     *,
@@ -73,11 +75,8 @@ def select_rows(
     own are brought to those of the first by straight lines, as long as all of them last. Raises
     `SignalError` or `SourceError`.
     """
-    mapping = _mapping(choices, known).of(known)
+    mapping = mapping.of(known)
     there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
-    uri = source.provenance.uri if isinstance(source, Measured) else str(source)
-    for named in mapping.columns.values():
-        found(named.column, there, uri)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
@@ -86,7 +85,8 @@ def select_rows(
             measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
             columns = '; '.join((listed(there), *measured.notes))
             raise SignalError(
-                f'{uri} has no column for {name} (its columns: {columns}); name it as in {option}'
+                f'{measured.provenance.uri} has no column for {name} (its columns: {columns}); name it as in '
+                f'{option}'
             )
     signals = _select(source, mapping, known, timed=timed, whole=True).signals
     first = next(iter(signals.values()))
@@ -94,12 +94,6 @@ def select_rows(
     rows = {'time': first.times} if timed else {}
     rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
     return {name: values[inside] for name, values in rows.items()}
-
-
-def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
-    if isinstance(choices, Mapping):
-        return choices
-    return with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
 
 
 def _select(
