@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.even_grid import evenly_spaced
+from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.excitation import LOWEST_RATE as LOWEST_RATE_OF_ACCELERATION
 from engine_mount.signals.quantities import QUANTITIES, Quantity
 from engine_mount.signals.resampling import has_step, resampled
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_size
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_order, check_size
 from mount_control.settings import ControlParameters
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_recorder.bag_writer import BagWriter
@@ -31,8 +32,6 @@ DISPLACEMENT, ENGINE, CHASSIS = 'displacement', 'engine_displacement', 'chassis_
 ACCELERATION = 'acceleration'
 LOWEST_RATE = 100.0  # Hz, chosen: five times the 20 Hz up to which an engine moves on its mounts
 SHORTEST = 0.5  # s, chosen: four periods of the band
-LONGEST_GAP = 0.125
-"""s: one period of the 8 Hz at which an engine moves on its mounts cannot be interpolated."""
 PREFIX = 'measured/'
 """The beginning of topics that only foreign recordings have."""
 SCENARIO = 'imported'
@@ -146,15 +145,8 @@ def _resampled(
 
 
 def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:
-    stamps = signal.begin + np.rint(SECOND * signal.times).astype(np.int64)
-    back = np.flatnonzero(np.diff(stamps) < 0)
-    if back.size:
-        place = int(back[0])
-        raise SignalError(
-            f'{signal.name}: time goes back at sample {place + 1}, from {signal.times[place]:.6f} s to '
-            f'{signal.times[place + 1]:.6f} s; sort the samples, or cut the file there'
-        )
-    return stamps, signal.values
+    check_order(signal.name, signal.times, 'cut the file there')
+    return signal.begin + np.rint(SECOND * signal.times).astype(np.int64), signal.values
 
 
 def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, behind: int) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count, check_order
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.sums import mean
 
@@ -50,12 +50,11 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     Refused are time that goes back, gaps of more than `longest_gap` (s), stamps that crowd, and a rate below
     `lowest_rate` (Hz).
     """
-    name, back = signal.name, np.flatnonzero(np.diff(signal.times) < 0.0)
-    if back.size or signal.times[-1] == signal.times[0]:
-        place = int(back[0]) if back.size else 0
+    name = signal.name
+    check_order(name, signal.times, 'say their --rate')
+    if signal.times[-1] == signal.times[0]:
         raise SignalError(
-            f'{name}: time does not rise at sample {place + 1}: {signal.times[place]:.6f} s is followed by '
-            f'{signal.times[place + 1]:.6f} s; sort the samples, or say their --rate'
+            f'{name}: time does not rise: all samples are at {signal.times[0]:g} s; say their --rate'
         )
     again = (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)
     once = np.concatenate([[True], ~again])

@@ -13,12 +13,12 @@ from engine_mount.signals.channels import (
     CHASSIS,
     DISPLACEMENT,
     ENGINE,
-    LONGEST_GAP,
     SCENARIO,
     SHORTEST,
     channels_of,
     write_channels,
 )
+from engine_mount.signals.excitation import LONGEST_GAP
 from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings

@@ -7,6 +7,7 @@ long waves, averaged over the length on which a tyre stands, and is faded in as 
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,8 +65,7 @@ def doubts_of_speed(speed: float) -> list[str]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class WheelHeight:
+class WheelHeight(NamedTuple):
     """Heights (n,) in m under the wheel every `STEP_TIME`, and what is to be told of them.
 
     `told` is plain data for the session: where the road came from, its class, the speed. `notes` are
@@ -75,13 +75,6 @@ class WheelHeight:
     height: FloatArray
     told: dict[str, object]
     notes: tuple[str, ...]
-
-    def write(self, folder: Path) -> Path:
-        """Write `road_value.npy` with its times beside it, which the simulator reads; return its path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        np.save(folder / 'road_t.npy', STEP_TIME * np.arange(self.height.size))
-        np.save(folder / 'road_value.npy', self.height)
-        return folder / 'road_value.npy'
 
 
 def wheel_height(

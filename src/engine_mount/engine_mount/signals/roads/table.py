@@ -90,7 +90,20 @@ def _checked_profile(
         notes = (*notes, f'{missing} missing heights at the ends are left out')
     spacing, even, done = _even_places(name, places[known], heights[known])
     profile = RoadProfile(float(places[known[0]]), spacing, even, provenance, (*notes, *done), effective)
-    _check_road(profile)
+    rms = root_mean_square(profile)
+    if not SMOOTHEST <= rms <= ROUGHEST:
+        what, guess = ('rougher', 'mm instead of m') if rms > ROUGHEST else ('smoother', 'm instead of mm')
+        raise SignalError(
+            f'{name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} than any road '
+            f'({SMOOTHEST:g} .. {ROUGHEST:g} m, chosen); are they in {guess}?'
+        )
+    waviness = unevenness(profile).waviness
+    if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:
+        raise SignalError(
+            f'{name}: a waviness of {waviness:.2f} with {rms:.3g} m rms is not that of heights '
+            '(1.5 to 3.5) but of accelerations (about 0); if it is one, drive it with --scenario recorded, '
+            'or make a road of it with engine-mount road invert'
+        )
     return profile
 
 
@@ -128,21 +141,3 @@ def _even_places(name: str, places: FloatArray, heights: FloatArray) -> tuple[fl
     if wide:
         note = f'{wide} gaps are interpolated, the longest of {steps[longest]:.3g} m at {places[longest]:g} m'
     return exact, interpolated(places, heights, grid), [note]
-
-
-def _check_road(profile: RoadProfile) -> None:
-    """Raise `SignalError` for heights in another unit, and for an acceleration in their place."""
-    rms = root_mean_square(profile)
-    if not SMOOTHEST <= rms <= ROUGHEST:
-        what, guess = ('rougher', 'mm instead of m') if rms > ROUGHEST else ('smoother', 'm instead of mm')
-        raise SignalError(
-            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} than any road '
-            f'({SMOOTHEST:g} .. {ROUGHEST:g} m, chosen); are they in {guess}?'
-        )
-    waviness = unevenness(profile).waviness
-    if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:
-        raise SignalError(
-            f'{profile.name}: a waviness of {waviness:.2f} with {rms:.3g} m rms is not that of heights '
-            '(1.5 to 3.5) but of accelerations (about 0); if it is one, drive it with --scenario recorded, '
-            'or make a road of it with engine-mount road invert'
-        )
