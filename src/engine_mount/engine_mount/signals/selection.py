@@ -25,7 +25,7 @@ from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, qu
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
 from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
-from engine_mount.signals.units import is_unit, unit_of
+from engine_mount.signals.units import is_unit, si_unit, unit_of
 from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
@@ -48,63 +48,22 @@ class Selection:
 
 
 def select(
-    source: str | Path | Measured, choices: Mapping | Keys[str, str], known: Quantities = QUANTITIES
-) -> Selection:
-    """Return what `choices`, a mapping or {quantity: `COLUMN[:UNIT]`}, name of a file or folder, path or URI.
-
-    Samples without a number (NaN) are left out, with a note. Raises `SignalError` with file, column, value,
-    guess and remedy, or `SourceError`.
-    """
-    if not isinstance(choices, Mapping):
-        choices = with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
-    return _select(source, choices, known)
-
-
-def select_rows(
     source: str | Path | Measured,
-    mapping: Mapping,
-    known: Quantities,
-    needed: Collection[str],
-    *,
-    timed: bool = False,
-) -> dict[str, FloatArray]:
-    """Return the quantities of a table row by row in SI, (n,) each, with `timed` the `time` in s.
-
-    A quantity is the column that is chosen for it, else `<name>_<unit>` or `<name> [<unit>]`; all of `known`
-    are returned that are there, and those `needed` must be. Columns that a format samples at times of their
-    own are brought to those of the first by straight lines, as long as all of them last. Raises
-    `SignalError` or `SourceError`.
-    """
-    mapping = mapping.of(known)
-    there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
-    chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
-    mapping = mapping.only({name: one for name, one in chosen.items() if one})
-    for name in needed:
-        if name not in mapping.columns:
-            option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
-            measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
-            columns = '; '.join((listed(there), *measured.notes))
-            raise SignalError(
-                f'{measured.provenance.uri} has no column for {name} (its columns: {columns}); name it as in '
-                f'{option}'
-            )
-    signals = _select(source, mapping, known, timed=timed, whole=True).signals
-    first = next(iter(signals.values()))
-    inside = np.full(first.values.size, True)
-    rows = {'time': first.times} if timed else {}
-    rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
-    return {name: values[inside] for name, values in rows.items()}
-
-
-def _select(
-    source: str | Path | Measured,
-    mapping: Mapping,
-    known: Quantities,
+    choices: Mapping | Keys[str, str],
+    known: Quantities = QUANTITIES,
     *,
     timed: bool = True,
     whole: bool = False,
 ) -> Selection:
-    """Return the columns that `mapping` names; `timed` at their times, `whole` without a missing number."""
+    """Return what `choices`, a mapping or {quantity: `COLUMN[:UNIT]`}, name of a file or folder, path or URI.
+
+    Samples without a number (NaN) are left out, with a note; `whole` refuses them. Where they are not `timed`
+    the number of the row takes the place of the time. Raises `SignalError` with file, column, value, guess
+    and remedy, or `SourceError`.
+    """
+    mapping = choices
+    if not isinstance(mapping, Mapping):
+        mapping = with_options(Mapping(), [f'{name}={text}' for name, text in mapping.items()], known=known)
     if not mapping.choices:
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
@@ -143,6 +102,42 @@ def _select(
     return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
 
+def select_rows(
+    source: str | Path | Measured,
+    mapping: Mapping,
+    known: Quantities,
+    needed: Collection[str],
+    *,
+    timed: bool = False,
+) -> dict[str, FloatArray]:
+    """Return the quantities of a table row by row in SI, (n,) each, with `timed` the `time` in s.
+
+    A quantity is the column that is chosen for it, else `<name>_<unit>` or `<name> [<unit>]`; all of `known`
+    are returned that are there, and those `needed` must be. Columns that a format samples at times of their
+    own are brought to those of the first by straight lines, as long as all of them last. Raises
+    `SignalError` or `SourceError`.
+    """
+    mapping = mapping.of(known)
+    there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
+    chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
+    mapping = mapping.only({name: one for name, one in chosen.items() if one})
+    for name in needed:
+        if name not in mapping.columns:
+            option = mapping.option.format(quantity=name, column='COLUMN', unit='UNIT')
+            measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
+            columns = '; '.join((listed(there), *measured.notes))
+            raise SignalError(
+                f'{measured.provenance.uri} has no column for {name} (its columns: {columns}); name it as in '
+                f'{option}'
+            )
+    signals = select(source, mapping, known, timed=timed, whole=True).signals
+    first = next(iter(signals.values()))
+    inside = np.full(first.values.size, True)
+    rows = {'time': first.times} if timed else {}
+    rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
+    return {name: values[inside] for name, values in rows.items()}
+
+
 def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     """Return a file with the columns that `mapping` names, and those that may hold their times."""
     there = headings(source, mapping.stated)
@@ -175,8 +170,8 @@ def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
         raise SignalError(
             f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
         )
-    own = Quantity(name, unit_of(choice.unit or column.unit).dimension, '')
-    return replace(own, sentence=f'{name}, in {own.unit.symbol}')
+    dimension = unit_of(choice.unit or column.unit).dimension
+    return Quantity(name, dimension, f'{name}, in {si_unit(dimension).symbol}')
 
 
 def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:

@@ -80,9 +80,25 @@ def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:
 
 
 def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -> FloatArray:
-    """Return the samples of a channel with its conversion; invalid ones are NaN."""
-    _check_places(file, path, number, index)
-    name = file.groups[number].channels[index].name
+    """Return the samples of a channel with its conversion; invalid ones are NaN.
+
+    Raises `SignalError` for a channel, or its times, that ends beyond the record.
+    """
+    group = file.groups[number]
+    # asammdf itself would read on beyond the record
+    size = int(group.channel_group.samples_byte_nr)
+    for place in {index, file.masters_db.get(number, index)}:
+        channel = group.channels[place]
+        if hasattr(channel, 'start_offset'):  # version 3
+            end = channel.start_offset + 8 * channel.additional_byte_offset + channel.bit_count
+        else:
+            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
+        if size <= 0 or end > 8 * size:
+            raise SignalError(
+                f'{path}, channel {channel.name!r}: ends at bit {end} of a record of {size} '
+                'bytes; the file is damaged, export it again'
+            )
+    name = group.channels[index].name
     # asammdf itself would leave out invalid samples, but not their times
     get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True)
     signal = get()
@@ -100,23 +116,6 @@ def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -
     if signal.invalidation_bits is not None:
         values[np.asarray(signal.invalidation_bits, bool)] = np.nan
     return values
-
-
-def _check_places(file: Any, path: Path, number: int, index: int) -> None:
-    """Raise `SignalError` for a channel, or its times, beyond the record, where asammdf reads on."""
-    group = file.groups[number]
-    size = int(group.channel_group.samples_byte_nr)
-    for place in {index, file.masters_db.get(number, index)}:
-        channel = group.channels[place]
-        if hasattr(channel, 'start_offset'):  # version 3
-            end = channel.start_offset + 8 * channel.additional_byte_offset + channel.bit_count
-        else:
-            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
-        if size <= 0 or end > 8 * size:
-            raise SignalError(
-                f'{path}, channel {channel.name!r}: ends at bit {end} of a record of {size} '
-                'bytes; the file is damaged, export it again'
-            )
 
 
 def _group_name(file: Any, number: int) -> str:

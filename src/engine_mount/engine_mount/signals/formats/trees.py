@@ -36,7 +36,7 @@ def leaves_in(tree: Any, notes: list[str], name: str = '', unit: str = '') -> It
     elif isinstance(tree, list):
         for place, value in enumerate(tree[:_MOST]):
             key = _text(value, 'name', 'Name', 'label') or place
-            yield from leaves_in(value, notes, f'{name}.{key}'.lstrip('.'))
+            yield from leaves_in({key: value}, notes, name)
     elif hasattr(tree, 'dtype') and hasattr(tree, 'shape'):
         attributes = getattr(tree, 'attrs', {})
         # HDF5 holds the rows of a matrix of MATLAB as columns

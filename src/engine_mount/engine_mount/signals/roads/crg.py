@@ -141,8 +141,7 @@ def _long_sections(
     name: str, titles: list[str], units: list[str], road: dict[str, float]
 ) -> tuple[FloatArray, list[int]]:
     """Return the lateral places (m, rising) of the long sections and their columns."""
-    found = {column: _SECTION.fullmatch(title) for column, title in enumerate(titles)}
-    matches = {column: match for column, match in found.items() if match}
+    matches = {column: match for column, title in enumerate(titles) if (match := _SECTION.fullmatch(title))}
     foreign = [f'{titles[column]} [{units[column]}]' for column in matches if units[column] != 'm']
     named = {float(match[1]): column for column, match in matches.items() if match[1]}
     numbered = {int(match[2]): column for column, match in matches.items() if match[2]}
