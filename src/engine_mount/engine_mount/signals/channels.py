@@ -87,11 +87,13 @@ def channels_of(
             stamps, (values,) = _resampled([signal], LOWEST_RATE_OF_ACCELERATION, 0.0, notes)
             found[name] = stamps, values
         elif name != DISPLACEMENT:
-            found[name] = _as_sampled(signal)
-    wanted = {name: quantities.get(name) or QUANTITIES[name] for name in found}
-    return [
-        Channel(*recorded_as(wanted[name]), wanted[name].unit.symbol, *pair) for name, pair in found.items()
-    ], list(dict.fromkeys(notes))
+            check_order(signal.name, signal.times, 'cut the file there')
+            found[name] = signal.begin + np.rint(SECOND * signal.times).astype(np.int64), signal.values
+    channels = []
+    for name, (stamps, values) in found.items():
+        wanted = quantities.get(name) or QUANTITIES[name]
+        channels.append(Channel(*recorded_as(wanted), wanted.unit.symbol, stamps, values))
+    return channels, list(dict.fromkeys(notes))
 
 
 def write_channels(
@@ -142,11 +144,6 @@ def _resampled(
     ]
     values = [resampled(one, step, (begin - one.begin) / SECOND, count)[:] for one in even]
     return np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64), values
-
-
-def _as_sampled(signal: Signal) -> tuple[Times, FloatArray]:
-    check_order(signal.name, signal.times, 'cut the file there')
-    return signal.begin + np.rint(SECOND * signal.times).astype(np.int64), signal.values
 
 
 def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, behind: int) -> None:

@@ -122,28 +122,23 @@ def read_file(file: str | Path, mapping: Mapping) -> Selection:
     Without another offset the mean of a displacement is its rest position. Raises `SignalError` or
     `SourceError`.
     """
-    columns = dict(mapping.columns) if mapping.choices else _columns_by_titles(file, mapping)
+    columns = dict(mapping.columns)
+    if not mapping.choices:
+        there = headings(file, mapping.stated)
+        for heading in there:
+            found = titled(heading.name.rpartition('/')[2].rpartition('.')[2])
+            if found is not None and not is_time(heading) and is_unit(heading.unit, found.dimension):
+                columns.setdefault(found.name, ColumnChoice(heading.name))
+        if not columns:
+            raise SignalError(
+                f'{file}: no column tells by its title and unit what it is; say it with --column '
+                f'QUANTITY=COLUMN:UNIT or a mapping file. Quantities: {", ".join(QUANTITIES)}. Columns: '
+                f'{listed(there)}'
+            )
     for name in {DISPLACEMENT, ENGINE, CHASSIS} & columns.keys():
         if columns[name].offset is None:
             columns[name] = replace(columns[name], offset=MEAN)
     return select(file, replace(mapping, columns=columns))
-
-
-def _columns_by_titles(file: str | Path, mapping: Mapping) -> dict[str, ColumnChoice]:
-    """Return the columns whose title tells the quantity and whose header tells the unit."""
-    there = headings(file, mapping.stated)
-    columns: dict[str, ColumnChoice] = {}
-    for heading in there:
-        found = titled(heading.name.rpartition('/')[2].rpartition('.')[2])
-        if found is not None and not is_time(heading) and is_unit(heading.unit, found.dimension):
-            columns.setdefault(found.name, ColumnChoice(heading.name))
-    if not columns:
-        raise SignalError(
-            f'{file}: no column tells by its title and unit what it is; say it with --column '
-            f'QUANTITY=COLUMN:UNIT or a mapping file. Quantities: {", ".join(QUANTITIES)}. Columns: '
-            f'{listed(there)}'
-        )
-    return columns
 
 
 def _parts_of(signals: Keys[str, Signal]) -> tuple[list[Part], list[str]]:

@@ -71,7 +71,15 @@ def select(
     signals, quantities, columns = {}, {}, {}
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
-        wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
+        if name not in mapping.others:
+            wanted = quantity(name, known)
+        elif own_unit := choice.unit or column.unit:
+            dimension = unit_of(own_unit).dimension
+            wanted = Quantity(name, dimension, f'{name}, in {si_unit(dimension).symbol}')
+        else:
+            raise SignalError(
+                f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
+            )
         where = f'{name_of(uri)}, column {column.name!r}'
         base, notes = column.time, ()
         if timed:
@@ -162,16 +170,6 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
         names = ', '.join(choice.column for choice in fitting)
         raise SignalError(f'{wanted.name} may be each of the columns {names}; name one')
     return fitting[0] if fitting else None
-
-
-def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
-    """Return a quantity of the user's own: any size is taken."""
-    if not (choice.unit or column.unit):
-        raise SignalError(
-            f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
-        )
-    dimension = unit_of(choice.unit or column.unit).dimension
-    return Quantity(name, dimension, f'{name}, in {si_unit(dimension).symbol}')
 
 
 def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:

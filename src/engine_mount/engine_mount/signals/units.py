@@ -143,7 +143,11 @@ def unit_of(text: str, dimension: str = '') -> Unit:
     unit = find_unit(text, dimension)
     if unit is None:
         plain = _plain(text)
-        raise SignalError(f'unit {text!r} is not known: {_TRAPS.get(plain) or _nearest(plain)}')
+        near = [symbol for symbol in _UNITS if symbol.lower() == plain.lower()]
+        near = near or difflib.get_close_matches(plain, _UNITS, n=3, cutoff=0.6)
+        known = f'known are {", ".join(dict.fromkeys(one.symbol for one in _UNITS.values()))}'
+        guess = _TRAPS.get(plain) or (f'is it {" or ".join(near)}?' if near else known)
+        raise SignalError(f'unit {text!r} is not known: {guess}')
     return unit
 
 
@@ -183,11 +187,3 @@ def units_of(dimension: str) -> tuple[Unit, ...]:
 
 def _plain(text: str) -> str:
     return text.strip().strip('[](){}').replace('**', '^').replace(' ', '').translate(_SIGNS)
-
-
-def _nearest(plain: str) -> str:
-    by_case = [symbol for symbol in _UNITS if symbol.lower() == plain.lower()]
-    near = by_case or difflib.get_close_matches(plain, _UNITS, n=3, cutoff=0.6)
-    if near:
-        return f'is it {" or ".join(near)}?'
-    return f'known are {", ".join(dict.fromkeys(unit.symbol for unit in _UNITS.values()))}'

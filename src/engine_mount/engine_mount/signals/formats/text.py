@@ -122,24 +122,35 @@ def _titles(
     plain = [text for text in above if is_content(text)]
     found = [_as_titles(text, dialect) for text in plain]
     units = found.pop() if len(found) > 1 and found[-2] and is_unit_row(found[-1]) else []
-    if found and found[-1]:
-        return found[-1], units, dialect.first, _left_out(plain[: len(found) - 1])
-    if plain and plain[-1] == above[-1]:
-        _refuse_other_width(path, dialect, plain[-1])
-    comments = [text for text in above if is_comment(text)]
-    commented = _as_commented(comments[-1], dialect) if comments else []
-    if commented:
-        return commented, [], dialect.first, _left_out(plain)
-    names = [str(place) for place in range(len(dialect.kinds))]
-    counted, behind = [cell for cell in dialect.rows[0] if cell], dialect.rows[1:]
-    fractions = sum(dialect.decimal in cell for row in behind for cell in row)
-    if len(counted) > 1 and counted == names[: len(counted)] and 2 * fractions >= len(behind):
-        # as an export of a frame without names begins
-        titles = [cell or 'index' for cell in dialect.rows[0]]
-        return titles, [], dialect.first + 1, ['the first line is taken as numbers of the columns']
-    if dialect.kinds[-1] == 'missing':
-        names[-1] = ''
-    return names, [], dialect.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
+    titles, above_titles = found[-1] if found else [], plain[: len(found) - 1]
+    first, width, notes = dialect.first, len(dialect.kinds), list[str]()
+    if not titles:
+        cells = cells_of(plain[-1], dialect.delimiter) if plain and plain[-1] == above[-1] else []
+        # the line just above the samples looks like titles of other columns
+        if len(cells) > 1 and width > 1 and all(cell and not _is_number(cell) for cell in cells):
+            raise SignalError(
+                f'{path}, line {first - 1}: {len(cells)} titles ({", ".join(cells)[:80]}) above lines of '
+                f'{width} cells ({", ".join(dialect.rows[0])[:80]}); is a decimal comma among commas? Export '
+                'with semicolons, or with one title for each column'
+            )
+        comments = [text for text in above if is_comment(text)]
+        titles, above_titles = _as_commented(comments[-1], dialect) if comments else [], plain
+    if not titles:
+        titles = [str(place) for place in range(width)]
+        counted, behind = [cell for cell in dialect.rows[0] if cell], dialect.rows[1:]
+        fractions = sum(dialect.decimal in cell for row in behind for cell in row)
+        if len(counted) > 1 and counted == titles[: len(counted)] and 2 * fractions >= len(behind):
+            # as an export of a frame without names begins
+            titles, above_titles, first = [cell or 'index' for cell in dialect.rows[0]], [], first + 1
+            notes = ['the first line is taken as numbers of the columns']
+        else:
+            notes = ['no titles: the columns are numbered from 0 on']
+            if dialect.kinds[-1] == 'missing':
+                titles[-1] = ''
+    if above_titles:
+        count, line = len(above_titles), above_titles[0]
+        notes.insert(0, f'{count} lines before the titles are left out, the first {line[:60]!r}')
+    return titles, units, first, notes
 
 
 def _as_titles(text: str, dialect: Dialect) -> list[str]:
@@ -166,23 +177,6 @@ def _as_commented(text: str, dialect: Dialect) -> list[str]:
 
 def _is_number(cell: str) -> bool:
     return 'number' in (kind_of(cell, '.'), kind_of(cell, ','))
-
-
-def _refuse_other_width(path: Path, dialect: Dialect, text: str) -> None:
-    """Raise `SignalError` where the line just above the samples looks like titles of other columns."""
-    cells, width = cells_of(text, dialect.delimiter), len(dialect.kinds)
-    if len(cells) > 1 and width > 1 and all(cell and not _is_number(cell) for cell in cells):
-        raise SignalError(
-            f'{path}, line {dialect.first - 1}: {len(cells)} titles ({", ".join(cells)[:80]}) above lines '
-            f'of {width} cells ({", ".join(dialect.rows[0])[:80]}); is a decimal comma among commas? Export '
-            'with semicolons, or with one title for each column'
-        )
-
-
-def _left_out(lines: Sequence[str]) -> list[str]:
-    return (
-        [f'{len(lines)} lines before the titles are left out, the first {lines[0][:60]!r}'] if lines else []
-    )
 
 
 # Samples.
