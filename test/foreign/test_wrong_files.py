@@ -115,7 +115,7 @@ WRONG = {
     ),
     'times that stand still': (
         drive, ('t [s],az', 0.0 * T, SHAKING), ('--column', 'az:m/s^2', '--time', 't:s'),
-        ("column 'az'", 'does not rise', 'sort the samples'),
+        ("column 'az'", 'does not rise: all samples are at 0 s', '--rate'),
     ),
     'a gap': (
         drive, ('t [s],az', T + 0.4 * (T >= 2.0), SHAKING), ('--column', 'az:m/s^2'),

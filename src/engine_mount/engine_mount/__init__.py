@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from engine_mount.recordings.access import compare as compare
     from engine_mount.recordings.access import open as open
     from engine_mount.reports.report import report as report
-    from engine_mount.signals.importing.importing import import_file as import_file
+    from engine_mount.signals.importing import import_file as import_file
     from engine_mount.signals.roads.driving import road as road
 
 _MODULES = {
@@ -29,7 +29,7 @@ _MODULES = {
     'drive': 'drives.drive',
     'replay': 'drives.replay',
     'report': 'reports.report',
-    'import_file': 'signals.importing.importing',
+    'import_file': 'signals.importing',
     'road': 'signals.roads.driving',
     'identify': 'identification.identify',
     'calibrate': 'identification.calibrate',

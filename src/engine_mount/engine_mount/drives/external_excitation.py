@@ -9,26 +9,25 @@ from typing import Any
 import numpy as np
 
 from engine_mount.recordings.recording import recording_hash
+from engine_mount.signals.channels import recorded_as
 from engine_mount.signals.even_grid import evenly_spaced
 from engine_mount.signals.excitation import LONGEST_GAP, LOWEST_RATE
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.formats.measured import listed
 from engine_mount.signals.formats.reading import headings
-from engine_mount.signals.importing.channels import recorded_as
-from engine_mount.signals.importing.writing import told_mapping, told_provenance
 from engine_mount.signals.mapping import ColumnChoice, mapping_in_file, with_options
 from engine_mount.signals.mapping import Mapping as ColumnMapping
 from engine_mount.signals.quantities import QUANTITIES
-from engine_mount.signals.roads.driving import Road, wheel_height
+from engine_mount.signals.roads.driving import STEP_TIME, Road, wheel_height
 from engine_mount.signals.selection import select
-from engine_mount.signals.signal import Signal, SignalError
+from engine_mount.signals.signal import FloatArray, SignalError
 
 FOLDER = 'given'
 """In the folder of a run: the files that its simulator reads."""
 _ACCELERATION = 'acceleration'
 _QUANTITY = {_ACCELERATION: QUANTITIES[_ACCELERATION]}
-_OWN = recorded_as(QUANTITIES[_ACCELERATION])
-_OWN_COLUMN = f'/{_OWN.topic.name}.{_OWN.field}'
+_TOPIC, _FIELD = recorded_as(QUANTITIES[_ACCELERATION])
+_OWN_COLUMN = f'/{_TOPIC.name}.{_FIELD}'
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ def recorded_acceleration(
     rate: float | None = None,
     scale: float | None = None,
     mapping_file: Path | None = None,
-    stated: Stated | None = None,
+    stated: Stated = NOT_STATED,
 ) -> ExternalExcitation:
     """Return the acceleration that `columns` (`COLUMN[:UNIT]`) choose in `file`, a path or URI, in m/s^2.
 
@@ -95,13 +94,14 @@ def recorded_acceleration(
     signal = selection.signals[_ACCELERATION]
     evenly_spaced(signal, LONGEST_GAP, LOWEST_RATE)  # refuses by the names of the file
     origin = {
-        **told_provenance(selection.provenance),
-        'mapping': told_mapping(mapping, mapping_file.name if mapping_file else ''),
+        **selection.provenance.for_session(),
+        'mapping': mapping.for_session(mapping_file.name if mapping_file else ''),
         'columns': selection.columns,
     }
-    return ExternalExcitation(
-        'recorded.file', partial(_write, signal), origin, (*selection.notes, *signal.notes)
-    )
+    plain = ''.join(sign if sign.isalnum() else ' ' for sign in signal.name)
+    name = '_'.join(plain.split()) or _ACCELERATION
+    write = partial(_write, name, signal.times, signal.values)
+    return ExternalExcitation('recorded.file', write, origin, (*selection.notes, *signal.notes))
 
 
 def measured_road(
@@ -119,14 +119,14 @@ def measured_road(
     )
     sentences = (*road.unevenness.sentences(), *over.notes)
     notes = tuple(f'{road.profile.name}: {sentence}' for sentence in sentences)
-    return ExternalExcitation('road.file', over.write, over.told, notes)
+    write = partial(_write, 'road', STEP_TIME * np.arange(over.height.size), over.height)
+    return ExternalExcitation('road.file', write, over.told, notes)
 
 
-def _write(signal: Signal, folder: Path) -> Path:
-    """Write a pair of NPY files, values and times; return that of the values."""
+def _write(name: str, times: FloatArray, values: FloatArray, folder: Path) -> Path:
+    """Write a pair of NPY files, values and times (s), both (n,); return that of the values."""
     folder.mkdir(parents=True, exist_ok=True)
-    plain = ''.join(sign if sign.isalnum() else ' ' for sign in signal.name)
-    name = '_'.join(plain.split()) or _ACCELERATION
-    np.save(folder / f'{name}_value.npy', signal.values)
-    np.save(folder / f'{name}_t.npy', signal.times)
-    return folder / f'{name}_value.npy'
+    np.save(folder / f'{name}_t.npy', times)
+    file = folder / f'{name}_value.npy'
+    np.save(file, values)
+    return file

@@ -44,7 +44,7 @@ from engine_mount.settings.chosen import (
 )
 from engine_mount.settings.options import owned
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
-from engine_mount.signals.importing.writing import SCENARIO
+from engine_mount.signals.channels import SCENARIO
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law

@@ -39,7 +39,7 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.times import each_once
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import check_effect, control_parameters
-from engine_mount.signals.importing.writing import SCENARIO
+from engine_mount.signals.channels import SCENARIO
 from mount_models.arithmetic.sums import each_interpolated
 from mount_ros.topics import (
     AIR_GAP,

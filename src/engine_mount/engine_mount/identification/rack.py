@@ -12,7 +12,7 @@ from engine_mount.identification.fitting import FloatArray, IdentificationError
 from engine_mount.identification.force_points import ForcePoints, gap_groups
 from engine_mount.identification.gap_curves import RippleRecording
 from engine_mount.recordings.recording import open_run, recording_hash, recording_place
-from engine_mount.signals.formats.bag import is_recording
+from engine_mount.signals.formats.reading import is_recording
 from engine_mount.signals.mapping import Mapping
 from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.selection import select_rows

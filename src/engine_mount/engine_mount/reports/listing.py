@@ -4,9 +4,12 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.events import read_marks
@@ -24,6 +27,7 @@ from engine_mount.recordings.session import (
 )
 from engine_mount.settings.chosen import changed_parameters
 from engine_mount.settings.run_folder import RunFolder
+from engine_mount.signals.formats.measured import Measured
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.versions import versions
 from mount_ros.topics import AIR_GAP, EVENT
@@ -49,6 +53,7 @@ class Description(NamedTuple):
     figures: Figures
     rows: list[tuple[str, str]]  # label and text, a sentence without label
     tables: list[Table]
+    notes: Sequence[str]
 
 
 def list_recordings(folders: Sequence[Path]) -> list[Figures]:
@@ -150,7 +155,42 @@ def describe_recording(recording: Recording) -> Description:
         Table('Parameters other than the default', 'lll', parameters, ('parameter', 'value', 'default')),
         Table('Topics', 'llrr', topics, ('topic', 'type', 'messages', 'lost')),
     ]
-    return Description(figures, rows, [table for table in tables if table.rows])
+    return Description(figures, rows, [table for table in tables if table.rows], recording.warnings)
+
+
+def describe_measured(measured: Measured) -> Description:
+    """Return the columns of a foreign file in numbers: values in the file's own unit, rate in Hz, span in s.
+
+    None where a number is not known, as rate and span where a column holds the times.
+    """
+    origin, columns, texts = measured.provenance, [], []
+    for column in measured.columns.values():
+        known = column.values[~np.isnan(column.values)]
+        sizes = (known.min, known.mean, known.max)
+        least, mean, greatest = (float(size()) if known.size else None for size in sizes)
+        times = np.zeros(0) if column.time is None else column.time.times
+        span = float(times[-1] - times[0]) if len(times) > 1 else None
+        rate = (len(times) - 1) / span if span else None
+        count = column.values.size
+        columns.append({
+            'name': column.name, 'unit': column.unit, 'samples': count, 'missing': count - known.size,
+            'least': least, 'mean': mean, 'greatest': greatest, 'rate': rate, 'span': span,
+        })  # fmt: skip
+        texts.append((
+            column.name, column.unit, str(count),
+            '' if rate is None else f'{rate:.6g} Hz',
+            '' if span is None else f'{span:.6g} s',
+            'none' if mean is None else f'{least:.4g} .. {greatest:.4g}',
+            '' if mean is None else f'{mean:.4g}',
+        ))  # fmt: skip
+    read_by = f'{origin.uri}, {origin.format}, read by {origin.reader}'
+    heads = ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean')
+    return Description(
+        {'provenance': asdict(origin), 'columns': columns, 'notes': measured.notes},
+        [('file', read_by), ('SHA-256', origin.sha256)],
+        [Table('Columns', 'llrrrrr', texts, heads)],
+        measured.notes,
+    )
 
 
 def _places(folder: Path) -> Iterator[Path]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count, check_order
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.sums import mean
 
@@ -50,12 +50,11 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     Refused are time that goes back, gaps of more than `longest_gap` (s), stamps that crowd, and a rate below
     `lowest_rate` (Hz).
     """
-    name, back = signal.name, np.flatnonzero(np.diff(signal.times) < 0.0)
-    if back.size or signal.times[-1] == signal.times[0]:
-        place = int(back[0]) if back.size else 0
+    name = signal.name
+    check_order(name, signal.times, 'say their --rate')
+    if signal.times[-1] == signal.times[0]:
         raise SignalError(
-            f'{name}: time does not rise at sample {place + 1}: {signal.times[place]:.6f} s is followed by '
-            f'{signal.times[place + 1]:.6f} s; sort the samples, or say their --rate'
+            f'{name}: time does not rise: all samples are at {signal.times[0]:g} s; say their --rate'
         )
     again = (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)
     once = np.concatenate([[True], ~again])
@@ -67,9 +66,8 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     late = float(np.abs(times - (first + period * np.arange(times.size))).max()) / period
     notes = list(signal.notes)
     if late > JITTER:
-        _check_steps(name, times, period, longest_gap)
-        first, period, values, done = _by_stamps(times, values)
-        notes += done
+        first, period, values, done = _by_stamps(name, times, values, period, longest_gap)
+        notes.append(done)
     elif late > ON_THE_LINE:
         notes.append(
             f'taken as evenly spaced at {1.0 / period:.4g} Hz: the stamps are up to '
@@ -83,7 +81,13 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
     return EvenSignal(name, period, values, signal.begin + round(SECOND * first), tuple(notes))
 
 
-def _check_steps(name: str, times: FloatArray, period: float, longest_gap: float) -> None:
+def _by_stamps(
+    name: str, times: FloatArray, values: FloatArray, period: float, longest_gap: float
+) -> tuple[float, float, FloatArray, str]:
+    """Return the first time, the period and the values of an even grid, and what was done.
+
+    Raises `SignalError` for gaps of more than `longest_gap` (s), and stamps that crowd.
+    """
     steps = np.diff(times)
     longest, shortest = int(steps.argmax()), int(steps.argmin())
     if steps[longest] > longest_gap:
@@ -98,14 +102,9 @@ def _check_steps(name: str, times: FloatArray, period: float, longest_gap: float
             f'{times[shortest]:.3f} s, less than {1e3 * CROWDED * period:.3g} ms: say their --rate if they '
             'were taken evenly, or remove one'
         )
-
-
-def _by_stamps(times: FloatArray, values: FloatArray) -> tuple[float, float, FloatArray, list[str]]:
-    """Return the first time, the period and the values of an even grid, and what was done."""
-    steps = np.diff(times)
     count = int(np.rint(steps / np.median(steps)).sum())
     period = float(times[-1] - times[0]) / count
-    longest, wide = int(steps.argmax()), np.count_nonzero(steps > 1.5 * period)
+    wide = np.count_nonzero(steps > 1.5 * period)
     note = f'brought from uneven stamps onto an even grid of {1.0 / period:.4g} Hz'
     if wide:
         note = (
@@ -113,7 +112,7 @@ def _by_stamps(times: FloatArray, values: FloatArray) -> tuple[float, float, Flo
             f'{times[longest]:.3f} s'
         )
     grid = times[0] + period * np.arange(count + 1)
-    return float(times[0]), period, interpolated(times, values, grid), [note]
+    return float(times[0]), period, interpolated(times, values, grid), note
 
 
 @compiled

@@ -41,8 +41,15 @@ def build_excitation(sim: SimParameters) -> Excitation:
         signal = recorded_signal(sim.recorded)
         values = acceleration_at(signal, STEP_TIME)
     elif sim.scenario == 'road' and sim.road.file:
-        signal = measured_height(sim.road.file)
-        values = height_at(signal, STEP_TIME)
+        mapping = Mapping({'height': ColumnChoice('0' if sim.road.file.endswith('.npy') else '1', scale=1.0)})
+        height = select(sim.road.file, mapping, _HEIGHT).signals['height']
+        signal = evenly_spaced(height, LONGEST_ROAD_GAP, LOWEST_ROAD_RATE)
+        check_size(
+            signal.name, signal.values, signal.period, LARGEST_HEIGHT, 'm',
+            'the height of a road is meant in m, without hills: engine-mount drive --road makes it of a '
+            'profile',
+        )  # fmt: skip
+        values = resampled(signal, STEP_TIME)
     else:
         return building.build_excitation(sim)
     notes = tuple(f'{signal.name}: {note}' for note in signal.notes)
@@ -85,19 +92,3 @@ def acceleration_at(even: EvenSignal, step_time: float) -> StreamedSeries:
         'acceleration, or this sample a fault to cut or repair?',
     )  # fmt: skip
     return resampled(replace(even, values=values), step_time)
-
-
-def measured_height(file: str) -> EvenSignal:
-    """Return the height (m) in `file` over time (s), evenly spaced; raises `SignalError`."""
-    mapping = Mapping({'height': ColumnChoice('0' if file.endswith('.npy') else '1', scale=1.0)})
-    signal = select(file, mapping, _HEIGHT).signals['height']
-    return evenly_spaced(signal, LONGEST_ROAD_GAP, LOWEST_ROAD_RATE)
-
-
-def height_at(even: EvenSignal, step_time: float) -> StreamedSeries:
-    """Return the heights (n,) in m at steps of `step_time` (s); raises `SignalError` where they are none."""
-    check_size(
-        even.name, even.values, even.period, LARGEST_HEIGHT, 'm',
-        'the height of a road is meant in m, without hills: engine-mount drive --road makes it of a profile',
-    )  # fmt: skip
-    return resampled(even, step_time)

@@ -9,7 +9,7 @@ from engine_mount.signals.formats.measured import MeasuredColumn
 from engine_mount.signals.mapping import ColumnChoice
 from engine_mount.signals.quantities import Quantity
 from engine_mount.signals.signal import FloatArray, SignalError
-from engine_mount.signals.units import STANDARD_GRAVITY, Unit, is_unit, unit_of, units_of
+from engine_mount.signals.units import STANDARD_GRAVITY, Unit, find_unit, unit_of, units_of
 from mount_models.arithmetic.sums import mean
 
 GRAVITY_WITHIN = 0.06
@@ -40,8 +40,7 @@ def unit_of_column(
         return f'write {option.format(quantity=wanted.name, column=column.name, unit=symbol)}'
 
     size, notes = _size(column.values), []
-    known = is_unit(column.unit) or is_unit(column.unit, wanted.dimension)
-    header = unit_of(column.unit, wanted.dimension) if known else None
+    header = find_unit(column.unit, wanted.dimension)
     said = unit_of(choice.unit, wanted.dimension) if choice.unit else None
     unit, scale = said or header or wanted.unit, 1.0 if choice.scale is None else choice.scale
     if unit.dimension != wanted.dimension:

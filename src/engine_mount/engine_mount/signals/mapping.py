@@ -6,11 +6,11 @@ One measuring system is one YAML file that a team shares; options of a command s
 import math
 from collections.abc import Mapping as Keys
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.quantities import QUANTITIES, Quantities, quantity, titled
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units import is_unit, unit_of
@@ -78,7 +78,7 @@ class Mapping:
     time: TimeChoice = TimeChoice()
     system: str = ''
     option: str = '--column {quantity}={column}:{unit}'
-    stated: Stated = field(default_factory=Stated)
+    stated: Stated = NOT_STATED
 
     @property
     def choices(self) -> dict[str, ColumnChoice]:
@@ -88,6 +88,12 @@ class Mapping:
     def only(self, columns: Keys[str, ColumnChoice]) -> 'Mapping':
         """Return the mapping with these columns alone."""
         return replace(self, columns=dict(columns), others={})
+
+    def for_session(self, file: str = '') -> dict[str, Any]:
+        """Return what a session says of it: its `file`, the measuring system, times that were said."""
+        times = {name: value for name, value in asdict(self.time).items() if value}
+        said = {'file': Path(file).name, 'system': self.system, 'time': times}
+        return {name: value for name, value in said.items() if value}
 
     def of(self, known: Quantities) -> 'Mapping':
         """Return the mapping of the `known` quantities alone, by the names that these have."""
@@ -144,7 +150,7 @@ def with_options(
     scale: float | None = None,
     default: str = '',
     known: Quantities = QUANTITIES,
-    stated: Stated | None = None,
+    stated: Stated = NOT_STATED,
 ) -> Mapping:
     """Return the mapping with what options say, which goes before what a file says.
 
@@ -167,11 +173,10 @@ def with_options(
         said = {name: replace(one, scale=scale) for name, one in (said or mapping.columns).items()}
     times = TimeChoice(*split_unit(time), rate) if time or rate is not None else mapping.time
     file = mapping.stated
-    if stated is not None:
-        file = replace(
-            stated, decimal=stated.decimal or file.decimal, delimiter=stated.delimiter or file.delimiter
-        )
-    return replace(mapping, columns={**mapping.columns, **said}, time=times, stated=file)
+    stated = Stated(
+        stated.decimal or file.decimal, stated.delimiter or file.delimiter, stated.dbc or file.dbc
+    )
+    return replace(mapping, columns={**mapping.columns, **said}, time=times, stated=stated)
 
 
 def split_unit(text: str, dimension: str = '') -> tuple[str, str]:

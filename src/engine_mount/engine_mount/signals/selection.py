@@ -25,7 +25,7 @@ from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, qu
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
 from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
-from engine_mount.signals.units import is_unit, unit_of
+from engine_mount.signals.units import is_unit, si_unit, unit_of
 from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
@@ -46,26 +46,73 @@ class Selection:
     provenance: Provenance
     notes: tuple[str, ...]
 
-    @property
-    def name(self) -> str:
-        """The name of the file."""
-        return name_of(self.provenance.uri)
-
 
 def select(
-    source: str | Path | Measured, choices: Mapping | Keys[str, str], known: Quantities = QUANTITIES
+    source: str | Path | Measured,
+    choices: Mapping | Keys[str, str],
+    known: Quantities = QUANTITIES,
+    *,
+    timed: bool = True,
+    whole: bool = False,
 ) -> Selection:
     """Return what `choices`, a mapping or {quantity: `COLUMN[:UNIT]`}, name of a file or folder, path or URI.
 
-    Samples without a number (NaN) are left out, with a note. Raises `SignalError` with file, column, value,
-    guess and remedy, or `SourceError`.
+    Samples without a number (NaN) are left out, with a note; `whole` refuses them. Where they are not `timed`
+    the number of the row takes the place of the time. Raises `SignalError` with file, column, value, guess
+    and remedy, or `SourceError`.
     """
-    return _select(source, _mapping(choices, known), known)
+    mapping = choices
+    if not isinstance(mapping, Mapping):
+        mapping = with_options(Mapping(), [f'{name}={text}' for name, text in mapping.items()], known=known)
+    if not mapping.choices:
+        raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
+    measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
+    uri = measured.provenance.uri
+    signals, quantities, columns = {}, {}, {}
+    for name, choice in mapping.choices.items():
+        column = measured.column(choice.column)
+        if name not in mapping.others:
+            wanted = quantity(name, known)
+        elif own_unit := choice.unit or column.unit:
+            dimension = unit_of(own_unit).dimension
+            wanted = Quantity(name, dimension, f'{name}, in {si_unit(dimension).symbol}')
+        else:
+            raise SignalError(
+                f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
+            )
+        where = f'{name_of(uri)}, column {column.name!r}'
+        base, notes = column.time, ()
+        if timed:
+            base, notes = times_of(measured, column, mapping.time)
+        elif base is None:
+            base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
+        is_known = _known(where, column, base, whole=whole)
+        own = replace(column, values=column.values[is_known])
+        unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
+        values = unit.to_si(own.values)
+        values *= scale  # in place: it can be an hour
+        offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
+        if offset:
+            values -= offset
+            which = 'its mean' if choice.offset == MEAN else 'as said'
+            more.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
+        times = base.times[is_known]
+        begin = base.begin + round(SECOND * float(times[0]))
+        if missing := column.values.size - values.size:
+            more.append(f'{column.name}: {missing} samples without a number are left out')
+        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
+        columns[name] = {
+            'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
+            'times': base.told, 'samples': int(values.size),
+            **({'offset': choice.offset} if choice.offset else {}),
+        }  # fmt: skip
+        quantities[name] = wanted
+    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
 
 def select_rows(
     source: str | Path | Measured,
-    choices: Mapping | Keys[str, str],
+    mapping: Mapping,
     known: Quantities,
     needed: Collection[str],
     *,
@@ -78,11 +125,8 @@ def select_rows(
     own are brought to those of the first by straight lines, as long as all of them last. Raises
     `SignalError` or `SourceError`.
     """
-    mapping = _mapping(choices, known).of(known)
+    mapping = mapping.of(known)
     there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
-    uri = source.provenance.uri if isinstance(source, Measured) else str(source)
-    for named in mapping.columns.values():
-        heading_of(there, named.column, uri)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
     for name in needed:
@@ -91,71 +135,15 @@ def select_rows(
             measured = source if isinstance(source, Measured) else read(source, None, mapping.stated)
             columns = '; '.join((listed(there), *measured.notes))
             raise SignalError(
-                f'{uri} has no column for {name} (its columns: {columns}); name it as in {option}'
+                f'{measured.provenance.uri} has no column for {name} (its columns: {columns}); name it as in '
+                f'{option}'
             )
-    signals = _select(source, mapping, known, timed=timed, whole=True).signals
+    signals = select(source, mapping, known, timed=timed, whole=True).signals
     first = next(iter(signals.values()))
     inside = np.full(first.values.size, True)
     rows = {'time': first.times} if timed else {}
     rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
     return {name: values[inside] for name, values in rows.items()}
-
-
-def heading_of(there: Sequence[Heading], wanted: str, uri: str) -> Heading:
-    """Return the heading that `wanted` names; raises `SignalError`, also for an unknown unit behind it."""
-    try:
-        return found(wanted, there, uri)
-    except SignalError:
-        name, _, unit = wanted.rpartition(':')
-        if name in {text for one in there for text in (one.name, one.header)}:
-            try:
-                unit_of(unit)
-            except SignalError as error:
-                raise SignalError(f'{uri}, column {name!r}: {error}') from None
-        raise
-
-
-def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
-    if isinstance(choices, Mapping):
-        return choices
-    return with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
-
-
-def _select(
-    source: str | Path | Measured,
-    mapping: Mapping,
-    known: Quantities,
-    *,
-    timed: bool = True,
-    whole: bool = False,
-) -> Selection:
-    """Return the columns that `mapping` names; `timed` at their times, `whole` without a missing number."""
-    if not mapping.choices:
-        raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
-    measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
-    uri = measured.provenance.uri
-    signals, quantities, columns = {}, {}, {}
-    for name, choice in mapping.choices.items():
-        column = measured.column(heading_of(measured.headings, choice.column, uri).name)
-        wanted = _other(column, name, choice) if name in mapping.others else quantity(name, known)
-        where = f'{name_of(uri)}, column {column.name!r}'
-        base, notes = column.time, ()
-        if timed:
-            base, notes = times_of(measured, column, mapping.time)
-        elif base is None:
-            base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
-        is_known = _known(where, column, base, whole=whole)
-        own = replace(column, values=column.values[is_known])
-        values, facts, more = _in_si(where, own, wanted, choice, mapping.option)
-        times = base.times[is_known]
-        begin = base.begin + round(SECOND * float(times[0]))
-        if missing := column.values.size - values.size:
-            more.append(f'{column.name}: {missing} samples without a number are left out')
-        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
-        offset = {'offset': choice.offset} if choice.offset else {}
-        columns[name] = {**facts, 'times': base.told, 'samples': int(values.size), **offset}
-        quantities[name] = wanted
-    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
 
 def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
@@ -164,7 +152,7 @@ def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:
     wanted = [choice.column for choice in mapping.choices.values()]
     if timed and mapping.time.column:
         wanted.append(mapping.time.column)
-    names = {heading_of(there, text, str(source)).name for text in wanted}
+    names = {found(text, there, str(source)).name for text in wanted}
     guessed = timed and not mapping.time.column
     chosen = [one.name for one in there if one.name in names or (guessed and is_time(one))]
     return read(source, chosen, mapping.stated)
@@ -184,16 +172,6 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
     return fitting[0] if fitting else None
 
 
-def _other(column: MeasuredColumn, name: str, choice: ColumnChoice) -> Quantity:
-    """Return a quantity of the user's own: any size is taken."""
-    if not (choice.unit or column.unit):
-        raise SignalError(
-            f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
-        )
-    own = Quantity(name, unit_of(choice.unit or column.unit).dimension, '')
-    return replace(own, sentence=f'{name}, in {own.unit.symbol}')
-
-
 def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:
     """Return which samples hold a number; raises `SignalError` for values without times or bounds."""
     if base.times.size != column.values.size:
@@ -210,22 +188,6 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
         raise SignalError(f'{where}: {said} ({bad.size} such of {known.size}); repair it or cut it out')
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
     return known
-
-
-def _in_si(
-    where: str, column: MeasuredColumn, wanted: Quantity, choice: ColumnChoice, option: str
-) -> tuple[FloatArray, dict[str, Any], list[str]]:
-    """Return the values in SI, what a session tells of them, and sentences."""
-    unit, scale, notes = unit_of_column(where, column, wanted, choice, option)
-    values = unit.to_si(column.values)
-    values *= scale  # in place: it can be an hour
-    facts = {'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol}
-    offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
-    if offset:
-        values -= offset
-        which = 'its mean' if choice.offset == MEAN else 'as said'
-        notes.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
-    return values, facts, notes
 
 
 def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:

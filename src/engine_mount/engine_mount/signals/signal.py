@@ -53,6 +53,17 @@ def check_count(name: str, count: int, fewest: int = FEWEST) -> None:
         raise SignalError(f'{name} has {count} samples; at least {fewest} are needed')
 
 
+def check_order(name: str, times: FloatArray, remedy: str) -> None:
+    """Raise `SignalError` where `times` (n,) in s go back."""
+    back = np.flatnonzero(np.diff(times) < 0.0)
+    if back.size:
+        place = int(back[0])
+        raise SignalError(
+            f'{name}: time does not rise at sample {place + 1}: {times[place]:.6f} s is followed by '
+            f'{times[place + 1]:.6f} s; sort the samples, or {remedy}'
+        )
+
+
 def check_size(name: str, values: FloatArray, step_time: float, limit: float, unit: str, remedy: str) -> None:
     """Raise `SignalError` with the largest of `values` (n,), `step_time` s apart, if beyond +- `limit`."""
     ends = (int(values.argmax()), int(values.argmin()))  # no absolute values: they would be an hour once more

@@ -139,12 +139,25 @@ _WORDS = {
 
 
 def unit_of(text: str, dimension: str = '') -> Unit:
-    """Return the unit that `text` spells, such as `m/s²`, `[mm]` or `lbf`; raises `SignalError`.
+    """Return the unit that `text` spells, see `find_unit`; raises `SignalError`."""
+    unit = find_unit(text, dimension)
+    if unit is None:
+        plain = _plain(text)
+        near = [symbol for symbol in _UNITS if symbol.lower() == plain.lower()]
+        near = near or difflib.get_close_matches(plain, _UNITS, n=3, cutoff=0.6)
+        known = f'known are {", ".join(dict.fromkeys(one.symbol for one in _UNITS.values()))}'
+        guess = _TRAPS.get(plain) or (f'is it {" or ".join(near)}?' if near else known)
+        raise SignalError(f'unit {text!r} is not known: {guess}')
+    return unit
+
+
+def find_unit(text: str, dimension: str = '') -> Unit | None:
+    """Return the unit that `text` spells, such as `m/s²`, `[mm]` or `lbf`; None where it is not known.
 
     Of a known `dimension` small letters will do, as headers write them (`_mh`, `_n`, `a_per_s`), unless two
     units differ by capitals alone.
     """
-    plain = text.strip().strip('[](){}').replace('**', '^').replace(' ', '').translate(_SIGNS)
+    plain = _plain(text)
     unit = _UNITS.get(plain) or _WORDS.get(plain.lower())
     if dimension and (unit is None or unit.dimension != dimension):
         small = plain.replace('_per_', '/')
@@ -153,18 +166,13 @@ def unit_of(text: str, dimension: str = '') -> Unit:
         }
         if len(fitting) == 1 and not min(one.symbol for one in fitting).startswith('M'):
             return fitting.pop()
-    if unit is None:
-        raise SignalError(f'unit {text!r} is not known: {_TRAPS.get(plain) or _nearest(plain)}')
     return unit
 
 
 def is_unit(text: str, dimension: str = '') -> bool:
     """Return whether `text` spells a known unit, of `dimension` where one is named."""
-    try:
-        unit = unit_of(text, dimension)
-    except SignalError:
-        return False
-    return dimension in ('', unit.dimension)
+    unit = find_unit(text, dimension)
+    return unit is not None and dimension in ('', unit.dimension)
 
 
 def si_unit(dimension: str) -> Unit:
@@ -177,9 +185,5 @@ def units_of(dimension: str) -> tuple[Unit, ...]:
     return tuple(dict.fromkeys(unit for unit in _UNITS.values() if unit.dimension == dimension))
 
 
-def _nearest(plain: str) -> str:
-    by_case = [symbol for symbol in _UNITS if symbol.lower() == plain.lower()]
-    near = by_case or difflib.get_close_matches(plain, _UNITS, n=3, cutoff=0.6)
-    if near:
-        return f'is it {" or ".join(near)}?'
-    return f'known are {", ".join(dict.fromkeys(unit.symbol for unit in _UNITS.values()))}'
+def _plain(text: str) -> str:
+    return text.strip().strip('[](){}').replace('**', '^').replace(' ', '').translate(_SIGNS)

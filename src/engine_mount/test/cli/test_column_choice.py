@@ -8,7 +8,7 @@ from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.identification.friction.files import friction_mapping, read_recording
 from engine_mount.identification.rack import FileValues, read_force
 from engine_mount.signals.formats.content import Stated
-from engine_mount.signals.importing.importing import read_file
+from engine_mount.signals.importing import read_file
 from engine_mount.signals.mapping import Mapping, mapping_in_file, with_options
 from engine_mount.signals.selection import select
 from engine_mount.signals.signal import SignalError

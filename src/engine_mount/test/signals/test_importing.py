@@ -10,7 +10,7 @@ from engine_mount.recordings.edit import cut
 from engine_mount.recordings.recording import open_recording
 from engine_mount.recordings.session import recorded_session, session_content
 from engine_mount.signals.formats.reading import read
-from engine_mount.signals.importing.importing import import_file
+from engine_mount.signals.importing import import_file
 from engine_mount.signals.mapping import ColumnChoice, Mapping
 from engine_mount.signals.signal import SignalError
 

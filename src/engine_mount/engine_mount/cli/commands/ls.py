@@ -1,6 +1,6 @@
 """`engine-mount ls` and `info`: which recordings there are, and what one of them is."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from engine_mount.cli.commands.options import (
     Dbc,
@@ -87,34 +87,25 @@ def info(
 
     Of a foreign file, its columns.
     """
-    from dataclasses import asdict
-
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.recording import open_run
-    from engine_mount.reports.listing import describe_recording
-    from engine_mount.signals.formats.measured import columns_table, described
+    from engine_mount.reports.listing import describe_measured, describe_recording
     from engine_mount.signals.formats.reading import is_foreign, read
 
     screen = TerminalScreen()
     place = local(recording, screen)
-    figures: dict[str, Any]
     with screen.console.status('reading'):
         if is_foreign(place):
-            measured = read(place, None, stated(dbc, decimal, delimiter))
-            columns, origin, notes = described(measured), measured.provenance, measured.notes
-            read_by = f'{origin.uri}, {origin.format}, read by {origin.reader}'
-            rows, tables = [('file', read_by), ('SHA-256', origin.sha256)], [columns_table(columns)]
-            figures = {'provenance': asdict(origin), 'columns': columns, 'notes': notes}
+            found = describe_measured(read(place, None, stated(dbc, decimal, delimiter)))
         else:
             opened = open_run(place)
-            figures, rows, tables = describe_recording(opened)
+            found = describe_recording(opened)
             whole = 'whole' if opened.whole else 'not whole'
-            rows.insert(0, ('recording', f'{named(opened.path)}, {whole}'))
-            notes = opened.warnings
-    for label, text in rows:
+            found.rows.insert(0, ('recording', f'{named(opened.path)}, {whole}'))
+    for label, text in found.rows:
         screen.say(f'{label:<20}{text}' if label else text)
-    for table in tables:
+    for table in found.tables:
         screen.table(table)
-    for sentence in notes:
+    for sentence in found.notes:
         screen.note(sentence)
-    write_figures(figures, json_file)
+    write_figures(found.figures, json_file)

@@ -35,7 +35,7 @@ from engine_mount.settings.chosen import (
     control_parameters,
     with_recorded_policy,
 )
-from engine_mount.signals.importing.writing import SCENARIO
+from engine_mount.signals.channels import SCENARIO
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_init.parameters import InitParameters
 from mount_models.actuator import contact_force, current_force_table, offset_current

@@ -20,7 +20,7 @@ from engine_mount.identification.friction.recording import (
 )
 from engine_mount.recordings.recording import recording_place
 from engine_mount.signals.formats.cells import name_and_unit
-from engine_mount.signals.formats.content import Stated
+from engine_mount.signals.formats.content import NOT_STATED, Stated
 from engine_mount.signals.formats.measured import Measured, MeasuredColumn, Provenance
 from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name
@@ -46,7 +46,7 @@ _BAND_SPREAD = 0.8
 
 
 def friction_mapping(
-    texts: Sequence[str] = (), mapping: Mapping | None = None, stated: Stated | None = None
+    texts: Sequence[str] = (), mapping: Mapping | None = None, stated: Stated = NOT_STATED
 ) -> Mapping:
     """Return the columns of a mapping, and of `--channel NAME=COLUMN:UNIT` options, which go before it.
 

@@ -1,7 +1,9 @@
 """MCAP files and rosbag2 folders: every number of every topic as `/topic.field`."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +21,6 @@ UNITS = {
     'geometry_msgs/msg/WrenchStamped': {'wrench.force.': 'N', 'wrench.torque.': 'N m'},
 }
 """Units by beginnings of paths, as the definitions of common_interfaces (Jazzy) and REP 103 say."""
-
-
-def is_recording(path: Path) -> bool:
-    """Return whether `path` is a bag: its folder, or one of its files, compressed or not."""
-    names = [file.name for file in path.iterdir()] if path.is_dir() else [path.name]
-    return any(kind in Path(name).suffixes for name in names for kind in ('.mcap', '.db3'))
 
 
 def open_bag(path: Path, stated: Stated) -> Content:
@@ -68,16 +64,13 @@ def open_bag(path: Path, stated: Stated) -> Content:
 def _fields(recording: Recording) -> Iterator[tuple[str, str, str]]:
     """Yield topic, field and unit of all numbers, by the first message of each topic."""
     for topic in recording:
-        try:
-            series = next(recording.parts([topic], 1), None)
-            names = () if series is None else series.names
-        except SeriesError:
-            continue
-        for field in names:
-            if series is not None and not field.startswith('header.stamp.'):
+        with suppress(SeriesError):
+            for series in islice(recording.parts([topic], 1), 1):
                 units = UNITS.get(series.type, {}).items()
-                known = next((unit for start, unit in units if field.startswith(start)), '')
-                yield topic, field, series.unit(field) or known
+                for field in series.names:
+                    if not field.startswith('header.stamp.'):
+                        known = next((unit for start, unit in units if field.startswith(start)), '')
+                        yield topic, field, series.unit(field) or known
 
 
 def _clock(series: Series) -> TimeBase:

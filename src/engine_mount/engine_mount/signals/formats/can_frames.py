@@ -2,7 +2,7 @@
 
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +47,8 @@ class Frames:
         self._times[key].append(time)
         self._payloads[key].append(data)
 
-    def leaves(self, begin: int = 0) -> tuple[list[Leaf], Callable[[Sequence[int]], None]]:
-        """Return the signals there are, and what decodes those of chosen numbers.
+    def leaves(self, begin: int = 0) -> list[Leaf]:
+        """Return the signals there are; a message is decoded, with all its signals, when one is read.
 
         `begin` (ns since 1970, or 0) is when times begin that do not count from 1970 themselves. Raises
         `SignalError` where no frame is known.
@@ -64,30 +64,23 @@ class Frames:
                 f'{self._unknown.total()} frames of {len(self._unknown)} identifiers that {self._dbc.name} '
                 f'does not name: {unknown}'
             )
-        buses = Counter(key for _, key in self._times)
-        places = [(key, signal) for key in sorted(self._times) for signal in self._messages[key[1]].signals]
-        columns: dict[int, tuple[FloatArray, TimeBase]] = {}
+        buses, leaves = Counter(key for _, key in self._times), []
+        for key in sorted(self._times):
+            message, decoded = self._messages[key[1]], cache(partial(self._decode, key, begin))
+            prefix = f'{key[0]}/{message.name}' if buses[key[1]] > 1 else message.name
+            for signal in message.signals:
+                name = signal.name
+                read, clock = (lambda part=part, name=name, of=decoded: of()[name][part] for part in (0, 1))
+                leaves.append(Leaf(f'{prefix}.{name}', read, signal.unit or '', name, clock=clock))
+        return leaves
 
-        def prepare(numbers: Sequence[int]) -> None:
-            for key in {places[number][0] for number in numbers}:
-                wanted = {number: places[number][1].name for number in numbers if places[number][0] == key}
-                columns.update(self._decode(key, wanted, begin))
-
-        leaves = []
-        for number, (key, signal) in enumerate(places):
-            bus = f'{key[0]}/' if buses[key[1]] > 1 else ''
-            name = f'{bus}{self._messages[key[1]].name}.{signal.name}'
-            read, clock = (lambda number=number, part=part: columns[number][part] for part in (0, 1))
-            leaves.append(Leaf(name, read, signal.unit or '', signal.name, clock=clock))
-        return leaves, prepare
-
-    def _decode(self, key: Key, wanted: dict[int, str], begin: int) -> dict[int, tuple[FloatArray, TimeBase]]:
-        """Return the wanted signals (number: name) of a message at the times of frames that hold them.
+    def _decode(self, key: Key, begin: int) -> dict[str, tuple[FloatArray, TimeBase]]:
+        """Return the signals of a message at the times of frames that hold them.
 
         Frames that do not decode are counted.
         """
         message, payloads = self._messages[key[1]], self._payloads[key]
-        columns = {name: np.full(len(payloads), np.nan) for name in wanted.values()}
+        columns = {signal.name: np.full(len(payloads), np.nan) for signal in message.signals}
         faulty, reason = 0, ''
         for place, data in enumerate(payloads):
             try:
@@ -95,8 +88,8 @@ class Frames:
             except Exception as error:  # bitstruct and cantools raise several kinds
                 faulty, reason = faulty + 1, reason or str(error)
                 continue
-            for name in columns.keys() & values.keys():
-                columns[name][place] = values[name]
+            for name, value in values.items():
+                columns[name][place] = value
         if faulty:
             self._notes.append(
                 f'{message.name}: {faulty} of {len(payloads)} frames do not decode ({reason}), left out'
@@ -106,10 +99,10 @@ class Frames:
         if first > _DATED:
             times, begin = times - first, round(first * SECOND)
         found = {}
-        for number, name in wanted.items():
-            known = ~np.isnan(columns[name])
+        for name, column in columns.items():
+            known = ~np.isnan(column)
             base = TimeBase(times[known], begin, f'times of the frames of {message.name}')
-            found[number] = columns[name][known], bases.setdefault(known.tobytes(), base)
+            found[name] = column[known], bases.setdefault(known.tobytes(), base)
         return found
 
 
@@ -132,8 +125,7 @@ def open_can_log(path: Path, stated: Stated) -> Content:
             frames.add(bus, one.arbitration_id, one.is_extended_id, one.timestamp, bytes(one.data))
     if other:
         notes.append(f'{other} error and remote frames are left out')
-    leaves, prepare = frames.leaves()
-    return Content(path, f'CAN log {suffix}', 'python-can, cantools', leaves, notes, prepare)
+    return Content(path, f'CAN log {suffix}', 'python-can, cantools', frames.leaves(), notes)
 
 
 def is_can_log(path: Path) -> bool:

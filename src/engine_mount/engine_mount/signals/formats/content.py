@@ -39,6 +39,9 @@ class Stated:
             raise SignalError(f'decimal sign {self.decimal!r} must be . or ,')
 
 
+NOT_STATED = Stated()
+
+
 @dataclass(frozen=True, eq=False)
 class Leaf:
     """A column before it is read.

@@ -5,6 +5,7 @@ of cells are possible; of these the ones with the fewest columns of text stay. W
 they differ, the titles decide; where these do not either, the table is refused.
 """
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ _NAMES = {
 }  # fmt: skip
 _STATED = {'tab': '\t', '\\t': '\t', ' ': BLANK}
 _MOST = 2000  # lines that are looked at, chosen
+_GROUPED = re.compile(r'[+-]?(?!0)\d{1,3}[.,]\d{3}')
 _ENOUGH = 0.5  # of the lines behind the first that fits, chosen: fewer are no table
 Lines = Sequence[tuple[int, str]]
 """Lines of a file with their numbers from 1 on."""
@@ -52,8 +54,8 @@ class Dialect:
 
 def find_dialect(path: Path, head: Lines, later: Sequence[str], stated: Stated) -> Dialect:
     """Return how to read the lines at the beginning, `head`, and those `later`; raises `SignalError`."""
-    lines = [(number, text) for number, text in head if text.strip() and not is_comment(text)]
-    later = [text for text in later if text.strip() and not is_comment(text)]
+    lines = [(number, text) for number, text in head if is_content(text)]
+    later = [text for text in later if is_content(text)]
     delimiters = [_STATED.get(stated.delimiter, stated.delimiter)] if stated.delimiter else _NAMES
     tried = [_table(lines, later, sign, decimal) for sign in delimiters for decimal in stated.decimal or '.,']
     possible = [dialect for dialect in tried if dialect is not None]
@@ -65,7 +67,14 @@ def find_dialect(path: Path, head: Lines, later: Sequence[str], stated: Stated) 
     if len(found) > 1:
         found = [dialect for dialect in found if _fits_titles(dialect, lines)] or found
     if not found:
-        raise SignalError(_no_table(path, lines))
+        if not lines:
+            raise SignalError(f'{path} holds comments and blank lines only; needed are lines of numbers')
+        number, text = lines[len(lines) // 2]
+        raise SignalError(
+            f'{path}, line {number}: {text.strip()[:80]!r} is no line of a table of numbers; expected are '
+            'lines of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, '
+            'no signs between thousands'
+        )
     if len(found) > 1:
         ways = ' or '.join(
             f'{dialect.told} ({", ".join(dialect.rows[0][:4]).replace(chr(9), " ")})' for dialect in found
@@ -83,13 +92,18 @@ def is_comment(line: str) -> bool:
     return line.lstrip().startswith(COMMENTS)
 
 
+def is_content(line: str) -> bool:
+    """Return whether a line is neither blank nor a comment."""
+    return bool(line.strip()) and not is_comment(line)
+
+
 def _table(lines: Lines, later: Sequence[str], delimiter: str, decimal: str) -> Dialect | None:
     """Return the table that lines are under a delimiter and a decimal sign, None where they are none."""
     rows = [tuple(cells_of(text, delimiter)) for _, text in lines[:_MOST]]
     half = rows[len(rows) // 2 :] + [tuple(cells_of(text, delimiter)) for text in later]
     width = Counter(map(len, half)).most_common(1)[0][0] if half else 0
     body = [row for row in half if len(row) == width]
-    kinds = tuple(_kind([row[place] for row in body], decimal) for place in range(width))
+    kinds = tuple(_kind(cells, decimal) for cells in zip(*body, strict=True))
     fitting = [_fits(row, kinds, decimal) for row in rows]
     if 'number' not in kinds or not any(fitting) or (width == 1) != (delimiter == ALONE):
         return None
@@ -117,8 +131,8 @@ def _kind(cells: Sequence[str], decimal: str) -> str:
 def _fits(row: Sequence[str], kinds: Sequence[str], decimal: str) -> bool:
     if len(row) != len(kinds):
         return False
-    pairs = [(_number_kind(cell, decimal), kind) for cell, kind in zip(row, kinds, strict=True)]
-    own = [(one, kind) for one, kind in pairs if kind != 'text']
+    pairs = zip(row, kinds, strict=True)
+    own = [(_number_kind(cell, decimal), kind) for cell, kind in pairs if kind != 'text']
     return all(one in (kind, 'missing') for one, kind in own) and any(one == kind for one, kind in own)
 
 
@@ -153,26 +167,10 @@ def _refuse_thousands(path: Path, dialect: Dialect) -> None:
     for place, kind in enumerate(dialect.kinds):
         cells = [row[place] for row in dialect.rows if len(row) == width]
         signed = [cell for cell in cells if sign in cell]
-        if kind == 'number' and len(signed) != len(cells) and signed and all(map(_is_grouped, signed)):
+        if kind == 'number' and len(signed) != len(cells) and signed and all(map(_GROUPED.fullmatch, signed)):
             cell = signed[0]
             raise SignalError(
                 f'{path}: column {place} holds {cell!r} beside whole numbers, which may be '
                 f'{cell.replace(sign, ",."[sign == ","])} or {cell.replace(sign, "")}; state it with '
                 '--decimal, or export without signs between thousands'
             )
-
-
-def _is_grouped(cell: str) -> bool:
-    head, _, tail = cell.lstrip('+-').replace(',', '.').partition('.')
-    return len(tail) == 3 and tail.isdecimal() and 1 <= len(head) <= 3 and not head.startswith('0')
-
-
-def _no_table(path: Path, lines: Lines) -> str:
-    if not lines:
-        return f'{path} holds comments and blank lines only; needed are lines of numbers'
-    number, text = lines[len(lines) // 2]
-    return (
-        f'{path}, line {number}: {text.strip()[:80]!r} is no line of a table of numbers; expected are lines '
-        'of equally many cells between semicolons, tabs, commas or blanks, decimal point or comma, no signs '
-        'between thousands'
-    )

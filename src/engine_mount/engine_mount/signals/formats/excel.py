@@ -5,6 +5,7 @@ from contextlib import closing
 from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 from functools import partial
+from itertools import chain, repeat, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -30,17 +31,15 @@ def open_excel(path: Path, stated: Stated) -> Content:
         readable(path, 'Excel workbook (.xlsx)'),
         closing(openpyxl.load_workbook(path, read_only=True, data_only=True)) as book,
     ):
-        tables = {sheet.title: _leaves(path, sheet, notes) for sheet in book.worksheets}
-    tables = {title: leaves for title, leaves in tables.items() if leaves}
-    if len(tables) == 1:
-        return Content(path, 'Excel', 'openpyxl', with_dates(path, *tables.values()), notes)
-    notes.append(f'sheets {", ".join(tables)}: columns are sheet/name')
-    found = [
-        replace(leaf, name=f'{title}/{leaf.name}')
-        for title, leaves in tables.items()
-        for leaf in with_dates(path, leaves)
-    ]
-    return Content(path, 'Excel', 'openpyxl', found, notes)
+        sheets = {sheet.title: _leaves(path, sheet, notes) for sheet in book.worksheets}
+    tables = {title: with_dates(path, leaves) for title, leaves in sheets.items() if leaves}
+    if len(tables) != 1:
+        notes.append(f'sheets {", ".join(tables)}: columns are sheet/name')
+        tables = {
+            title: [replace(leaf, name=f'{title}/{leaf.name}') for leaf in leaves]
+            for title, leaves in tables.items()
+        }
+    return Content(path, 'Excel', 'openpyxl', list(chain(*tables.values())), notes)
 
 
 def _rows(path: Path, sheet: Any) -> Iterator[Row]:
@@ -71,19 +70,18 @@ def _leaves(path: Path, sheet: Any, notes: list[str]) -> list[Leaf]:
     samples = rows[first:]
     while samples and not any(cell is not None for cell in samples[-1]):
         samples.pop()
-    width = max(map(len, samples))
-    names = [titles[place] if place < len(titles) else '' for place in range(width)]
-    names = [name or str(place) for place, name in enumerate(names)]
+    columns = list(zip_longest(*samples))
+    padded = chain(titles, repeat(''))
+    names = [next(padded) or str(place) for place in range(len(columns))]
     found = []
     for place, (name, header, unit) in enumerate(titles_and_units(names, units)):
-        cells = [row[place] if place < len(row) else None for row in samples]
-        kinds = {_is_number(cell) for cell in cells if cell not in _MISSING}
-        known = next((cell for cell in cells if cell not in _MISSING), None)
-        if _is_value(known):
-            read = partial(_values, f'{path}, sheet {title!r}', cells, place, first, _is_number(known))
-            found.append(Leaf(name, read, unit, header, date=not _is_number(known)))
-        elif kinds or header != str(place):
-            why = 'text' if kinds else 'nothing (formulas that were never calculated?)'
+        known = [cell for cell in columns[place] if cell not in _MISSING]
+        if known and _is_value(known[0]):
+            number = _is_number(known[0])
+            read = partial(_values, f'{path}, sheet {title!r}', columns[place], place, first, number)
+            found.append(Leaf(name, read, unit, header, date=not number))
+        elif known or header != str(place):
+            why = 'text' if known else 'nothing (formulas that were never calculated?)'
             notes.append(f'{title}: column {header!r} holds {why}, left out')
     return found
 

@@ -28,8 +28,7 @@ def open_mdf(path: Path, stated: Stated) -> Content:
             f'{path} is no readable MDF file: byte 64 is {head[64:68].hex() or "missing"} where its '
             'header block begins with HD or ##HD; is it cut off, or another format?'
         )
-    notes: list[str] = []
-    frames = None
+    notes, reader = list[str](), 'asammdf'
     with readable(path, 'MDF file'):
         # By a stream, for a path would be mapped whole into memory; of a logger that never closed its file
         # asammdf completes a copy. Frames are decoded by the user's database, by one within the file only
@@ -45,19 +44,13 @@ def open_mdf(path: Path, stated: Stated) -> Content:
         leaves = _leaves(file, path, begin, notes)
         raw = any(channel.name == FRAME for group in file.groups for channel in group.channels)
         if raw and stated.dbc is not None:
-            frames = frames_in_mdf(file, path, stated.dbc, notes)
-    content = Content(path, f'MDF {file.version}', 'asammdf', leaves, notes)
-    if frames is not None:
-        own = len(leaves)
-        decoded, decode = frames.leaves(begin)
-        content.leaves = [*leaves, *decoded]
-        content.reader = 'asammdf, cantools'
-        content.prepare = lambda numbers: decode([number - own for number in numbers if number >= own])
-    elif raw and not leaves:
-        raise SignalError(f'{path} holds raw CAN frames; {NO_DATABASE}')
-    elif raw:
-        notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
-    return content
+            leaves += frames_in_mdf(file, path, stated.dbc, notes).leaves(begin)
+            reader = 'asammdf, cantools'
+        elif raw and not leaves:
+            raise SignalError(f'{path} holds raw CAN frames; {NO_DATABASE}')
+        elif raw:
+            notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
+    return Content(path, f'MDF {file.version}', reader, leaves, notes)
 
 
 def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:
@@ -87,9 +80,25 @@ def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:
 
 
 def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -> FloatArray:
-    """Return the samples of a channel with its conversion; invalid ones are NaN."""
-    _check_places(file, path, number, index)
-    name = file.groups[number].channels[index].name
+    """Return the samples of a channel with its conversion; invalid ones are NaN.
+
+    Raises `SignalError` for a channel, or its times, that ends beyond the record.
+    """
+    group = file.groups[number]
+    # asammdf itself would read on beyond the record
+    size = int(group.channel_group.samples_byte_nr)
+    for place in {index, file.masters_db.get(number, index)}:
+        channel = group.channels[place]
+        if hasattr(channel, 'start_offset'):  # version 3
+            end = channel.start_offset + 8 * channel.additional_byte_offset + channel.bit_count
+        else:
+            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
+        if size <= 0 or end > 8 * size:
+            raise SignalError(
+                f'{path}, channel {channel.name!r}: ends at bit {end} of a record of {size} '
+                'bytes; the file is damaged, export it again'
+            )
+    name = group.channels[index].name
     # asammdf itself would leave out invalid samples, but not their times
     get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True)
     signal = get()
@@ -107,23 +116,6 @@ def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -
     if signal.invalidation_bits is not None:
         values[np.asarray(signal.invalidation_bits, bool)] = np.nan
     return values
-
-
-def _check_places(file: Any, path: Path, number: int, index: int) -> None:
-    """Raise `SignalError` for a channel, or its times, beyond the record, where asammdf reads on."""
-    group = file.groups[number]
-    size = int(group.channel_group.samples_byte_nr)
-    for place in {index, file.masters_db.get(number, index)}:
-        channel = group.channels[place]
-        if hasattr(channel, 'start_offset'):  # version 3
-            end = channel.start_offset + 8 * channel.additional_byte_offset + channel.bit_count
-        else:
-            end = 8 * channel.byte_offset + channel.bit_offset + channel.bit_count
-        if size <= 0 or end > 8 * size:
-            raise SignalError(
-                f'{path}, channel {channel.name!r}: ends at bit {end} of a record of {size} '
-                'bytes; the file is damaged, export it again'
-            )
 
 
 def _group_name(file: Any, number: int) -> str:

@@ -4,10 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from engine_mount.recordings.screen import Table
 from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.sources.uris import is_local, name_of, shown
+from engine_mount.signals.units import unit_of
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -24,6 +23,12 @@ class Provenance:
     size: int
     format: str
     reader: str
+
+    def for_session(self) -> dict[str, Any]:
+        """Return what a session says of a file: its name, any URI, hash, size, format, reader."""
+        uri = {} if is_local(self.uri) else {'uri': shown(self.uri)}
+        own = {'sha256': self.sha256, 'bytes': self.size, 'format': self.format, 'reader': self.reader}
+        return {'file': name_of(self.uri), **uri, **own}
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +99,8 @@ class Measured:
 def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
     """Return the heading meant by `wanted`: its name, header, last part of the name, or number from 0 on.
 
-    Names are tried in this order, then once more without regard to capitals; raises `SignalError`.
+    Names are tried in this order, then once more without regard to capitals; raises `SignalError`, also for
+    an unknown unit behind a name.
     """
     for fitting in _fitting(wanted, headings):
         if len(fitting) == 1:
@@ -103,6 +109,12 @@ def found(wanted: str, headings: Sequence[Heading], uri: str) -> Heading:
             raise SignalError(
                 f'{uri}: column {wanted!r} is ambiguous: {listed(fitting)}; name one of these in full'
             )
+    name, _, unit = wanted.rpartition(':')
+    if any(name in (one.name, one.header) for one in headings):
+        try:
+            unit_of(unit)
+        except SignalError as error:
+            raise SignalError(f'{uri}, column {name!r}: {error}') from None
     raise SignalError(f'{uri} has no column {wanted!r}; its columns are {listed(headings)}')
 
 
@@ -121,50 +133,3 @@ def _fitting(wanted: str, headings: Sequence[Heading]) -> Iterator[list[Heading]
         yield [one for one in headings if text(one.header) == word]
         yield [one for one in headings if text(one.name).endswith(('/' + word, '.' + word))]
     yield [one for one in headings if wanted.isdecimal() and one.number == int(wanted)]
-
-
-Facts = dict[str, Any]
-"""A column in numbers: samples, how many are missing (NaN), range in its unit, mean rate (Hz) and span (s).
-
-None where a number is not known, as rate and span where a column holds the times.
-"""
-
-
-def described(measured: Measured) -> list[Facts]:
-    """Return the facts of every column that was read."""
-    return [_facts(column) for column in measured.columns.values()]
-
-
-def columns_table(facts: list[Facts]) -> Table:
-    """Return the facts as a table for people."""
-    titles = ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean')
-    return Table('Columns', 'llrrrrr', [_row(one) for one in facts], titles)
-
-
-def _facts(column: MeasuredColumn) -> Facts:
-    known = column.values[~np.isnan(column.values)]
-    sizes = (known.min, known.mean, known.max)
-    least, mean, greatest = (float(size()) if known.size else None for size in sizes)
-    times = np.zeros(0) if column.time is None else column.time.times
-    span = float(times[-1] - times[0]) if len(times) > 1 else None
-    missing = column.values.size - known.size
-    return {
-        'name': column.name, 'unit': column.unit, 'samples': column.values.size, 'missing': missing,
-        'least': least, 'mean': mean, 'greatest': greatest,
-        'rate': (len(times) - 1) / span if span else None, 'span': span,
-    }  # fmt: skip
-
-
-def _row(one: Facts) -> tuple[str, ...]:
-    rate, span = ('' if one[key] is None else f'{one[key]:.6g}' for key in ('rate', 'span'))
-    sizes = ('none', '')
-    if one['mean'] is not None:
-        sizes = (f'{one["least"]:.4g} .. {one["greatest"]:.4g}', f'{one["mean"]:.4g}')
-    return (
-        one['name'],
-        one['unit'],
-        str(one['samples']),
-        rate and f'{rate} Hz',
-        span and f'{span} s',
-        *sizes,
-    )

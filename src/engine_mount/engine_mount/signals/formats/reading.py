@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine_mount.signals.formats.bag import is_recording
-from engine_mount.signals.formats.content import Content, Stated
+from engine_mount.signals.formats.arrays import is_array_folder
+from engine_mount.signals.formats.can_frames import is_can_log
+from engine_mount.signals.formats.content import NOT_STATED, Content, Stated
 from engine_mount.signals.formats.measured import Heading, Measured, Provenance, found
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.stores import local_copy
@@ -37,18 +38,18 @@ _SUFFIXES = {
 """Formats by suffix, where the first bytes do not tell."""
 _MODULES = {
     'npy': 'arrays', 'npz': 'arrays', 'array_folder': 'arrays', 'json': 'trees', 'matlab': 'trees',
-    'hdf5': 'trees', 'can_log': 'can_frames',
+    'hdf5': 'trees', 'parquet': 'trees', 'can_log': 'can_frames',
 }  # fmt: skip
 """Where `open_FORMAT` is, if not in a module called like the format."""
 
 
-def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated | None = None) -> Measured:
+def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated = NOT_STATED) -> Measured:
     """Return the columns of the file or folder at `uri`, only those that `columns` name where given.
 
     Raises `SignalError` or `SourceError` with one sentence: file, place, value, what was expected, remedy.
     """
     with local_copy(str(uri)) as path:
-        content = _opened(path, stated or Stated())
+        content = _opened(path, stated)
         there = content.headings
         chosen = there if columns is None else [found(wanted, there, str(uri)) for wanted in columns]
         loaded = content.load(list(dict.fromkeys(chosen)), named=columns is not None)
@@ -63,23 +64,29 @@ def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated |
     return Measured(columns_read, provenance, tuple(notes), others)
 
 
-def headings(uri: str | Path, stated: Stated | None = None) -> tuple[Heading, ...]:
+def headings(uri: str | Path, stated: Stated = NOT_STATED) -> tuple[Heading, ...]:
     """Return which columns the file or folder at `uri` has, without their values; raises as `read`."""
     with local_copy(str(uri)) as path:
-        return _opened(path, stated or Stated()).headings
+        return _opened(path, stated).headings
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether `path` is a bag: its folder, or one of its files, compressed or not."""
+    names = [file.name for file in path.iterdir()] if path.is_dir() else [path.name]
+    return any(kind in Path(name).suffixes for name in names for kind in ('.mcap', '.db3'))
 
 
 def is_foreign(path: Path) -> bool:
     """Return whether `path` is a file, or a folder of NPY files, rather than a recording of ROS 2."""
     if is_recording(path) or (path / 'recording').exists():
         return False
-    return path.is_file() or _is_array_folder(path)
+    return path.is_file() or is_array_folder(path)
 
 
 def _opened(path: Path, stated: Stated) -> Content:
     """Return the opened file; a module is loaded when a file needs it."""
     try:
-        kind = _kind_of_folder(path) if path.is_dir() else _kind_of_file(path)
+        kind = _kind(path)
         module = importlib.import_module(f'engine_mount.signals.formats.{_MODULES.get(kind, kind)}')
         content: Content = getattr(module, f'open_{kind}')(path, stated)
         return content
@@ -87,7 +94,16 @@ def _opened(path: Path, stated: Stated) -> Content:
         raise SignalError(f'{path} may not be read by you; change its permissions') from None
 
 
-def _kind_of_file(path: Path) -> str:
+def _kind(path: Path) -> str:
+    if path.is_dir():
+        if is_recording(path):
+            return 'bag'
+        if is_array_folder(path):
+            return 'array_folder'
+        raise SignalError(
+            f'{path} is a folder without a recording; give one file of it, the folder of a rosbag2 '
+            'recording, or of pairs of NPY files (value and t, x_value.npy and x_t.npy)'
+        )
     with path.open('rb') as file:
         head = file.read(512)
     suffix = path.suffix.lower()
@@ -105,32 +121,12 @@ def _kind_of_file(path: Path) -> str:
             return kind
     if is_recording(path):
         return 'bag'
-    if suffix in ('.blf', '.trc', '.asc', '.log'):
-        from engine_mount.signals.formats.can_frames import is_can_log
-
-        if is_can_log(path):
-            return 'can_log'
+    if suffix in ('.blf', '.trc', '.asc', '.log') and is_can_log(path):
+        return 'can_log'
     text = b'\0' not in head or head.startswith((b'\xff\xfe', b'\xfe\xff'))
     if not text and suffix not in (*_SUFFIXES, '.csv', '.txt'):
         raise SignalError(f'{path.name}: files of type {suffix or "(none)"} are not read; read are {_READ}')
     return _SUFFIXES.get(suffix, 'text')
-
-
-def _kind_of_folder(path: Path) -> str:
-    if is_recording(path):
-        return 'bag'
-    if _is_array_folder(path):
-        return 'array_folder'
-    raise SignalError(
-        f'{path} is a folder without a recording; give one file of it, the folder of a rosbag2 recording, or '
-        'of pairs of NPY files (value and t, x_value.npy and x_t.npy)'
-    )
-
-
-def _is_array_folder(path: Path) -> bool:
-    from engine_mount.signals.formats.arrays import is_array_folder
-
-    return is_array_folder(path)
 
 
 def _hashed(path: Path) -> tuple[str, int]:

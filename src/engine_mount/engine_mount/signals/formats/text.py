@@ -26,7 +26,7 @@ from engine_mount.signals.formats.cells import (
     titles_and_units,
 )
 from engine_mount.signals.formats.content import Content, Leaf, Stated, with_dates
-from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment
+from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment, is_content
 from engine_mount.signals.signal import SignalError
 
 HEAD = 1 << 18
@@ -53,7 +53,13 @@ def open_text(path: Path, stated: Stated) -> Content:
 
     def prepare(numbers: Sequence[int]) -> None:
         places = list(dict.fromkeys([*numbers, *dates]))
-        columns.update(zip(places, _read(path, codec, dialect, first, places, titles), strict=True))
+        blocks = [
+            _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
+            for number, block in (_samples(path, codec, dialect, first) if places else ())
+        ]
+        if places and not blocks:
+            raise SignalError(f'{path} holds no samples; needed are lines below the titles')
+        columns.update(zip(places, map(np.concatenate, zip(*blocks, strict=True)), strict=True))
 
     leaves = [
         Leaf(
@@ -113,27 +119,38 @@ def _titles(
     path: Path, dialect: Dialect, above: Sequence[str]
 ) -> tuple[list[str], list[str], int, list[str]]:
     """Return titles, units or [], the number of the first line of samples, and notes."""
-    plain = [text for text in above if text.strip() and not is_comment(text)]
+    plain = [text for text in above if is_content(text)]
     found = [_as_titles(text, dialect) for text in plain]
     units = found.pop() if len(found) > 1 and found[-2] and is_unit_row(found[-1]) else []
-    if found and found[-1]:
-        return found[-1], units, dialect.first, _left_out(plain[: len(found) - 1])
-    if plain and plain[-1] == above[-1]:
-        _refuse_other_width(path, dialect, plain[-1])
-    comments = [text for text in above if is_comment(text)]
-    commented = _as_commented(comments[-1], dialect) if comments else []
-    if commented:
-        return commented, [], dialect.first, _left_out(plain)
-    names = [str(place) for place in range(len(dialect.kinds))]
-    counted, behind = [cell for cell in dialect.rows[0] if cell], dialect.rows[1:]
-    fractions = sum(dialect.decimal in cell for row in behind for cell in row)
-    if len(counted) > 1 and counted == names[: len(counted)] and 2 * fractions >= len(behind):
-        # as an export of a frame without names begins
-        titles = [cell or 'index' for cell in dialect.rows[0]]
-        return titles, [], dialect.first + 1, ['the first line is taken as numbers of the columns']
-    if dialect.kinds[-1] == 'missing':
-        names[-1] = ''
-    return names, [], dialect.first, [*_left_out(plain), 'no titles: the columns are numbered from 0 on']
+    titles, above_titles = found[-1] if found else [], plain[: len(found) - 1]
+    first, width, notes = dialect.first, len(dialect.kinds), list[str]()
+    if not titles:
+        cells = cells_of(plain[-1], dialect.delimiter) if plain and plain[-1] == above[-1] else []
+        # the line just above the samples looks like titles of other columns
+        if len(cells) > 1 and width > 1 and all(cell and not _is_number(cell) for cell in cells):
+            raise SignalError(
+                f'{path}, line {first - 1}: {len(cells)} titles ({", ".join(cells)[:80]}) above lines of '
+                f'{width} cells ({", ".join(dialect.rows[0])[:80]}); is a decimal comma among commas? Export '
+                'with semicolons, or with one title for each column'
+            )
+        comments = [text for text in above if is_comment(text)]
+        titles, above_titles = _as_commented(comments[-1], dialect) if comments else [], plain
+    if not titles:
+        titles = [str(place) for place in range(width)]
+        counted, behind = [cell for cell in dialect.rows[0] if cell], dialect.rows[1:]
+        fractions = sum(dialect.decimal in cell for row in behind for cell in row)
+        if len(counted) > 1 and counted == titles[: len(counted)] and 2 * fractions >= len(behind):
+            # as an export of a frame without names begins
+            titles, above_titles, first = [cell or 'index' for cell in dialect.rows[0]], [], first + 1
+            notes = ['the first line is taken as numbers of the columns']
+        else:
+            notes = ['no titles: the columns are numbered from 0 on']
+            if dialect.kinds[-1] == 'missing':
+                titles[-1] = ''
+    if above_titles:
+        count, line = len(above_titles), above_titles[0]
+        notes.insert(0, f'{count} lines before the titles are left out, the first {line[:60]!r}')
+    return titles, units, first, notes
 
 
 def _as_titles(text: str, dialect: Dialect) -> list[str]:
@@ -143,9 +160,9 @@ def _as_titles(text: str, dialect: Dialect) -> list[str]:
     if dialect.delimiter == BLANK and len(cells) != width:
         cells = _GAPS.split(text.strip())
     while len(cells) > width and not cells[-1]:
-        cells = cells[:-1]
+        cells.pop()
     if len(cells) == width - 1 and dialect.kinds[-1] == 'missing':
-        cells = [*cells, '']
+        cells.append('')
     words = [cell for cell in cells if kind_of(cell, dialect.decimal) not in ('number', 'missing')]
     return cells if len(cells) == width and words else []
 
@@ -162,37 +179,7 @@ def _is_number(cell: str) -> bool:
     return 'number' in (kind_of(cell, '.'), kind_of(cell, ','))
 
 
-def _refuse_other_width(path: Path, dialect: Dialect, text: str) -> None:
-    """Raise `SignalError` where the line just above the samples looks like titles of other columns."""
-    cells, width = cells_of(text, dialect.delimiter), len(dialect.kinds)
-    if len(cells) > 1 and width > 1 and all(cell and not _is_number(cell) for cell in cells):
-        raise SignalError(
-            f'{path}, line {dialect.first - 1}: {len(cells)} titles ({", ".join(cells)[:80]}) above lines '
-            f'of {width} cells ({", ".join(dialect.rows[0])[:80]}); is a decimal comma among commas? Export '
-            'with semicolons, or with one title for each column'
-        )
-
-
-def _left_out(lines: Sequence[str]) -> list[str]:
-    return (
-        [f'{len(lines)} lines before the titles are left out, the first {lines[0][:60]!r}'] if lines else []
-    )
-
-
 # Samples.
-
-
-def _read(
-    path: Path, codec: str, dialect: Dialect, first: int, places: Sequence[int], titles: Sequence[str]
-) -> list[NDArray[Any]]:
-    """Return the columns at `places`; raises `SignalError` with line, column and cell."""
-    blocks = [
-        _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
-        for number, block in (_samples(path, codec, dialect, first) if places else ())
-    ]
-    if places and not blocks:
-        raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-    return [np.concatenate([block[number] for block in blocks]) for number in range(len(places))]
 
 
 def _samples(path: Path, codec: str, dialect: Dialect, first: int) -> Iterator[tuple[int, str]]:

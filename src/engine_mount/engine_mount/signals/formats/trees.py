@@ -1,7 +1,8 @@
-"""What nests, as columns by their paths (`imu.acc.z`): JSON, MATLAB up to 7 (scipy), 7.3 and HDF5 (h5py)."""
+"""What nests, as columns by their paths (`imu.acc.z`): JSON, MATLAB, HDF5 and Parquet."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from engine_mount.signals.extras import required
 from engine_mount.signals.formats.arrays import leaves_of
-from engine_mount.signals.formats.cells import date_in
+from engine_mount.signals.formats.cells import date_in, name_and_unit
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
 from engine_mount.signals.signal import SignalError
 
@@ -19,6 +20,7 @@ _LONGEST_VECTOR = 64  # numbers of one sample, chosen: a covariance has 36
 _UNITS = ('Units', 'units', 'Unit', 'unit')
 _VALUES = ('Data', 'data', 'values', 'Values')
 """Keys of the samples, to which the unit beside them belongs."""
+_ARROW_NUMBERS = ('int', 'uint', 'float', 'double', 'halffloat', 'bool', 'timestamp', 'decimal')
 _OBJECTS = (
     'objects of MATLAB (timeseries, timetable, table) are read by MATLAB alone, left out; save their '
     'numbers: s.time = ts.Time; s.data = ts.Data'
@@ -34,7 +36,7 @@ def leaves_in(tree: Any, notes: list[str], name: str = '', unit: str = '') -> It
     elif isinstance(tree, list):
         for place, value in enumerate(tree[:_MOST]):
             key = _text(value, 'name', 'Name', 'label') or place
-            yield from leaves_in(value, notes, f'{name}.{key}'.lstrip('.'))
+            yield from leaves_in({key: value}, notes, name)
     elif hasattr(tree, 'dtype') and hasattr(tree, 'shape'):
         attributes = getattr(tree, 'attrs', {})
         # HDF5 holds the rows of a matrix of MATLAB as columns
@@ -174,3 +176,37 @@ def _node(file: Any, node: Any, notes: list[str], depth: int) -> Any:
     if node.dtype.kind == 'O' and node.dtype.metadata and 'ref' in node.dtype.metadata:
         return [_node(file, file[one], notes, depth + 1) for one in np.asarray(node).reshape(-1)[:_MOST]]
     return node
+
+
+# Parquet.
+
+
+def open_parquet(path: Path, stated: Stated) -> Content:
+    """Return the columns of a Parquet file, one within a struct as `struct.field`; dates are times."""
+    parquet = required('pyarrow.parquet', 'reading Parquet files')
+    with readable(path, 'Parquet file'):
+        file = parquet.ParquetFile(path)
+        leaves = list(_arrow_leaves(file, file.schema_arrow))
+    return Content(path, 'Parquet', 'pyarrow', with_dates(path, leaves))
+
+
+def _arrow_leaves(file: Any, fields: Iterable[Any], above: str = '') -> Iterator[Leaf]:
+    for field in fields:
+        path, kind = f'{above}.{field.name}'.lstrip('.'), str(field.type)
+        if kind.startswith('struct'):
+            yield from _arrow_leaves(file, map(field.type.field, range(field.type.num_fields)), path)
+            continue
+        told = _text(
+            {key.decode(errors='replace'): text for key, text in (field.metadata or {}).items()}, *_UNITS
+        )
+        name, unit = (path, told) if told else name_and_unit(path)
+        date = kind.startswith('timestamp')
+        read = partial(_arrow_values, file, path, 'timestamp[ns]' if date else 'float64')
+        yield Leaf(name, read if kind.startswith(_ARROW_NUMBERS) else None, unit, path, date)
+
+
+def _arrow_values(file: Any, path: str, kind: str) -> Any:
+    table = file.read(columns=[path])
+    while any(str(field.type).startswith('struct') for field in table.schema):
+        table = table.flatten()
+    return table.column(0).cast(kind, safe=False).to_numpy()

@@ -11,6 +11,7 @@ behind the line that begins with `$$` numbers follow in records of 80 bytes.
 """
 
 import re
+from contextlib import suppress
 
 import numpy as np
 
@@ -110,9 +111,12 @@ def _sections(name: str, content: bytes) -> tuple[Sections, bytes, int]:
 
 def _numbers(sections: Sections, keyword: str) -> dict[str, float]:
     """Return the numbers of a section by their names; what is no number is left out."""
-    pairs = (line.partition('=') for line in sections.get(keyword, ()))
-    texts = {word.strip(' .\t').upper(): text for word, _, text in pairs}
-    return {word: float(text) for word, text in texts.items() if _is_number(text)}
+    found = {}
+    for line in sections.get(keyword, ()):
+        word, _, text = line.partition('=')
+        with suppress(ValueError):
+            found[word.strip(' .\t').upper()] = float(text)
+    return found
 
 
 def _table(name: str, sections: Sections, data: bytes, line: int) -> tuple[list[str], list[str], FloatArray]:
@@ -137,8 +141,7 @@ def _long_sections(
     name: str, titles: list[str], units: list[str], road: dict[str, float]
 ) -> tuple[FloatArray, list[int]]:
     """Return the lateral places (m, rising) of the long sections and their columns."""
-    found = {column: _SECTION.fullmatch(title) for column, title in enumerate(titles)}
-    matches = {column: match for column, match in found.items() if match}
+    matches = {column: match for column, title in enumerate(titles) if (match := _SECTION.fullmatch(title))}
     foreign = [f'{titles[column]} [{units[column]}]' for column in matches if units[column] != 'm']
     named = {float(match[1]): column for column, match in matches.items() if match[1]}
     numbered = {int(match[2]): column for column, match in matches.items() if match[2]}
@@ -169,14 +172,14 @@ def _text_table(name: str, data: bytes, channels: int, width: int, first: int) -
     whole = b''.join(line.rstrip(b'\r')[:_RECORD].ljust(_RECORD) for line in lines)
     cells = np.char.strip(np.frombuffer(whole, f'S{width}').reshape(-1, records * _RECORD // width))
     cells = np.where(np.char.startswith(cells, b'*'), b'nan', cells)[:, :channels]
-    try:
-        return cells.astype(float)
-    except ValueError as error:
-        bad = next(
-            place for place, cell in enumerate(cells.ravel()) if not _is_number(cell.decode('latin-1'))
-        )
-        line = first + bad // channels * records + bad % channels * width // _RECORD
-        raise SignalError(f'{name}, line {line}: {error}; each number has {width} characters') from None
+    numbers = np.empty(cells.size)
+    for place, cell in enumerate(cells.ravel().tolist()):
+        try:
+            numbers[place] = float(cell)
+        except ValueError as error:
+            line = first + place // channels * records + place % channels * width // _RECORD
+            raise SignalError(f'{name}, line {line}: {error}; each number has {width} characters') from None
+    return numbers.reshape(cells.shape)
 
 
 def _binary_table(name: str, data: bytes, channels: int, kind: str) -> FloatArray:
@@ -195,11 +198,3 @@ def _binary_table(name: str, data: bytes, channels: int, kind: str) -> FloatArra
     table = numbers[: rows * channels].reshape(rows, channels)
     filled = np.flatnonzero(~np.isnan(table).all(axis=1))
     return table[: filled[-1] + 1] if filled.size else table[:0]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -7,11 +7,11 @@ long waves, averaged over the length on which a tyre stands, and is faded in as 
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from engine_mount.signals.even_grid import EvenSignal
-from engine_mount.signals.importing.writing import told_provenance
 from engine_mount.signals.resampling import resampled
 from engine_mount.signals.roads.iso8608 import (
     LONGEST_WAVE,
@@ -65,8 +65,7 @@ def doubts_of_speed(speed: float) -> list[str]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class WheelHeight:
+class WheelHeight(NamedTuple):
     """Heights (n,) in m under the wheel every `STEP_TIME`, and what is to be told of them.
 
     `told` is plain data for the session: where the road came from, its class, the speed. `notes` are
@@ -76,13 +75,6 @@ class WheelHeight:
     height: FloatArray
     told: dict[str, object]
     notes: tuple[str, ...]
-
-    def write(self, folder: Path) -> Path:
-        """Write `road_value.npy` with its times beside it, which the simulator reads; return its path."""
-        folder.mkdir(parents=True, exist_ok=True)
-        np.save(folder / 'road_t.npy', STEP_TIME * np.arange(self.height.size))
-        np.save(folder / 'road_value.npy', self.height)
-        return folder / 'road_value.npy'
 
 
 def wheel_height(
@@ -127,7 +119,7 @@ def wheel_height(
         )
     found = unevenness(profile)
     told: dict[str, object] = {
-        **told_provenance(profile.provenance),
+        **profile.provenance.for_session(),
         'length_m': round(profile.length, 3),
         'spacing_m': round(profile.spacing, 6),
         'iso_8608': f'{found.letter}, Gd {1e6 * found.roughness:.3g}e-6 m^3, waviness {found.waviness:.2f}',

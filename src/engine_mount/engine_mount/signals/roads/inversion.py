@@ -68,7 +68,7 @@ def inverted(signal: Signal, speed: float) -> InvertedRoad:
     acceleration = acceleration_at(even, STEP_TIME)[:]
     # the road is as if repeated for ever: a pause keeps its end from its beginning
     pause = np.zeros(round(_PAUSE / STEP_TIME))
-    height = road_of(np.concatenate([acceleration, pause]), STEP_TIME, Vehicle())[: acceleration.size]
+    height = _road_of(np.concatenate([acceleration, pause]))[: acceleration.size]
     notes = [*even.notes, *doubts_of_speed(speed)]
     reached = 0.4 * even.rate
     if reached < BAND[1]:
@@ -76,18 +76,23 @@ def inverted(signal: Signal, speed: float) -> InvertedRoad:
     return InvertedRoad(speed * STEP_TIME * np.arange(height.size), height, tuple(notes))
 
 
-def road_of(acceleration: FloatArray, step_time: float, vehicle: Vehicle) -> FloatArray:
+def _road_of(acceleration: FloatArray) -> FloatArray:
     """Return the road (m) that gives the chassis of a vehicle without friction its `acceleration` (m/s^2).
 
-    Both (n,), `step_time` s apart, as if repeated for ever; within `BAND`, faded at the edges.
+    Both (n,), `STEP_TIME` apart, as if repeated for ever; within `BAND`, faded at the edges.
     """
     spectrum = np.fft.rfft(acceleration - mean(acceleration))
-    frequency = np.fft.rfftfreq(acceleration.size, step_time)
-    fade = _fade(frequency)
+    frequency = np.fft.rfftfreq(acceleration.size, STEP_TIME)
+    low, high = BAND
+    fade = np.clip((frequency / low - 1.0) / _EDGE + 1.0, 0.0, 1.0)
+    fade = fade * np.clip((1.0 - frequency / high) / _EDGE + 1.0, 0.0, 1.0)
     used = fade > 0.0
+    response = chassis_response(Vehicle(), frequency[used])
+    # 1 / response, held back where the response is weak (Tikhonov)
+    floor = WEAKEST * float(np.median(np.abs(response)))
+    inverse = np.conj(response) / (np.abs(response) ** 2 + floor**2)
     road = np.zeros_like(spectrum)
-    response = chassis_response(vehicle, frequency[used])
-    road[used] = spectrum[used] * fade[used] * _inverse(response)
+    road[used] = spectrum[used] * fade[used] * inverse
     return np.asarray(np.fft.irfft(road, acceleration.size), np.float64)
 
 
@@ -117,15 +122,3 @@ def chassis_response(vehicle: Vehicle, frequency: FloatArray) -> ComplexArray:
 
 def _stands_on(spring: ComplexArray, load: ComplexArray) -> ComplexArray:
     return spring * load / (spring + load)
-
-
-def _fade(frequency: FloatArray) -> FloatArray:
-    low, high = BAND
-    fade = np.clip((frequency / low - 1.0) / _EDGE + 1.0, 0.0, 1.0)
-    return np.asarray(fade * np.clip((1.0 - frequency / high) / _EDGE + 1.0, 0.0, 1.0))
-
-
-def _inverse(response: ComplexArray) -> ComplexArray:
-    """Return 1 / response, held back where the response is weak (Tikhonov)."""
-    floor = WEAKEST * float(np.median(np.abs(response)))
-    return np.asarray(np.conj(response) / (np.abs(response) ** 2 + floor**2))

@@ -100,15 +100,12 @@ class Unevenness(NamedTuple):
 
     def sentences(self) -> tuple[str, ...]:
         """Return what is to be told beside a road, one sentence a line."""
-        told = [
+        found = (
             f'ISO 8608 class {self.letter}: Gd(0.1 cycles/m) {1e6 * self.roughness:.3g}e-6 m^3, waviness '
             f'{self.waviness:.2f}, from {self.lowest:.3g} to {self.highest:.3g} cycles/m'
-        ]
-        if self.beyond:
-            told.append(
-                'too short or too coarse for 0.1 cycles/m: the class continues the line and is a guess'
-            )
-        return tuple(told)
+        )
+        guess = 'too short or too coarse for 0.1 cycles/m: the class continues the line and is a guess'
+        return (found, guess) if self.beyond else (found,)
 
 
 def unevenness(profile: RoadProfile) -> Unevenness:

@@ -59,30 +59,20 @@ def road_profile(
         places, heights, notes = read_track(name, content, lateral)
         digest = hashlib.sha256(content).hexdigest()
         provenance = Provenance(str(uri), digest, len(content), 'OpenCRG', 'engine_mount.signals')
-        return _checked_profile(name, places, heights, provenance, notes)
-    measured = read(uri)
-    spaced = re.fullmatch(r'[\d.]+(e-?\d+)?', distance)
-    known = by_name(_HEIGHT) if spaced else by_name(_HEIGHT, _DISTANCE)
-    said = {'height': column, 'distance': distance}
-    texts = [f'{name}={text}' for name, text in said.items() if text and name in known]
-    mapping = with_options(Mapping(option=_OPTION), texts, known=known)
-    rows = select_rows(measured, mapping, known, known)
-    heights = rows['height']
-    places = float(distance) * np.arange(heights.size) if spaced else rows['distance']
-    chosen = mapping.columns['height'].column if column else EFFECTIVE
-    effective = chosen == EFFECTIVE and EFFECTIVE in measured.columns
-    return _checked_profile(name, places, heights, measured.provenance, measured.notes, effective)
-
-
-def _checked_profile(
-    name: str,
-    places: FloatArray,
-    heights: FloatArray,
-    provenance: Provenance,
-    notes: tuple[str, ...],
-    effective: bool = False,
-) -> RoadProfile:
-    """Return heights (n,) at places (n,), m, on an even grid; raises `SignalError` where they are no road."""
+        effective = False
+    else:
+        measured = read(uri)
+        provenance, notes = measured.provenance, measured.notes
+        spaced = re.fullmatch(r'[\d.]+(e-?\d+)?', distance)
+        wanted = by_name(_HEIGHT) if spaced else by_name(_HEIGHT, _DISTANCE)
+        said = {'height': column, 'distance': distance}
+        texts = [f'{what}={text}' for what, text in said.items() if text and what in wanted]
+        mapping = with_options(Mapping(option=_OPTION), texts, known=wanted)
+        rows = select_rows(measured, mapping, wanted, wanted)
+        heights = rows['height']
+        places = float(distance) * np.arange(heights.size) if spaced else rows['distance']
+        chosen = mapping.columns['height'].column if column else EFFECTIVE
+        effective = chosen == EFFECTIVE and EFFECTIVE in measured.columns
     known = np.flatnonzero(np.isfinite(heights))
     if not known.size:
         raise SignalError(f'{name} holds no height: all {heights.size} are missing')
@@ -92,6 +82,24 @@ def _checked_profile(
     profile = RoadProfile(float(places[known[0]]), spacing, even, provenance, (*notes, *done), effective)
     _check_road(profile)
     return profile
+
+
+def _check_road(profile: RoadProfile) -> None:
+    """Raise `SignalError` for heights in another unit, and for an acceleration in their place."""
+    rms = root_mean_square(profile)
+    if not SMOOTHEST <= rms <= ROUGHEST:
+        what, guess = ('rougher', 'mm instead of m') if rms > ROUGHEST else ('smoother', 'm instead of mm')
+        raise SignalError(
+            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} than any road '
+            f'({SMOOTHEST:g} .. {ROUGHEST:g} m, chosen); are they in {guess}?'
+        )
+    waviness = unevenness(profile).waviness
+    if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:
+        raise SignalError(
+            f'{profile.name}: a waviness of {waviness:.2f} with {rms:.3g} m rms is not that of heights '
+            '(1.5 to 3.5) but of accelerations (about 0); if it is one, drive it with --scenario recorded, '
+            'or make a road of it with engine-mount road invert'
+        )
 
 
 def _even_places(name: str, places: FloatArray, heights: FloatArray) -> tuple[float, FloatArray, list[str]]:
@@ -128,21 +136,3 @@ def _even_places(name: str, places: FloatArray, heights: FloatArray) -> tuple[fl
     if wide:
         note = f'{wide} gaps are interpolated, the longest of {steps[longest]:.3g} m at {places[longest]:g} m'
     return exact, interpolated(places, heights, grid), [note]
-
-
-def _check_road(profile: RoadProfile) -> None:
-    """Raise `SignalError` for heights in another unit, and for an acceleration in their place."""
-    rms = root_mean_square(profile)
-    if not SMOOTHEST <= rms <= ROUGHEST:
-        what, guess = ('rougher', 'mm instead of m') if rms > ROUGHEST else ('smoother', 'm instead of mm')
-        raise SignalError(
-            f'{profile.name}: waves up to 100 m have a height of {rms:.3g} m rms, {what} than any road '
-            f'({SMOOTHEST:g} .. {ROUGHEST:g} m, chosen); are they in {guess}?'
-        )
-    waviness = unevenness(profile).waviness
-    if waviness < _FLAT_SPECTRUM and rms > _HIGH_STONES:
-        raise SignalError(
-            f'{profile.name}: a waviness of {waviness:.2f} with {rms:.3g} m rms is not that of heights '
-            '(1.5 to 3.5) but of accelerations (about 0); if it is one, drive it with --scenario recorded, '
-            'or make a road of it with engine-mount road invert'
-        )

@@ -219,7 +219,24 @@ def _filesystem(uri: str) -> tuple[Any, str]:
     logging.getLogger('asyncio').addFilter(_is_new)
     own = importlib.import_module('fsspec').config.conf
     if kind == 'ssh':
-        return _ssh(files, uri, {**own.get('ssh', {}), **own.get('sftp', {})})
+        # sshfs itself reads no configuration of fsspec
+        parts = urlsplit(uri)
+        options = {
+            'known_hosts': (),  # of the user, as ssh does; by itself sshfs trusts any host
+            'connect_timeout': CONNECT,
+            'login_timeout': SILENCE,
+            'keepalive_interval': CONNECT,
+            'keepalive_count_max': 3,
+            **own.get('ssh', {}),
+            **own.get('sftp', {}),
+            'host': parts.hostname or '',
+        }
+        if parts.port:
+            options['port'] = parts.port
+        if parts.username:
+            options['username'] = unquote(parts.username)
+        path = uri.partition('://')[2].partition('/')[2]
+        return files(**options), f'/{path.rstrip("/")}'
     options = {**files._get_kwargs_from_urls(uri), 'use_listings_cache': False}
     if kind == 'http':
         aiohttp = importlib.import_module('aiohttp')
@@ -238,23 +255,3 @@ def _filesystem(uri: str) -> tuple[Any, str]:
 def _is_new(record: logging.LogRecord) -> bool:
     """Return whether a line of asyncio says more than the error that a broken connection raises as well."""
     return not record.getMessage().startswith(('Task exception was never', 'socket.send() raised'))
-
-
-def _ssh(files: Any, uri: str, own: dict[str, Any]) -> tuple[Any, str]:
-    """Return the SFTP of the host: sshfs itself trusts any host key and reads no configuration of fsspec."""
-    parts = urlsplit(uri)
-    options = {
-        'known_hosts': (),  # of the user, as ssh does; by itself sshfs trusts any host
-        'connect_timeout': CONNECT,
-        'login_timeout': SILENCE,
-        'keepalive_interval': CONNECT,
-        'keepalive_count_max': 3,
-        **own,
-        'host': parts.hostname or '',
-    }
-    if parts.port:
-        options['port'] = parts.port
-    if parts.username:
-        options['username'] = unquote(parts.username)
-    path = uri.partition('://')[2].partition('/')[2]
-    return files(**options), f'/{path.rstrip("/")}'

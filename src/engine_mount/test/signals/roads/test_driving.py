@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from engine_mount.drives.external_excitation import measured_road
 from engine_mount.signals.formats.measured import Provenance
-from engine_mount.signals.roads.driving import STEP_TIME, doubts_of_speed, speed_of, wheel_height
-from engine_mount.signals.roads.iso8608 import RoadProfile
+from engine_mount.signals.roads.driving import STEP_TIME, Road, doubts_of_speed, speed_of, wheel_height
+from engine_mount.signals.roads.iso8608 import RoadProfile, unevenness
 from engine_mount.signals.signal import SignalError
 
 SOURCE = Provenance('folder/made.csv', 'aa', 1, 'CSV', 'test')
@@ -82,6 +83,7 @@ def test_provenance_and_class_go_into_the_session(tmp_path):
     over = wheel_height(wave(), 20.0)
     told = [over.told[name] for name in ('file', 'sha256', 'speed')]
     assert told == ['made.csv', 'aa', '20 m/s (72 km/h)']
-    file = over.write(tmp_path / 'given')
+    road = wave()
+    file = measured_road(Road(road, unevenness(road), 20.0)).write(tmp_path / 'given')
     np.testing.assert_array_equal(np.load(file), over.height)
     np.testing.assert_allclose(np.diff(np.load(file.with_name('road_t.npy'))), STEP_TIME)

@@ -1,1 +1,0 @@
-"""Files of others as recordings of this project: joined, cut at gaps, written with where they came from."""
