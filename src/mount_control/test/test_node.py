@@ -86,9 +86,6 @@ class Surroundings:
     def send_raw_table(self, raw):
         self._table.publish(raw)
 
-    def send_raw_displacement(self, raw):
-        self._displacement.publish(raw)
-
     def initialise(self):
         """Send what a finished initialisation leaves behind."""
         self.send(-1.0)
@@ -110,22 +107,9 @@ class Surroundings:
 
 
 @pytest.fixture
-def make_control(context):
+def make_control(make_node):
     """Return a function that creates a controller node with parameters, by default of the paper's policy."""
-    made = []
-
-    def make(**parameters):
-        values = {'lockstep': True, **PAPER, **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountControl(context=context, parameter_overrides=overrides))
-        return made[-1]
-
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
-    del node
-    made.clear()
+    return lambda **parameters: make_node(MountControl, **{'lockstep': True, **PAPER, **parameters})
 
 
 @pytest.fixture

@@ -29,20 +29,10 @@ COUNT = 2000
 
 
 @pytest.fixture
-def make_recorder(context, tmp_path):
+def make_recorder(make_node, tmp_path):
     """Return a function that creates a recorder with parameters."""
-    made = []
-
-    def make(name='mount_recorder', **parameters):
-        values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS], **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountRecorder(name, context=context, parameter_overrides=overrides))
-        return made[-1]
-
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
+    values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS]}
+    return lambda **parameters: make_node(MountRecorder, **values | parameters)
 
 
 def publish_streams(publishers, count):
