@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 from command_line import command, refused
+from references import REFERENCES_FOLDER
 
 from engine_mount.reports import report
 from engine_mount.reports.sections import overview as overview_section
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import string_message
 
-REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
 PAPER = ('--set', 'mount_control.policy=switched_viscous')
 BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8', *PAPER)
 MOST = 1_500_000  # bytes of a page
@@ -143,8 +143,8 @@ def test_pictures_lie_beside_the_page(bench, tmp_path):
 
 
 def test_two_recordings_share_the_figures_and_their_differences_are_told(tmp_path):
-    compared = ('--compare', REFERENCES / 'rough', '--out', tmp_path / 'two.html')
-    command('report', REFERENCES / 'gap', *compared)
+    compared = ('--compare', REFERENCES_FOLDER / 'rough', '--out', tmp_path / 'two.html')
+    command('report', REFERENCES_FOLDER / 'gap', *compared)
     page = Page(tmp_path / 'two.html')
     panels = page.figures[0]['panels']
     names = {curve['name'] for panel in panels for curve in panel['curves']}
@@ -187,7 +187,7 @@ def test_a_damaged_recording_is_reported_as_far_as_it_goes(bench, tmp_path):
 def test_what_is_no_recording_is_refused_in_a_sentence(tmp_path):
     (tmp_path / 'x.mcap').write_bytes(b'hello')
     assert 'is no MCAP file' in refused('report', tmp_path / 'x.mcap', codes=(1,))
-    assert '7 recordings in one report are too many' in refused('report', *[REFERENCES / 'gap'] * 7)
+    assert '7 recordings in one report are too many' in refused('report', *[REFERENCES_FOLDER / 'gap'] * 7)
 
 
 @pytest.fixture(scope='module')

@@ -1,4 +1,4 @@
-"""Samples whose numbers are known, and recordings of them."""
+"""Samples whose numbers are known, and recordings of them, for the tests of writer and reader."""
 
 from pathlib import Path
 

@@ -1,8 +1,5 @@
 """What the tests share: a force table as an initialisation makes it, controllers."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +8,6 @@ from mount_control.settings import ControlSettings, control_settings
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.specimen import default_specimen
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 # Currents (A) and normal forces (N) of a closing actuator, rounded; the first is the touch of the pads.
 CURRENTS = np.array([0.4725, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0])

@@ -13,7 +13,6 @@ from mount_driver.protocol import Status
 
 SEEDS = st.integers(0, 1 << 62)
 SOUND = bytes(CODEC.encode_measurement(sample(1), 1))
-HEALTH = bytes(CODEC.encode_status(Status(13.5, 40.0), 1))
 DATAGRAM = pack_message(Frame(CODEC.measurement.frame_id, SOUND))
 
 

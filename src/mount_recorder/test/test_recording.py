@@ -5,7 +5,6 @@ import threading
 import time
 import tracemalloc
 from functools import partial
-from types import SimpleNamespace
 
 import pytest
 from read_back import loss_statement, read_back
@@ -35,10 +34,6 @@ class SlowDisk(BagWriter):
         if self.free is not None:
             self.free.wait()
         super().write(*message)
-
-
-class Fed(SimpleNamespace):
-    """A recorder of two topics, and the functions that hand it messages, one per nanosecond."""
 
 
 @pytest.fixture

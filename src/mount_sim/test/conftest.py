@@ -1,9 +1,7 @@
 """What the tests share: simulated mounts by their parameters, and runs of them."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +13,6 @@ from mount_sim.excitation.building import build_excitation
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import ALONE
 from mount_sim.plant.simulated_car import SimulatedCar, SimulatedMount
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 def sim_parameters(**changes: Any) -> SimParameters:

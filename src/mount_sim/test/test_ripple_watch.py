@@ -227,9 +227,6 @@ def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
         assert (fed(learnt, samples, begin=10_000 * (1 + found)) is not None) is found
 
 
-"""Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
-
-
 ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 125)) ** 2, READY])
 """Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
 

@@ -6,19 +6,19 @@ import shutil
 from pathlib import Path
 
 import pytest
+from references import REFERENCES_FOLDER
 
 from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
 from engine_mount.signals.sources.uris import SourceError
 
-REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
 CHANGE = ('--set', 'mount_control.highest_current=0.7')
 
 
 @pytest.fixture
 def fleet(tmp_path, monkeypatch):
     """A folder with one recording and a damaged one, read in this process."""
-    shutil.copytree(REFERENCES / 'gap', tmp_path / 'fleet' / 'gap')
+    shutil.copytree(REFERENCES_FOLDER / 'gap', tmp_path / 'fleet' / 'gap')
     (tmp_path / 'fleet' / 'broken.mcap').write_bytes(b'not a recording')
 
     def run_tasks(work, items, **_):

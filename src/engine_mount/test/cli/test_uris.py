@@ -7,8 +7,9 @@ from pathlib import Path
 
 import fsspec
 import pytest
+from references import REFERENCES_FOLDER
 
-REFERENCE = Path(__file__).parents[4] / 'bags' / 'reference' / 'gap'
+REFERENCE = REFERENCES_FOLDER / 'gap'
 STORE = 'memory://drives'
 RUN = f'{STORE}/gap'
 KEPT = ('source', 'samples', 'equal_to_recorded', 'compared_setpoints', 'switch_on_s', 'peak_current_a')

@@ -1,14 +1,9 @@
 """What the tests share: small recordings, the genuine bags beside the repository."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
-
-from recorded_drive import write_drive
+from samples import write_drive
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, write_drive
+from samples import PERIOD, START, write_drive
 
 import engine_mount
 from engine_mount.recordings.audit import audit

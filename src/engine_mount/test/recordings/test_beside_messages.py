@@ -5,7 +5,7 @@ import itertools
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from recorded_drive import PERIOD, START, sample
+from samples import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings.audit import audit

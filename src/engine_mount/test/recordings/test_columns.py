@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, joint_state
+from samples import PERIOD, START, joint_state
 
 import engine_mount
 from engine_mount.recordings import SeriesError

@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from recorded_drive import sample
+from samples import sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError

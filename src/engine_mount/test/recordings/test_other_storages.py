@@ -6,9 +6,9 @@ import sqlite3
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, sample
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from samples import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
