@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 from samples import PERIOD, START, joint_state
 
+import engine_mount
+from engine_mount.recordings.recording import Recording
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import string_message
 from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
@@ -16,6 +18,16 @@ LATCHED = {
     **{'deadline': _TIME, 'lifespan': _TIME, 'liveliness': 'automatic', 'liveliness_lease_duration': _TIME},
     'avoid_ros_namespace_conventions': False,
 }
+
+
+def bag_of(folder: Path, topic: str, type_name: str, messages) -> Recording:
+    """Write a recording of one topic with a message each ms, and open it."""
+    writer = BagWriter(folder)
+    writer.add_topic(topic, type_name)
+    for index, raw in enumerate(messages):
+        writer.write(topic, raw, START + index * PERIOD)
+    writer.close()
+    return engine_mount.open(folder)
 
 
 def answers(count: int, *, on: int = 100, off: int = 300, phase: float = 0.0) -> dict[str, np.ndarray]:

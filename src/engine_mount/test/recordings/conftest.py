@@ -1,5 +1,7 @@
 """What the tests share: small recordings, the genuine bags beside the repository."""
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,13 @@ from samples import write_drive
 def drive(tmp_path) -> Path:
     """Return a recording of 500 samples of three topics."""
     return write_drive(tmp_path / 'drive', 500)
+
+
+@pytest.fixture
+def place(tmp_path) -> Callable[[], Path]:
+    """Return a new folder at each call."""
+    numbers = itertools.count()
+    return lambda: tmp_path / f'bag_{next(numbers)}'
 
 
 @pytest.fixture

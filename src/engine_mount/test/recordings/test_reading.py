@@ -2,30 +2,20 @@
 
 import numpy as np
 import pytest
+from compared_drives import bag_of
 from mcap.writer import CompressionType, IndexType, Writer
-from rosbags.typesys import Stores, get_typestore
 from samples import PERIOD, START, joint_state, sample, write_drive
 
 import engine_mount
 from engine_mount.recordings import ReadingError, SeriesError
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.schemas import schema_text
-from mount_ros.messages.cdr import string_message
-from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.cdr import string_message, wrench
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 STRING = 'std_msgs/msg/String'
 INDICES = np.arange(500)
-
-
-def bag_of(folder, topic, type_name, messages):
-    writer = BagWriter(folder)
-    writer.add_topic(topic, type_name)
-    for index, raw in enumerate(messages):
-        writer.write(topic, raw, START + index * PERIOD)
-    writer.close()
-    return engine_mount.open(folder)
 
 
 def test_columns_carry_names_numbers_units_and_stamps(drive):
@@ -95,24 +85,8 @@ def test_names_in_another_order_at_equal_length_are_noticed(tmp_path):
 
 
 def test_instruments_are_read_by_path(tmp_path):
-    types = STORE.types
-    vector = types['geometry_msgs/msg/Vector3']
-    raws = [
-        bytes(
-            STORE.serialize_cdr(
-                types['geometry_msgs/msg/WrenchStamped'](
-                    header=types['std_msgs/msg/Header'](
-                        stamp=types['builtin_interfaces/msg/Time'](sec=index, nanosec=5), frame_id='rack'
-                    ),
-                    wrench=types['geometry_msgs/msg/Wrench'](
-                        force=vector(x=0.0, y=0.0, z=10.0 * index), torque=vector(x=0.0, y=0.0, z=0.0)
-                    ),
-                ),
-                SIM_MOUNT_FORCE.type,
-            )
-        )
-        for index in range(5)
-    ]
+    layout = OneNumberLayout(wrench)
+    raws = [layout.pack(index * 1_000_000_000 + 5, 10.0 * index) for index in range(5)]
     series = bag_of(tmp_path / 'bag', '/sim/mount_force', SIM_MOUNT_FORCE.type, raws)['sim/mount_force']
     np.testing.assert_array_equal(series['wrench.force.z'], 10.0 * np.arange(5))
     np.testing.assert_array_equal(series.stamps, np.arange(5) * 1_000_000_000 + 5)
