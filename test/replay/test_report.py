@@ -19,6 +19,7 @@ from mount_ros.messages.cdr import string_message
 
 PAPER = ('--set', 'mount_control.policy=switched_viscous')
 BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8', *PAPER)
+SHORT = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
 MOST = 1_500_000  # bytes of a page
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 
@@ -96,8 +97,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
     made = tuple(harmonics if make.__name__ == 'harmonics' else make for make in report.SECTIONS)
     monkeypatch.setattr(report, 'SECTIONS', made)
     monkeypatch.setattr(overview_section, 'overview', overview)
-    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
-    printed = command('drive', '--core', *short, '--out', tmp_path / 'run')
+    printed = command('drive', '--core', *SHORT, '--out', tmp_path / 'run')
     page = Page(tmp_path / 'run' / 'report.html')
     for name in ('overview', 'harmonics'):
         told = f'section {name} could not be made: a section with [brackets] fails'
@@ -121,8 +121,7 @@ def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figu
         raise ZeroDivisionError('nothing to draw')
 
     monkeypatch.setattr(broken, fail)
-    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
-    printed = command('drive', '--core', *short, '--out', tmp_path / 'run', codes=(1,))
+    printed = command('drive', '--core', *SHORT, '--out', tmp_path / 'run', codes=(1,))
     assert f'note {file} could not be made: nothing to draw' in printed
     assert f'recording  {tmp_path / "run" / "recording"}' in printed
     assert (tmp_path / 'run' / 'summary.json').exists()
