@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 LIMIT = 240.0  # s: only a hang takes so long
 LATE = 0.020  # s: a setpoint that comes later than this is answered with 0 A
 ATTEMPTS, ATTEMPTS_IN_CI = 2, 4

@@ -1,11 +1,12 @@
 """One table of exit codes holds for all commands, and says of each what it promises."""
 
 import re
-from pathlib import Path
+
+from sources import REPOSITORY
 
 from engine_mount.cli.command import app
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'exit_codes.md'
+PAGE = REPOSITORY / 'docs' / 'reference' / 'exit_codes.md'
 
 
 def _rows() -> dict[str, str]:

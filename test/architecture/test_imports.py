@@ -1,12 +1,11 @@
 """The arrows between the packages point one way."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from loaded_modules import modules_after
 from sources import PACKAGES, ROS_PACKAGES, SOURCES, module_files, modules_of
 
 FLOORS = (
@@ -78,17 +77,15 @@ def test_models_know_no_ros():
 
 
 def test_the_command_loads_what_it_needs_once_it_knows_what_is_wanted():
-    tell = 'import sys, engine_mount.cli.command; print(*sys.modules)'
-    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
-    assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'rclpy', 'mcap'} & set(loaded.split())
+    loaded = modules_after('import engine_mount.cli.command')
+    assert not {'numpy', 'scipy', 'numba', 'matplotlib', 'rclpy', 'mcap'} & loaded
 
 
 def test_no_node_loads_what_only_files_of_others_need():
     """Where asammdf is installed, python-can loads it, and each node would start 4 s later."""
     nodes = ', '.join(f'{package}.node' for package in MAY_TOUCH_ROS)
-    tell = f'import sys, {nodes}, mount_recorder.node, engine_mount.drives.drive; print(*sys.modules)'
-    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
-    assert not {'asammdf', 'pandas', 'pyarrow', 'fsspec', 'dask'} & set(loaded.split())
+    loaded = modules_after(f'import {nodes}, mount_recorder.node, engine_mount.drives.drive')
+    assert not {'asammdf', 'pandas', 'pyarrow', 'fsspec', 'dask'} & loaded
 
 
 def test_the_front_door_of_foreign_files_loads_the_reader_of_recordings_only_for_one():

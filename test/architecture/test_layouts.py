@@ -2,14 +2,15 @@
 
 import json
 import re
-from pathlib import Path
 from xml.etree import ElementTree
+
+from sources import SOURCES
 
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import DEFAULT, POLICIES
 from mount_ros.topics import JOINT_STATE, TOPICS
 
-LAYOUTS = Path(__file__).resolve().parents[2] / 'src' / 'mount_bringup' / 'layouts'
+LAYOUTS = SOURCES / 'mount_bringup' / 'layouts'
 OTHERS = {'sim/chassis_acceleration': 'linear_acceleration.z', 'sim/mount_force': 'wrench.force.z'}
 
 

@@ -2,9 +2,9 @@
 
 import re
 from functools import cache
-from pathlib import Path
 
 import pytest
+from sources import REPOSITORY, SOURCES
 
 from mount_bringup.graph.nodes import SIMULATED
 from mount_control.policy.contract import trace_fields
@@ -20,8 +20,6 @@ from mount_ros.topics import (
     Delivery,
 )
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = REPOSITORY / 'src'
 MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themselves
     'mount_recorder/collector.py',
     'mount_ros/data_path.py',

@@ -6,7 +6,7 @@ declarations.
 
 from collections.abc import Sequence
 
-from generated import PAGES, table, written_by
+from generated import PAGES, page_of, table, written_by
 
 from engine_mount.fleet.tables import COLUMNS, Column
 
@@ -36,7 +36,7 @@ def page() -> str:
         ('result', '`engine-mount fleet replay`, a row for each mount of each recording'),
     ):
         parts += [f'## {name}', f'Made by {of}.', columns_table(COLUMNS[name])]
-    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+    return page_of(parts)
 
 
 def columns_table(columns: Sequence[Column]) -> str:

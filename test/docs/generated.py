@@ -11,6 +11,11 @@ def written_by(file: str) -> str:
     return f'`python test/docs/{Path(file).name}` writes this page, and a test holds it against its source.'
 
 
+def page_of(parts: Iterable[str]) -> str:
+    """Return the text of a page with a blank line between its parts."""
+    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+
+
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table of Markdown; what stands in a cell must not end it."""
     lines = [columns, ['---'] * len(columns), *rows]

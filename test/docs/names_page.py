@@ -6,7 +6,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from generated import PAGES, first_paragraph, table, written_by
+from generated import PAGES, first_paragraph, page_of, table, written_by
 
 from engine_mount.experiments.registry import listed
 from mount_control.policy.registry import DEFAULT, POLICIES, prefix_of
@@ -34,7 +34,7 @@ def page() -> str:
     parts += ['## Policies', f'`mount_control.policy`; `{DEFAULT}` is the default.', policies()]
     parts += ['## Damper laws', '`mount_control.damper` of the policy `switched_viscous`.', dampers()]
     parts += ['## Experiments', '`engine-mount experiment`.', experiments()]
-    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+    return page_of(parts)
 
 
 def scenarios() -> str:

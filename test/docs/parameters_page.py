@@ -6,8 +6,9 @@ against the code.
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
+
+from generated import PAGES, page_of
 
 from mount_bringup.settings import defaults_of_nodes
 from mount_control.settings import parameter_sets
@@ -18,7 +19,7 @@ from mount_models.specimen_choice import SpecimenChoice
 from mount_recorder.parameters import RecorderParameters
 from mount_sim.parameters import NodeParameters, SimParameters
 
-PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'parameters.md'
+PAGE = PAGES / 'parameters.md'
 SETS: dict[str, list[tuple[str, Any]]] = {
     'mount_driver': [('', DriverParameters()), ('', SpecimenChoice())],
     'mount_sim': [('', SimParameters()), ('', NodeParameters())],
@@ -54,7 +55,7 @@ def page() -> str:
                 ]
             ),
         ]
-    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+    return page_of(parts)
 
 
 def notes_of(parameters: NamedTuple, prefix: str) -> Iterator[tuple[str, Quantity]]:

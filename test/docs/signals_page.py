@@ -3,7 +3,7 @@
 `python test/docs/signals_page.py` renews the page; `test_generated_pages.py` holds it against the DBC.
 """
 
-from generated import PAGES, cell, table, written_by
+from generated import PAGES, cell, page_of, table, written_by
 
 from mount_driver.can_library import Database, Message, Signal
 from mount_driver.protocol import DATABASE_FILE
@@ -32,7 +32,7 @@ def page() -> str:
     parts = [HEAD, '## Frames', frames]
     for message in messages:
         parts += [f'## {message.name}', signals_table(message)]
-    return '\n\n'.join(part.rstrip() for part in parts) + '\n'
+    return page_of(parts)
 
 
 def frame_row(message: Message) -> tuple[str, ...]:

@@ -1,20 +1,15 @@
 """A fleet from the first to the last command: the same result from a disk, from S3 and from SFTP."""
 
 import json
-import sys
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 from command_line import command, refused
+from served_stores import Bucket, name_s3_store, s3_server
 
 from engine_mount.fleet import Fleet
 from engine_mount.fleet.example import make_example
-
-# The stores are those that the tests of engine_mount.signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
-
-from served_stores import Bucket, name_s3_store, s3_server
 
 pytestmark = pytest.mark.slow
 

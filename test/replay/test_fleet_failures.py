@@ -6,9 +6,10 @@ import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from references import REFERENCES_FOLDER
+from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
 
 from engine_mount.drives.replay import parsed_changes
 from engine_mount.fleet import job
@@ -19,19 +20,12 @@ from engine_mount.fleet.tables import WritingError
 from engine_mount.signals.sources import remote
 from engine_mount.signals.sources.uris import StoreAwayError
 
-# The stores are those that the tests of engine_mount.signals fetch from.
-sys.path.insert(0, str(Path(__file__).parents[2] / 'src' / 'engine_mount' / 'test' / 'signals'))
-
-from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
-
 pytestmark = pytest.mark.slow
 
-REFERENCES = Path(__file__).parents[2] / 'bags' / 'reference'
 CHANGES = parsed_changes({'highest_current': 0.7})
 NAMES = [f'{number}_{name}' for number in range(3) for name in ('gap', 'opening', 'rough')]
 DONE = 2
 """Recordings that are finished when something happens."""
-SMALLER = 300_000  # bytes: a file of a recording is larger, those of a result are smaller
 PATIENCE = 120.0  # s
 GOES_ON = 'the same command goes on where it stopped'
 GIVEN_UP = (
@@ -61,7 +55,7 @@ if __name__ == '__main__':
 def drives(tmp_path_factory):
     folder = tmp_path_factory.mktemp('fleet') / 'drives'
     for name in NAMES:
-        shutil.copytree(REFERENCES / name[2:], folder / name)
+        shutil.copytree(REFERENCES_FOLDER / name[2:], folder / name)
     return folder
 
 

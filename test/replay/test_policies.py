@@ -1,10 +1,8 @@
 """Another policy than the paper's, one file and one line: driven, recorded, replayed, asked afterwards."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+import viscous_example
 
 import engine_mount
 from engine_mount.drives.drive import drive
@@ -18,7 +16,6 @@ from engine_mount.settings.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES
 from mount_recorder.session import session_text
 
-EXAMPLES = Path(__file__).resolve().parents[2] / 'src' / 'mount_control' / 'test'
 SIM = {'scenario': 'bench', 'timeline.start': 2.8, 'timeline.duration': 1.0}
 CONTINUOUS = {'policy': 'continuous_viscous'}
 CHOSEN = {'policy': 'viscous_example', 'viscous_example.damping_coefficient': 800.0}
@@ -27,14 +24,9 @@ CHOSEN = {'policy': 'viscous_example', 'viscous_example.damping_coefficient': 80
 @pytest.fixture(scope='module', autouse=True)
 def example():
     """Register the worked example as a policy."""
-    patch = pytest.MonkeyPatch()
-    patch.syspath_prepend(EXAMPLES)
-    import viscous_example
-
-    patch.setitem(POLICIES, 'viscous_example', viscous_example)
-    yield
-    patch.undo()
-    sys.modules.pop('viscous_example')
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(POLICIES, 'viscous_example', viscous_example)
+        yield
 
 
 @pytest.fixture(scope='module')

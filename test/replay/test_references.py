@@ -1,9 +1,8 @@
 """The recordings in bags/reference, replayed: every setpoint and intermediate to the bit as accepted."""
 
-from pathlib import Path
-
 import pytest
 from reference_differences import differences_from_reference
+from references import REFERENCES
 
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.reference import ACCEPTED_NAME
@@ -12,10 +11,6 @@ from engine_mount.recordings.session import (
     versions_sentence,
 )
 from mount_recorder.versions import versions
-
-REFERENCES = sorted(
-    folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()
-)
 
 
 @pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import pytest
 from command_line import command, refused
+from references import REFERENCES_FOLDER
 
 from engine_mount.reports import report
 from engine_mount.reports.sections import overview as overview_section
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.cdr import string_message
 
-REFERENCES = Path(__file__).resolve().parents[2] / 'bags' / 'reference'
 PAPER = ('--set', 'mount_control.policy=switched_viscous')
 BENCH = ('--scenario', 'bench', '--duration', '2.5', '--set', 'mount_sim.timeline.start=2.8', *PAPER)
+SHORT = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
 MOST = 1_500_000  # bytes of a page
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 
@@ -96,8 +97,7 @@ def test_a_section_that_fails_is_a_sentence_in_page_and_terminal_and_never_the_e
     made = tuple(harmonics if make.__name__ == 'harmonics' else make for make in report.SECTIONS)
     monkeypatch.setattr(report, 'SECTIONS', made)
     monkeypatch.setattr(overview_section, 'overview', overview)
-    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
-    printed = command('drive', '--core', *short, '--out', tmp_path / 'run')
+    printed = command('drive', '--core', *SHORT, '--out', tmp_path / 'run')
     page = Page(tmp_path / 'run' / 'report.html')
     for name in ('overview', 'harmonics'):
         told = f'section {name} could not be made: a section with [brackets] fails'
@@ -121,8 +121,7 @@ def test_a_drive_whose_picture_or_page_cannot_be_made_says_so_and_keeps_its_figu
         raise ZeroDivisionError('nothing to draw')
 
     monkeypatch.setattr(broken, fail)
-    short = ('--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
-    printed = command('drive', '--core', *short, '--out', tmp_path / 'run', codes=(1,))
+    printed = command('drive', '--core', *SHORT, '--out', tmp_path / 'run', codes=(1,))
     assert f'note {file} could not be made: nothing to draw' in printed
     assert f'recording  {tmp_path / "run" / "recording"}' in printed
     assert (tmp_path / 'run' / 'summary.json').exists()
@@ -143,8 +142,8 @@ def test_pictures_lie_beside_the_page(bench, tmp_path):
 
 
 def test_two_recordings_share_the_figures_and_their_differences_are_told(tmp_path):
-    compared = ('--compare', REFERENCES / 'rough', '--out', tmp_path / 'two.html')
-    command('report', REFERENCES / 'gap', *compared)
+    compared = ('--compare', REFERENCES_FOLDER / 'rough', '--out', tmp_path / 'two.html')
+    command('report', REFERENCES_FOLDER / 'gap', *compared)
     page = Page(tmp_path / 'two.html')
     panels = page.figures[0]['panels']
     names = {curve['name'] for panel in panels for curve in panel['curves']}
@@ -187,7 +186,7 @@ def test_a_damaged_recording_is_reported_as_far_as_it_goes(bench, tmp_path):
 def test_what_is_no_recording_is_refused_in_a_sentence(tmp_path):
     (tmp_path / 'x.mcap').write_bytes(b'hello')
     assert 'is no MCAP file' in refused('report', tmp_path / 'x.mcap', codes=(1,))
-    assert '7 recordings in one report are too many' in refused('report', *[REFERENCES / 'gap'] * 7)
+    assert '7 recordings in one report are too many' in refused('report', *[REFERENCES_FOLDER / 'gap'] * 7)
 
 
 @pytest.fixture(scope='module')

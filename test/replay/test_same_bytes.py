@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+from references import REFERENCES, REFERENCES_FOLDER
 
 import engine_mount
 from engine_mount.recordings.compare import compare
@@ -23,8 +24,6 @@ from mount_ros.topics import EVENT, SESSION, TOPICS
 
 from .made_here import CONTROLS
 
-FOLDER = Path(__file__).parents[2] / 'bags' / 'reference'
-REFERENCES = sorted(path.name for path in FOLDER.iterdir() if path.is_dir())
 LIMIT = 600.0  # s: only a hang takes so long; the first time a process compiles the laws for its processor
 DATA = [topic for topic in TOPICS if topic not in (SESSION, EVENT) and not topic.name.startswith('/')]
 
@@ -54,7 +53,7 @@ def made(folder: Path, emulation: dict[str, str], *recording: Path) -> dict[str,
     settings = {name for each in EMULATED.values() for name in each}
     inherited = {name: value for name, value in os.environ.items() if name not in settings}
     process = subprocess.run(
-        [sys.executable, Path(__file__).with_name('made_here.py'), folder, FOLDER, *recording],
+        [sys.executable, Path(__file__).with_name('made_here.py'), folder, REFERENCES_FOLDER, *recording],
         env={**inherited, **emulation}, capture_output=True, text=True, timeout=LIMIT, check=False,
     )  # fmt: skip
     assert process.returncode == 0, process.stderr
@@ -64,7 +63,7 @@ def made(folder: Path, emulation: dict[str, str], *recording: Path) -> dict[str,
 def differences_of(here: Path, there: Path) -> list[str]:
     """Return which topics and numbers are other bytes in the second folder, and by how much."""
     told = []
-    for path in (*CONTROLS, *(f'replays/{name}/recording' for name in REFERENCES)):
+    for path in (*CONTROLS, *(f'replays/{folder.name}/recording' for folder in REFERENCES)):
         a, b = engine_mount.open(here / path), engine_mount.open(there / path)
         changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
         if changed:

@@ -3,16 +3,13 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from reference_differences import differences_from_reference
+from references import REFERENCES
 
 pytestmark = pytest.mark.slow
 
-REFERENCES = sorted(
-    folder for folder in (Path(__file__).parents[2] / 'bags' / 'reference').iterdir() if folder.is_dir()
-)
 LIMIT = 600.0  # s: only a hang takes so long
 REPLAYS = """
 import sys, types

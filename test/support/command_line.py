@@ -2,10 +2,12 @@
 
 import contextlib
 import io
+from collections.abc import Iterator
 
 import pytest
+from typer.main import get_command
 
-from engine_mount.cli.command import main
+from engine_mount.cli.command import app, main
 
 
 def command(*words, codes=(0,)) -> str:
@@ -19,6 +21,15 @@ def command(*words, codes=(0,)) -> str:
         main([str(word) for word in words])
     assert ended.value.code in codes, printed.getvalue()
     return printed.getvalue()
+
+
+def commands(group=None, prefix='') -> Iterator[str]:
+    """Yield the words of every command."""
+    for name, each in (group or get_command(app)).commands.items():
+        if hasattr(each, 'commands'):
+            yield from commands(each, f'{prefix}{name} ')
+        else:
+            yield prefix + name
 
 
 def refused(*words, codes=(1, 2)) -> str:

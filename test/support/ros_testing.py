@@ -157,6 +157,26 @@ def domain_source(domain_context: 'Context') -> Iterator['DataPath']:
         yield path
 
 
+@pytest.fixture
+def make_node(context: 'Context') -> Iterator[Callable[..., Any]]:
+    """Return a function that makes a node of a class with parameters; it is closed at the end of the test."""
+    from rclpy.parameter import Parameter
+
+    made: list[Any] = []
+
+    def make(kind: type, *arguments: Any, **parameters: Any) -> Any:
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        made.append(kind(*arguments, context=context, parameter_overrides=overrides))
+        return made[-1]
+
+    yield make
+    while made:  # a node that is held stays in the graph
+        node = made.pop()
+        if hasattr(node, 'close'):
+            node.close()
+        node.destroy_node()
+
+
 @contextlib.contextmanager
 def _source(context: 'Context') -> Iterator['DataPath']:
     from rclpy.node import Node

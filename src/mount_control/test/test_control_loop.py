@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from controllers import TABLE_ROWS, make_settings, sine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,13 +17,13 @@ ODD = [-3.0, -0.5, 0.0, 0.2, 1.5, 2.0, 5.0, 19.9, 21.0, 30.0, 1000.001, -1500.0]
 
 
 @pytest.fixture(scope='module')
-def make_loop(make_settings, table_rows):
+def make_loop():
     """Return a function that begins to answer at `START`."""
 
     def make(**parameters):
         loop, chosen = ControlLoop(), make_settings(switching='always', **parameters)
         loop.note(START)
-        loop.begin(chosen, chosen.table(*table_rows), START)
+        loop.begin(chosen, chosen.table(*TABLE_ROWS), START)
         return loop
 
     return make
@@ -51,7 +52,7 @@ ANY_MOTION = {'displacement_velocity': 100.0, 'displacement_noise': 0.1}
 
 @settings(deadline=None, max_examples=200)
 @given(samples(), st.lists(st.integers(0, 59), max_size=3), st.sampled_from([{}, ANY_MOTION]))
-def test_many_answers_are_single_answers_to_the_bit(make_loop, make_settings, given_samples, places, limits):
+def test_many_answers_are_single_answers_to_the_bit(make_loop, given_samples, places, limits):
     stamps, displacements = given_samples
     changes = {place: [make_settings('viscous_4000', quality=0.7)] for place in places if place < len(stamps)}
     single, many = make_loop(**limits), make_loop(**limits)
@@ -75,7 +76,7 @@ def test_many_answers_are_single_answers_to_the_bit(make_loop, make_settings, gi
 
 
 @pytest.mark.parametrize('odd', [math.nan, 0.01])
-def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_loop, sine, odd):
+def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_loop, odd):
     stamps, displacements = START + MS * np.arange(1, 4001), sine(8.0, 1e-3, 4.0)
     displacements[2000] = odd
     single, many = make_loop(), make_loop()
@@ -88,7 +89,7 @@ def test_a_doubt_after_more_than_a_second_without_one_is_no_interruption(make_lo
     assert max(expected[3100:]) > 0.4
 
 
-def test_a_change_waits_for_the_next_sample_that_can_be_used(make_loop, make_settings):
+def test_a_change_waits_for_the_next_sample_that_can_be_used(make_loop):
     loop = make_loop()
     loop.step(START + MS, 0.0)
     loop.change(make_settings('viscous_1000'), 'weaker')
@@ -103,9 +104,7 @@ def test_a_change_waits_for_the_next_sample_that_can_be_used(make_loop, make_set
 
 
 @pytest.mark.parametrize('place', ['_refusal', '_make_changes', 'doubt_of'])
-def test_a_change_that_comes_amid_a_step_is_made_at_that_sample_or_the_next(
-    make_loop, make_settings, monkeypatch, place
-):
+def test_a_change_that_comes_amid_a_step_is_made_at_that_sample_or_the_next(make_loop, monkeypatch, place):
     loop, stronger = make_loop(), make_settings('viscous_4000')
     loop.step(START + MS, 0.0)
     owner = control_loop if place == 'doubt_of' else loop
@@ -125,7 +124,7 @@ def test_a_change_that_comes_amid_a_step_is_made_at_that_sample_or_the_next(
     assert list(loop.changes_made) == ['stronger']
 
 
-def test_a_new_beginning_forgets_what_was_before(make_loop, make_settings, table_rows, sine):
+def test_a_new_beginning_forgets_what_was_before(make_loop):
     loop = make_loop()
     loop.step_many(START + MS * np.arange(1, 301), sine(8.0, 1e-3, 0.3))
     loop.change(make_settings('viscous_1000'), 'weaker')
@@ -134,7 +133,7 @@ def test_a_new_beginning_forgets_what_was_before(make_loop, make_settings, table
     assert loop.faults == 1
     loop.changes_made.clear()
     chosen = make_settings()
-    loop.begin(chosen, chosen.table(*table_rows), START + 301 * MS)
+    loop.begin(chosen, chosen.table(*TABLE_ROWS), START + 301 * MS)
     assert (loop.faults, loop.counts.samples) == (0, 0)
     assert loop.step(START + 302 * MS, 0.0) == OFF
     assert (loop.judgement, list(loop.changes_made)) == (Judgement.RESTART, [])
@@ -212,9 +211,7 @@ def test_invalid_samples_are_bridged_like_missing_ones(loop):
     assert judged(loop, 430) == [(Judgement.RESTART, 0)]
 
 
-def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_measurements(
-    make_settings, table_rows
-):
+def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_measurements():
     chosen = make_settings()
     for activation, expected in (
         (S - 1, Judgement.INTERRUPTED),
@@ -226,16 +223,16 @@ def test_a_sample_is_answered_only_where_the_table_was_made_during_the_present_m
         loop = ControlLoop()
         for stamp in (S, 2 * S, 3 * S):
             loop.note(stamp)
-        loop.begin(chosen, chosen.table(*table_rows), activation)
+        loop.begin(chosen, chosen.table(*TABLE_ROWS), activation)
         loop.step(3 * S, 0.0)
         assert loop.judgement is expected
         assert bool(loop.refusal) == (expected is Judgement.INTERRUPTED)
 
 
-def test_an_interruption_stands_until_the_next_activation(loop, make_settings, table_rows):
+def test_an_interruption_stands_until_the_next_activation(loop):
     assert judged(loop, 401, 1402, 1403) == [(Judgement.USE, 0), *[(Judgement.INTERRUPTED, 0)] * 2]
     chosen = make_settings()
-    loop.begin(chosen, chosen.table(*table_rows), START + 1403 * MS)
+    loop.begin(chosen, chosen.table(*TABLE_ROWS), START + 1403 * MS)
     assert judged(loop, 1404) == [(Judgement.RESTART, 0)]
     assert loop.counts == SampleCounts(samples=1, restarts=1)
 
@@ -254,9 +251,7 @@ def test_samples_at_2_khz_are_bridged_by_their_own_period(make_loop):
         (1, 2, 3, 1, 4, 2, 5, 3),  # one that is behind
     ],
 )
-def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(
-    loop, make_settings, table_rows, stamps
-):
+def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(loop, stamps):
     assert judged(loop, *(400 + ms for ms in stamps))[-1] == (Judgement.FOREIGN, 0)
     assert loop.foreign == (
         '3 displacement samples within 1 s were repeated, older than the one before or less than 0.75 ms '
@@ -264,7 +259,7 @@ def test_a_second_sender_is_noticed_by_its_stamps_and_answered_with_0_ampere(
     )
     assert judged(loop, 500, 501) == [(Judgement.FOREIGN, 0)] * 2
     chosen = make_settings()
-    loop.begin(chosen, chosen.table(*table_rows), START + 500 * MS)
+    loop.begin(chosen, chosen.table(*TABLE_ROWS), START + 500 * MS)
     assert judged(loop, 501) == [(Judgement.RESTART, 0)]
 
 

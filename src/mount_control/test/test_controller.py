@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from controllers import TABLE_ROWS, make_controller, make_law, make_settings, sine
 from hypothesis import given
 from hypothesis import settings as hypothesis
 from hypothesis import strategies as st
@@ -39,7 +40,7 @@ def test_traces_have_the_names_and_units_of_their_topic():
 
 
 @pytest.mark.parametrize('spoiled', [False, True])
-def test_single_steps_equal_a_run_to_the_bit(make_controller, sine, spoiled):
+def test_single_steps_equal_a_run_to_the_bit(spoiled):
     displacement = sine(8.0, 1.3e-3, 0.7) + sine(21.0, 0.2e-3, 0.7)
     displacement[400] = math.nan
     single, whole = make_controller(), make_controller()
@@ -54,7 +55,7 @@ def test_single_steps_equal_a_run_to_the_bit(make_controller, sine, spoiled):
         assert single.trace_record.tobytes() == traces[number].tobytes()
 
 
-def test_the_desired_force_is_the_damper_s_at_the_predicted_velocity(make_controller, sine):
+def test_the_desired_force_is_the_damper_s_at_the_predicted_velocity():
     traces = make_controller().run(sine(8.0, 1e-3, 1.0))
     on = traces[traces['damping_active'] == 1]
     velocity = on['predicted_velocity']
@@ -63,7 +64,7 @@ def test_the_desired_force_is_the_damper_s_at_the_predicted_velocity(make_contro
     assert (on['desired_force'] == 0.0).any()  # the dead zone is in use
 
 
-def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_controller, sine):
+def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force():
     traces = make_controller().run(sine(8.0, 1e-3, 1.0))
     for place in range(500, 1000, 7):
         now, velocity = traces[place], traces['predicted_velocity'][place]
@@ -77,7 +78,7 @@ def test_the_coefficient_is_the_friction_law_s_at_this_velocity_and_force(make_c
 
 @hypothesis(deadline=None, max_examples=40)
 @given(SHAKING)
-def test_the_desired_force_is_odd(make_controller, values):
+def test_the_desired_force_is_odd(values):
     displacement = _held(values)
     one, other = make_controller().run(displacement), make_controller().run(-displacement)
     np.testing.assert_array_equal(one['desired_force'], -other['desired_force'])
@@ -88,9 +89,7 @@ def test_the_desired_force_is_odd(make_controller, values):
     'doubtful', [math.nan, math.inf, -math.inf, 1e300, np.nextafter(FARTHEST_DISPLACEMENT, 2.0)]
 )
 @pytest.mark.parametrize('shaken_for', [0.0, 1.0])
-def test_a_doubtful_displacement_gives_0_ampere_and_leaves_no_mark(
-    make_controller, sine, doubtful, shaken_for
-):
+def test_a_doubtful_displacement_gives_0_ampere_and_leaves_no_mark(doubtful, shaken_for):
     controller, undisturbed = make_controller(), make_controller()
     for x in sine(8.0, 1e-3, shaken_for):
         controller.step(x)
@@ -104,7 +103,7 @@ def test_a_doubtful_displacement_gives_0_ampere_and_leaves_no_mark(
         assert controller.trace_record.tobytes() == undisturbed.trace_record.tobytes()
 
 
-def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
+def test_missing_samples_are_replaced_by_a_straight_line():
     displacement = sine(8.0, 1e-3, 0.5)
     gap = slice(300, 304)  # of 4 samples
     line = displacement.copy()
@@ -120,7 +119,7 @@ def test_missing_samples_are_replaced_by_a_straight_line(make_controller, sine):
         assert bridged.trace[name] == pytest.approx(complete.trace[name], rel=1e-9, abs=1e-12), name
 
 
-def test_restarting_forgets_the_past(make_controller, sine):
+def test_restarting_forgets_the_past():
     used = make_controller()
     used.run(sine(8.0, 1e-3, 0.6))
     used.restart(0.003)
@@ -130,7 +129,7 @@ def test_restarting_forgets_the_past(make_controller, sine):
     assert _equal(used.run(displacement), fresh.run(displacement))
 
 
-def test_a_mount_that_rests_anywhere_is_not_damped(make_controller):
+def test_a_mount_that_rests_anywhere_is_not_damped():
     controller = make_controller()
     controller.restart(0.012)
     traces = controller.run(np.full(1000, 0.012))
@@ -138,8 +137,8 @@ def test_a_mount_that_rests_anywhere_is_not_damped(make_controller):
     assert traces['magnitude'].max() < 1e-15
 
 
-def test_the_force_is_limited_by_the_table(make_settings, table_rows, sine):
-    currents, forces, offset = table_rows
+def test_the_force_is_limited_by_the_table():
+    currents, forces, offset = TABLE_ROWS
     settings = make_settings('viscous_4000')
     weak = settings.table(currents[:4], forces[:4], offset)  # up to 1 A and 75 N
     traces = Controller(ControlLaw(settings, weak)).run(sine(8.0, 2e-3, 1.0))
@@ -147,7 +146,7 @@ def test_the_force_is_limited_by_the_table(make_settings, table_rows, sine):
     assert traces['current'].max() == weak.currents[-1] < 1.0
 
 
-def test_the_window_is_one_period_of_the_chosen_eigenfrequency(make_controller, sine):
+def test_the_window_is_one_period_of_the_chosen_eigenfrequency():
     traces = make_controller(eigenfrequency=10.0).run(sine(10.0, 1e-3, 1.0))
     exceeded = int((traces['magnitude'] > 0.0008).argmax())
     assert int(traces['damping_active'].argmax()) == exceeded + 99
@@ -168,9 +167,7 @@ def _poisoned(controller, name, value):
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize('bridged', [0, 3])
 @pytest.mark.parametrize('name', ['z1', 'earlier', 'window'])
-def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
-    make_controller, sine, name, value, bridged
-):
+def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(name, value, bridged):
     displacement = sine(8.0, 1e-3, 1.2)
     controller, fresh = make_controller(), make_controller()
     before = controller.run(displacement[:507])[-1]
@@ -190,7 +187,7 @@ def test_a_spoiled_memory_ends_damping_in_the_same_step_and_begins_afresh(
     assert controller.faults == 1
 
 
-def test_a_table_or_a_law_that_is_no_number_never_becomes_a_current(make_controller, sine):
+def test_a_table_or_a_law_that_is_no_number_never_becomes_a_current():
     controller = make_controller()
     controller.run(sine(8.0, 1e-3, 0.5))
     controller.memory.tables.current[:] = math.nan
@@ -219,7 +216,7 @@ CHANGES = {
 
 @pytest.mark.parametrize('moment', range(700, 825, 11))  # everywhere in a period
 @pytest.mark.parametrize('change', CHANGES)
-def test_a_change_of_the_law_makes_no_jump(make_controller, make_law, sine, change, moment):
+def test_a_change_of_the_law_makes_no_jump(change, moment):
     displacement = sine(8.0, 1e-3, 1.4)
     controller, stayed = make_controller(), make_controller()
     before = controller.run(displacement[:moment])
@@ -246,7 +243,7 @@ def test_a_change_of_the_law_makes_no_jump(make_controller, make_law, sine, chan
     assert controller.faults == 0
 
 
-def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(make_controller, make_law, sine):
+def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit():
     displacement = sine(8.0, 1e-3, 1.0)
     controller, stayed = make_controller(), make_controller()
     controller.run(displacement[:700])
@@ -257,7 +254,7 @@ def test_a_change_that_leaves_the_band_pass_alone_leaves_it_alone_to_the_bit(mak
     np.testing.assert_array_equal(after['desired_force'], 2.0 * undisturbed['desired_force'])
 
 
-def test_a_change_while_damping_is_off_is_there_at_once(make_controller, make_law, sine):
+def test_a_change_while_damping_is_off_is_there_at_once():
     displacement = np.r_[sine(8.0, 0.1e-3, 0.5), sine(8.0, 1e-3, 1.0)]
     controller = make_controller()
     controller.run(displacement[:400])
@@ -268,9 +265,7 @@ def test_a_change_while_damping_is_off_is_there_at_once(make_controller, make_la
 
 
 @pytest.mark.parametrize('eigenfrequency', [5.0, 8.0, 13.0])
-def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(
-    make_controller, make_law, sine, eigenfrequency
-):
+def test_the_magnitude_stays_the_highest_of_the_last_period_over_a_change_of_it(eigenfrequency):
     displacement = sine(8.0, 1e-3, 0.6) * np.linspace(0.2, 1.0, 600)
     controller = make_controller()
     before = controller.run(displacement[:333])

@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 import pytest
+from bursts import check_burst
 
 from mount_control.control_loop import SampleCounts
 from mount_control.diagnosis import counted_since, verdict
-from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
+from mount_ros.nodes.diagnostics import Level, SlidingWindow
 
 DOUBT = 'displacement moved at 2.00 m/s (limit 1 m/s)'
 BURST = SampleCounts(samples=90, invalid=10, implausible=10, bridged=50)
@@ -81,14 +82,10 @@ def test_the_figures_hold_the_counts_and_the_last_stamp():
 
 @pytest.mark.parametrize('count', ['invalid', 'implausible', 'bridged'])
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(count):
-    window, standing, told = SlidingWindow(SampleCounts()), ActiveFindings(), []
-    for tenth in range(300):
-        found = 100 * min(max(tenth - 49, 0), 5)
-        counts = SampleCounts(samples=100 * tenth, **{count: found})
-        lately = counted_since(window.earlier(tenth / 10, counts), counts)
-        kept = standing.keep(judged(counts, lately, doubt='step'))
-        told.append((kept.level, kept.sentence))
-    warned = [tenth for tenth, (level, _) in enumerate(told) if level is Level.WARN]
-    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
-    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
-    assert len(set(told)) == 2
+    window = SlidingWindow(SampleCounts())
+
+    def judge(time, samples, found):
+        counts = SampleCounts(samples=samples, **{count: found})
+        return judged(counts, counted_since(window.earlier(time, counts), counts), doubt='step')
+
+    check_burst(judge)

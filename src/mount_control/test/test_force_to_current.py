@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from controllers import TABLE_ROWS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,12 +18,12 @@ from mount_control.force_maker import (
 
 
 @pytest.fixture(scope='module')
-def table(table_rows):
-    return resample(*table_rows, 3.0)
+def table():
+    return resample(*TABLE_ROWS, 3.0)
 
 
-def test_nodes_of_the_table_are_met(table, table_rows):
-    currents, forces, _ = table_rows
+def test_nodes_of_the_table_are_met(table):
+    currents, forces, _ = TABLE_ROWS
     for current, force in zip(currents[3:6], forces[3:6], strict=True):  # 75, 180.6, 261 N
         assert current_for(table.currents, table.limits, force) == pytest.approx(current, abs=1e-3)
     assert current_for(table.currents, table.limits, 75.0) == pytest.approx(1.0, abs=1e-12)
@@ -44,8 +45,8 @@ def test_beyond_the_table_its_last_current_holds(table):
 
 
 @pytest.mark.parametrize('offset', [0.0, -0.1, 3.0, 3.5, float('nan')])
-def test_an_offset_current_outside_its_limits_is_refused(table_rows, offset):
-    currents, forces, _ = table_rows
+def test_an_offset_current_outside_its_limits_is_refused(offset):
+    currents, forces, _ = TABLE_ROWS
     with pytest.raises(ForceTableError, match=r'offset_current .* must lie within 0 \.\. 3 A'):
         resample(currents, forces, offset, 3.0)
 
@@ -70,8 +71,8 @@ TOUCH = r'(limits: first touch of the pads within 0 .. 1 N, end up to 10000 N); 
         (0, 3, 0.5, 'must rise strictly'),
     ],
 )
-def test_a_table_that_cannot_be_is_refused(table_rows, row, places, value, sentence):
-    rows = [row.copy() for row in table_rows[:2]]
+def test_a_table_that_cannot_be_is_refused(row, places, value, sentence):
+    rows = [row.copy() for row in TABLE_ROWS[:2]]
     rows[row][places] = value
     with pytest.raises(ForceTableError, match=re.escape(sentence)):
-        resample(*rows, table_rows[2], 3.0)
+        resample(*rows, TABLE_ROWS[2], 3.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from controllers import TABLE_ROWS, sine
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -45,8 +46,8 @@ PAPER = {'policy': 'switched_viscous'}
 class Surroundings:
     """Plays driver and initialisation, and keeps what the controller sends."""
 
-    def __init__(self, context, table_rows):
-        currents, forces, self._offset_current = table_rows
+    def __init__(self, context, TABLE_ROWS):
+        currents, forces, self._offset_current = TABLE_ROWS
         self._rows = np.array([currents, forces])
         self.node = Node('surroundings', context=context)
         self.path = DataPath(self.node, lockstep=True)
@@ -86,9 +87,6 @@ class Surroundings:
     def send_raw_table(self, raw):
         self._table.publish(raw)
 
-    def send_raw_displacement(self, raw):
-        self._displacement.publish(raw)
-
     def initialise(self):
         """Send what a finished initialisation leaves behind."""
         self.send(-1.0)
@@ -110,27 +108,14 @@ class Surroundings:
 
 
 @pytest.fixture
-def make_control(context):
+def make_control(make_node):
     """Return a function that creates a controller node with parameters, by default of the paper's policy."""
-    made = []
-
-    def make(**parameters):
-        values = {'lockstep': True, **PAPER, **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountControl(context=context, parameter_overrides=overrides))
-        return made[-1]
-
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
-    del node
-    made.clear()
+    return lambda **parameters: make_node(MountControl, **{'lockstep': True, **PAPER, **parameters})
 
 
 @pytest.fixture
-def around(context, table_rows):
-    surroundings = Surroundings(context, table_rows)
+def around(context):
+    surroundings = Surroundings(context, TABLE_ROWS)
     yield surroundings
     surroundings.close()
 
@@ -177,9 +162,7 @@ def _shake(around, sine, every=1):
     return around.setpoints
 
 
-def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
-    active, around, sine, table_rows
-):
+def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(active, around):
     active()
     displacement = sine(8.0, 1e-3, 0.5)
     for number, x in enumerate(displacement):
@@ -190,7 +173,7 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
     assert [ms for ms, _ in around.traces] == [ms for ms, _ in around.setpoints]
 
     settings = control_settings(PAPER, default_specimen())
-    core = Controller(ControlLaw(settings, settings.table(*table_rows)))
+    core = Controller(ControlLaw(settings, settings.table(*TABLE_ROWS)))
     core.restart(displacement[0])
     expected = core.run(displacement)
     assert [current for _, current in around.setpoints] == expected['current'].tolist()
@@ -200,7 +183,7 @@ def test_each_displacement_is_answered_with_a_setpoint_and_a_trace_of_its_stamp(
 
 
 def test_a_sample_passes_few_functions_and_its_setpoint_leaves_before_its_trace_is_packed(
-    active, sine, monkeypatch
+    active, monkeypatch
 ):
     """Calls of the product's own functions, over 1000 samples, compiled ones and publishing among them."""
     control, calls, until_setpoint = active(lockstep=False), [], []
@@ -274,7 +257,7 @@ def stranger(context):
 
 @pytest.mark.parametrize('topic', [topics.DISPLACEMENT, topics.AIR_GAP, topics.CURRENT_FORCE_TABLE])
 def test_another_node_that_publishes_what_control_hears_ends_the_damping_at_0_ampere(
-    active, around, sine, stranger, topic
+    active, around, stranger, topic
 ):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
@@ -313,7 +296,7 @@ def test_another_writer_ends_a_graph_in_lock_step_alone(active, lockstep):
 
 
 def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_then_goes_on(
-    active, around, sine, stranger
+    active, around, stranger
 ):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
@@ -328,7 +311,7 @@ def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_
     assert _answers(around, 402)[-1][1] > 0.4
 
 
-def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
+def test_deactivation_leaves_0_ampere_and_silence(active, around):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
     assert control.trigger_deactivate() == SUCCESS
@@ -339,7 +322,7 @@ def test_deactivation_leaves_0_ampere_and_silence(active, around, sine):
     assert _answers(around, 402)[401:] == [(401.0, 0.0)]
 
 
-def test_the_end_of_the_process_leaves_0_ampere(active, around, sine):
+def test_the_end_of_the_process_leaves_0_ampere(active, around):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4
     control.close()
@@ -430,9 +413,7 @@ def _set(control, **values):
         {'switching': 'always'},
     ],
 )
-def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
-    active, around, sine, table_rows, values
-):
+def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(active, around, values):
     control = active()
     displacement = sine(8.0, 1e-3, 0.6)
     _shake(around, sine)
@@ -442,7 +423,7 @@ def test_what_is_set_on_a_node_at_work_acts_from_the_next_sample_and_is_told(
         around.send(number, displacement[number - 1])
         _answers(around, number)
     settings = control_settings(PAPER, default_specimen())
-    table = settings.table(*table_rows)
+    table = settings.table(*TABLE_ROWS)
     core = Controller(ControlLaw(settings, table))
     core.restart(displacement[0])
     expected = core.run(displacement[:400])['current'].tolist()

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 import viscous_example
+from controllers import TABLE_ROWS, sine
 
 from mount_control.controller import ControlLaw, Controller
-from mount_control.policy import continuous_viscous
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
 from mount_control.settings import control_settings, defaults, run_time_parameters
@@ -25,12 +25,12 @@ def registered(monkeypatch):
 
 
 @pytest.fixture
-def make(table_rows):
+def make():
     """Return a function that builds a controller of some parameters."""
 
     def made(**values):
         settings = control_settings(values, default_specimen())
-        return Controller(ControlLaw(settings, settings.table(*table_rows)))
+        return Controller(ControlLaw(settings, settings.table(*TABLE_ROWS)))
 
     return made
 
@@ -58,7 +58,7 @@ def test_a_trace_has_a_predicted_velocity_and_no_name_that_all_have(policy):
     assert len(trace_fields(POLICIES[policy])) == common + len(own) == 9 + len(own)
 
 
-def test_the_example_makes_the_force_that_it_wants(make, sine):
+def test_the_example_makes_the_force_that_it_wants(make):
     traces = make(policy='viscous_example').run(sine(8.0, 1e-3, 1.0))
     np.testing.assert_array_equal(traces['desired_force'], 1000.0 * traces['predicted_velocity'])
     made = traces['normal_force'] * traces['friction_coefficient']
@@ -99,7 +99,7 @@ def test_currents_keep_their_limits_and_off_is_0_ampere(make, policy):
 
 
 @pytest.mark.parametrize('policy', ALL)
-def test_whatever_of_the_memory_is_spoiled_it_begins_afresh_at_0_ampere(make, sine, policy):
+def test_whatever_of_the_memory_is_spoiled_it_begins_afresh_at_0_ampere(make, policy):
     controller = make(policy=policy)
     state = controller.memory.state.view(np.float64)
     counts = controller.memory.state.view(np.int64)
@@ -116,24 +116,20 @@ def test_whatever_of_the_memory_is_spoiled_it_begins_afresh_at_0_ampere(make, si
 
 
 @pytest.mark.parametrize('policy', ALL)
-def test_a_change_of_parameters_lets_the_current_stand_for_a_sample(make, sine, table_rows, policy):
+def test_a_change_of_parameters_lets_the_current_stand_for_a_sample(make, policy):
     controller, displacement = make(policy=policy), sine(8.0, 1e-3, 0.8)
     before = controller.run(displacement[:700])
     settings = control_settings({'policy': policy, 'damper': 'viscous_1000'}, default_specimen())
-    controller.change(ControlLaw(settings, settings.table(*table_rows)))
+    controller.change(ControlLaw(settings, settings.table(*TABLE_ROWS)))
     after = controller.run(displacement[700:])
     assert after['current'][0] == pytest.approx(before['current'][-1], rel=1e-12)
 
 
-def test_a_force_that_would_drive_is_no_force(make, sine, monkeypatch, table_rows):
+def test_a_force_that_would_drive_is_no_force(make, monkeypatch):
     settings = control_settings({'policy': 'viscous_example'}, default_specimen())
     driving = settings.design._replace(law=settings.design.law._replace(damping_coefficient=-1000.0))
     settings = settings._replace(design=driving)
-    traces = Controller(ControlLaw(settings, settings.table(*table_rows))).run(sine(8.0, 1e-3, 0.3))
+    traces = Controller(ControlLaw(settings, settings.table(*TABLE_ROWS))).run(sine(8.0, 1e-3, 0.3))
     assert traces['desired_force'].min() < -40.0
     assert (traces['normal_force'] == 0.0).all()
-    assert (traces['current'] == settings.table(*table_rows).limits.offset_current).all()
-
-
-def test_the_continuous_law_is_the_default():
-    assert control_settings({}, default_specimen()).policy is continuous_viscous
+    assert (traces['current'] == settings.table(*TABLE_ROWS).limits.offset_current).all()

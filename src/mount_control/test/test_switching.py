@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from controllers import make_controller, sine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,12 +16,6 @@ def _run(distances, law=LAW):
     state, window = np.zeros(1, switching.STATE), np.zeros(law.period)
     out = [switching.step(law, state[0], window, x) for x in distances]
     return np.array([m for m, _ in out]), np.array([a for _, a in out])
-
-
-def test_damping_goes_on_one_period_after_the_magnitude_exceeded_the_level():
-    _, active = _run(np.r_[np.zeros(50), 0.00081 * np.ones(300)])
-    assert active.argmax() == 50 + 125 - 1  # the 125th sample above the level
-    assert active[174:].all()
 
 
 def test_at_the_level_itself_damping_stays_off():
@@ -64,7 +59,7 @@ def test_after_switching_off_a_full_period_above_the_level_is_needed_again():
         (10.0, 1e-3, True),
     ],
 )
-def test_what_the_whole_chain_takes_for_a_shaking_engine(make_controller, sine, frequency, amplitude, on):
+def test_what_the_whole_chain_takes_for_a_shaking_engine(frequency, amplitude, on):
     traces = make_controller().run(sine(frequency, amplitude, 3.0))
     assert bool(traces['damping_active'].any()) is on
 
@@ -77,7 +72,7 @@ def test_magnitude_is_the_highest_value_of_the_last_period(distances, period):
     assert magnitude.tolist() == [before[k : k + period].max() for k in range(len(distances))]
 
 
-def test_told_to_damp_always_it_goes_on_after_one_period_and_never_off(make_controller, sine):
+def test_told_to_damp_always_it_goes_on_after_one_period_and_never_off():
     still = np.zeros(2000)
     active = make_controller(switching='always').run(np.r_[still, sine(8.0, 2e-3, 1.0), still])[
         'damping_active'

@@ -1,17 +1,13 @@
-"""What the tests share:  a multicast group of their own, and the far end of the bus."""
+"""What the tests share: a multicast group of their own, and the far end of the bus."""
 
 import itertools
 import os
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
+from car import GOOD, Car
 from ros_testing import free_domain
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
 
 _EACH = 40  # ports
 
@@ -36,10 +32,8 @@ def multicast(ports: Iterator[int]) -> tuple[str, int]:
 
 
 @pytest.fixture
-def make_car() -> Iterator[Callable[..., Any]]:
+def make_car() -> Iterator[Callable[..., Car]]:
     """Return a function that makes a `Car` with some parameters."""
-    from car import Car
-
     made: list[Car] = []
 
     def make(**parameters: Any) -> Car:
@@ -53,10 +47,8 @@ def make_car() -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture
-def car(make_car: Callable[..., Any]) -> Any:
+def car(make_car: Callable[..., Car]) -> Car:
     """Return a car whose first samples were answered with 3 A."""
-    from car import GOOD
-
     made = make_car()
     made.drive(GOOD, made.answer)
     return made

@@ -64,10 +64,6 @@ class FarEnd:
         """Return the next setpoint that fulfils a condition."""
         return wait_until(lambda: found if condition(found := self.setpoint()) else None, 'such a setpoint')
 
-    def nothing_for(self, seconds: float) -> bool:
-        """Whether no setpoint arrives for so long."""
-        return self.bus.recv(seconds) is None
-
     def stream(self, first: int = 0) -> None:
         """Send samples of a coil at 0 A, at about 1 kHz in a thread, and statuses at 10 Hz, until `close`."""
 

@@ -15,15 +15,22 @@ def frame(number, data=b'\x01' * 24, **options):
     return can.Message(arbitration_id=number, is_extended_id=False, is_fd=True, data=data, **options)
 
 
-@pytest.fixture(params=['udp_multicast', 'virtual'])
-def pair(request, multicast):
+@contextlib.contextmanager
+def both_ends(interface, multicast):
+    """Yield two ends of a bus, of which the second receives two identifiers alone."""
     group, port = multicast
-    arguments = (request.param, group if request.param == 'udp_multicast' else f'test-{port}')
+    arguments = (interface, group if interface == 'udp_multicast' else f'test-{port}')
     with (
         open_bus(*arguments, port=port) as far,
         open_bus(*arguments, port=port, receive=(0x210, 0x212)) as near,
     ):
         yield far, near
+
+
+@pytest.fixture(params=['udp_multicast', 'virtual'])
+def pair(request, multicast):
+    with both_ends(request.param, multicast) as ends:
+        yield ends
 
 
 def test_a_frame_tells_when_it_arrived_not_when_it_was_read(pair):
@@ -61,11 +68,7 @@ def test_a_burst_of_half_a_second_is_held(multicast):
 
 
 def test_error_frames_pass_the_filter(multicast):
-    group, port = multicast
-    with (
-        open_bus('udp_multicast', group, port=port) as far,
-        open_bus('udp_multicast', group, port=port, receive=(0x210,)) as near,
-    ):
+    with both_ends('udp_multicast', multicast) as (far, near):
         far.send(can.Message(arbitration_id=0x40, is_extended_id=False, is_error_frame=True, dlc=8))
         assert near.recv(10.0).is_error_frame
 
@@ -76,13 +79,9 @@ FOREIGN = [b'\xc1', msgpack.packb([1, 2, 3]), msgpack.packb(FIELDS | {'data': 'x
 
 @pytest.mark.parametrize('datagram', FOREIGN)
 def test_a_datagram_that_is_no_frame_is_counted_and_the_next_frame_comes(multicast, datagram):
-    group, port = multicast
-    with (
-        open_bus('udp_multicast', group, port=port) as far,
-        open_bus('udp_multicast', group, port=port, receive=(0x210,)) as near,
-    ):
+    with both_ends('udp_multicast', multicast) as (far, near):
         reception = Reception()
-        far._sender.sendto(datagram, (group, port))
+        far._sender.sendto(datagram, multicast)
         far.send(frame(0x210))
         assert reception.frame(near, 10.0).arbitration_id == 0x210
     assert reception.unreadable == 1

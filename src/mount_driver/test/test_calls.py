@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from far_end import FarEnd, sample
 from rclpy.lifecycle import TransitionCallbackReturn
-from rclpy.parameter import Parameter
 
 import mount_driver
 import mount_models
@@ -55,7 +54,7 @@ class Calls:
 
 
 @pytest.fixture
-def driver(context, monkeypatch):
+def driver(make_node, monkeypatch):
     """Return an active driver in real time on a virtual bus, whose frames this thread handles."""
     start = Exchange.start
 
@@ -64,14 +63,9 @@ def driver(context, monkeypatch):
         start(exchange, threaded=False)
 
     monkeypatch.setattr(Exchange, 'start', start_here)
-    values = {'interface': 'virtual', 'channel': 'calls', 'coil_celsius_before': 20.0}
-    node = MountDriver(
-        context=context, parameter_overrides=[Parameter(name, value=value) for name, value in values.items()]
-    )
+    node = make_node(MountDriver, interface='virtual', channel='calls', coil_celsius_before=20.0)
     assert node.trigger_configure() == node.trigger_activate() == TransitionCallbackReturn.SUCCESS
-    yield node
-    node.close()
-    node.destroy_node()
+    return node
 
 
 def wanted(index):

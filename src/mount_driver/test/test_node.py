@@ -7,7 +7,6 @@ import pytest
 from far_end import FarEnd, sample
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from ros_testing import wait_until
 
 from mount_driver.link import Refusal
@@ -27,22 +26,10 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 
 
 @pytest.fixture
-def make_driver(context, multicast):
+def make_driver(make_node, multicast):
     """Return a function that creates a driver with parameters."""
-    made = []
-
-    def make(**parameters):
-        values = {'channel': multicast[0], 'port': multicast[1], 'lockstep': True, **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountDriver(context=context, parameter_overrides=overrides))
-        return made[-1]
-
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
-    del node
-    made.clear()
+    values = {'channel': multicast[0], 'port': multicast[1], 'lockstep': True}
+    return lambda **parameters: make_node(MountDriver, **values | parameters)
 
 
 @pytest.fixture

@@ -123,14 +123,6 @@ def test_a_setpoint_is_limited_to_0_to_3_ampere(wanted, sent):
             CODEC.encode_setpoint(refused, 0)
 
 
-def test_a_received_setpoint_above_3_ampere_is_refused():
-    raw = dict.fromkeys(CODEC.setpoint.names, 0) | {'Current': 30_001}
-    assert CODEC.setpoint.decode(CODEC.setpoint.pack([*raw.values()])) == (
-        0,
-        None,
-    )
-
-
 @pytest.mark.parametrize(
     ('data', 'layout'),
     [

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
 from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings, coil_temperature
@@ -49,42 +50,28 @@ def test_what_is_measured_comes_before_what_is_given_and_that_before_nothing():
     assert unknown.source == 'unknown'
 
 
-def warm(simulated_actuator, celsius):
-    """An actuator whose core and coil are that warm."""
-    plant, warmer = simulated_actuator(), celsius - 20.0
-    plant.coil = plant.coil._replace(
-        conductivity=plant.coil.conductivity / (1.0 + 0.0043 * warmer),
-        resistance=plant.coil.resistance * (1.0 + 0.0039 * warmer),
-    )
-    return plant
-
-
-def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit(
-    simulated_actuator, specimen, run_initialisation
-):
+def test_the_measured_temperature_compensates_as_a_given_one_does_to_the_bit():
     # the ramp begins at 1 ms; what comes behind its middle does not count any more
     made = readings((0.0, 20.0), (1.3, 60.0), (1.4, 100.0))
-    measured = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS, made)
+    measured = run_initialisation(SimulatedActuator(celsius=60.0), SPECIMEN, PARAMETERS, made)
     given = PARAMETERS._replace(coil_temperature_celsius=60.0)
-    expected = run_initialisation(warm(simulated_actuator, 60.0), specimen, given)
+    expected = run_initialisation(SimulatedActuator(celsius=60.0), SPECIMEN, given)
     assert (measured.rest_gap, measured.contact_gap) == (expected.rest_gap, expected.contact_gap)
     assert measured.evidence.temperature == (60.0, 'measured')
-    said = verdict(measured, specimen)
+    said = verdict(measured, SPECIMEN)
     assert said.level == Level.OK
     assert said.figures['coil_temperature_celsius'] == '60.0'
     assert said.figures['coil_temperature_from'] == 'measured'
 
 
-def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warning(
-    simulated_actuator, specimen, run_initialisation
-):
-    result = run_initialisation(warm(simulated_actuator, 60.0), specimen, PARAMETERS)
-    calibrated = PARAMETERS._replace(coil_temperature_celsius=specimen.temperature.calibration_celsius)
-    of_any_resistance = replace(specimen, coil_resistance=None)  # else one told so cold would be refused
-    expected = run_initialisation(warm(simulated_actuator, 60.0), of_any_resistance, calibrated)
+def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warning():
+    result = run_initialisation(SimulatedActuator(celsius=60.0), SPECIMEN, PARAMETERS)
+    calibrated = PARAMETERS._replace(coil_temperature_celsius=SPECIMEN.temperature.calibration_celsius)
+    of_any_resistance = replace(SPECIMEN, coil_resistance=None)  # else one told so cold would be refused
+    expected = run_initialisation(SimulatedActuator(celsius=60.0), of_any_resistance, calibrated)
     assert (result.rest_gap, result.contact_gap) == (expected.rest_gap, expected.contact_gap)
     assert abs(result.rest_gap - 508e-6) > 20e-6  # what the warning is for
-    said = verdict(result, specimen)
+    said = verdict(result, SPECIMEN)
     assert said.level == Level.WARN
     assert said.sentence.startswith('rest gap ')
     assert 'not compensated for the coil temperature, which is unknown: right at 20 degC' in said.sentence
@@ -92,15 +79,11 @@ def test_an_unknown_temperature_is_taken_for_that_of_the_calibration_with_a_warn
     assert said.figures['coil_temperature_from'] == 'unknown'
 
 
-def test_a_specimen_without_compensation_asks_for_no_temperature(
-    simulated_actuator, specimen, run_initialisation
-):
-    plain = replace(specimen, temperature=None)
-    assert verdict(run_initialisation(simulated_actuator(), plain, PARAMETERS), plain).level == Level.OK
+def test_a_specimen_without_compensation_asks_for_no_temperature():
+    plain = replace(SPECIMEN, temperature=None)
+    assert verdict(run_initialisation(SimulatedActuator(), plain, PARAMETERS), plain).level == Level.OK
 
 
-def test_a_measured_temperature_beyond_the_compensation_is_refused(
-    simulated_actuator, specimen, run_initialisation
-):
+def test_a_measured_temperature_beyond_the_compensation_is_refused():
     with pytest.raises(InitialisationError, match=r'coil temperature \(150\.0 degC\)'):
-        run_initialisation(simulated_actuator(), specimen, PARAMETERS, readings((0.0, 150.0)))
+        run_initialisation(SimulatedActuator(), SPECIMEN, PARAMETERS, readings((0.0, 150.0)))

@@ -1,6 +1,7 @@
 """What the node says of its result."""
 
 import pytest
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
 from mount_init.node import verdict, wear_reserve
 from mount_init.parameters import InitParameters
@@ -8,14 +9,14 @@ from mount_ros.nodes.diagnostics import Level
 
 
 @pytest.fixture(scope='module')
-def result(simulated_actuator, specimen, run_initialisation):
+def result():
     return run_initialisation(
-        simulated_actuator(noise=0.01), specimen, InitParameters(coil_temperature_celsius=20.0)
+        SimulatedActuator(noise=0.01), SPECIMEN, InitParameters(coil_temperature_celsius=20.0)
     )
 
 
-def test_a_good_result_is_told_with_its_figures(result, specimen):
-    said = verdict(result, specimen)
+def test_a_good_result_is_told_with_its_figures(result):
+    said = verdict(result, SPECIMEN)
     assert said.level == Level.OK
     assert said.sentence.startswith('rest gap 50')
     assert 'contact gap 34' in said.sentence
@@ -23,10 +24,10 @@ def test_a_good_result_is_told_with_its_figures(result, specimen):
     assert float(said.figures['contact_gap_um']) == pytest.approx(result.contact_gap * 1e6, abs=0.01)
 
 
-def test_worn_pads_are_a_warning_before_they_are_a_refusal(simulated_actuator, specimen, run_initialisation):
-    worn = run_initialisation(simulated_actuator(contact_gap=295e-6), specimen)
-    assert 0.0 < wear_reserve(worn, specimen) < 10e-6
-    said = verdict(worn, specimen)
+def test_worn_pads_are_a_warning_before_they_are_a_refusal():
+    worn = run_initialisation(SimulatedActuator(contact_gap=295e-6))
+    assert 0.0 < wear_reserve(worn, SPECIMEN) < 10e-6
+    said = verdict(worn, SPECIMEN)
     assert said.level == Level.WARN
     assert 'pads are nearly worn' in said.sentence
     assert 'replace the pads' in said.sentence

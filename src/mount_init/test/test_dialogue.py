@@ -4,6 +4,7 @@ import threading
 import time
 
 import pytest
+from simulated_actuator import SPECIMEN
 
 from mount_init.dialogue import CoilDialogue, DriverReport
 from mount_init.errors import InitialisationError
@@ -17,9 +18,8 @@ STEP = 1_000_000  # ns
 class Bench:
     """A dialogue with a coil that follows its setpoints exactly; the ramp runs in a thread of its own."""
 
-    def __init__(self, specimen):
+    def __init__(self):
         self.setpoints = []
-        self.specimen = specimen
         self.dialogue = CoilDialogue(lambda stamp, current: self.setpoints.append((stamp, current)))
         self.ending = threading.Event()
         self.outcome = None
@@ -32,7 +32,7 @@ class Bench:
 
     def start(self, silence_timeout=LONG, total_timeout=LONG):
         parameters = InitParameters(100.0, silence_timeout=silence_timeout, total_timeout=total_timeout)
-        self.ramp = Initialisation(self.specimen, parameters)
+        self.ramp = Initialisation(SPECIMEN, parameters)
         begun = threading.Event()
         begin = self.dialogue._begin
 
@@ -66,8 +66,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench(specimen):
-    made = Bench(specimen)
+def bench():
+    made = Bench()
     yield made
     made.ending.set()
     if made.thread:

@@ -11,6 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from ros_testing import LIMIT, wait_until
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
 from mount_init.node import MountInit
 from mount_init.parameters import InitParameters
@@ -181,13 +182,13 @@ class Graph:
 
 
 @pytest.fixture
-def graph(context, simulated_actuator):
+def graph(context):
     """Return a function that builds the graph; by default in lock-step around a fault-free actuator."""
     made = []
-    simulated_actuator().follow(0.0)  # compiled before the node waits for its samples
+    SimulatedActuator().follow(0.0)  # compiled before the node waits for its samples
 
     def make(plant=None, **parameters):
-        made.append(Graph(context, plant or simulated_actuator(), {'lockstep': True, **parameters}))
+        made.append(Graph(context, plant or SimulatedActuator(), {'lockstep': True, **parameters}))
         return made[-1]
 
     yield make
@@ -195,9 +196,7 @@ def graph(context, simulated_actuator):
         one.close()
 
 
-def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
-    graph, simulated_actuator, specimen, run_initialisation
-):
+def test_activation_measures_in_lock_step_and_latches_gaps_and_table(graph):
     g = graph(coil_temperature_celsius=90.0)
     g.configure()
     g.electronics.send_temperature(45.0)  # what is measured comes first
@@ -209,7 +208,7 @@ def test_activation_measures_in_lock_step_and_latches_gaps_and_table(
     assert stamps == list(range(1, RAMP_LENGTH + 1))
     assert g.electronics.setpoints[-1][1] == 0.0
 
-    core = run_initialisation(simulated_actuator(), specimen, InitParameters(coil_temperature_celsius=45.0))
+    core = run_initialisation(SimulatedActuator(), SPECIMEN, InitParameters(coil_temperature_celsius=45.0))
     stamp, numbers, _ = g.electronics.results[0]
     assert stamp == RAMP_LENGTH * STEP
     # the same samples as plain function calls: the same result to the bit
@@ -247,7 +246,7 @@ def test_after_the_ramp_the_node_leaves_the_coil_to_others(graph):
     assert [current for _, current in g.electronics.setpoints[RAMP_LENGTH:]] == [0.5] * 20
 
 
-def test_a_second_activation_measures_anew(graph, simulated_actuator):
+def test_a_second_activation_measures_anew(graph):
     g = graph()
     g.configure()
     g.electronics.send_sample()
@@ -255,7 +254,7 @@ def test_a_second_activation_measures_anew(graph, simulated_actuator):
     wait_until(lambda: len(g.electronics.tables) == 1, 'the first table')
     assert g.change(Transition.TRANSITION_DEACTIVATE)
     number = g.electronics.plant.number
-    worn = simulated_actuator(contact_gap=330e-6)
+    worn = SimulatedActuator(contact_gap=330e-6)
     worn.number = number
     g.electronics.plant = worn
     assert g.change(Transition.TRANSITION_ACTIVATE)
@@ -269,7 +268,7 @@ def test_a_second_activation_measures_anew(graph, simulated_actuator):
     assert stamps == list(range(1, 2 * RAMP_LENGTH + 1))
 
 
-def test_in_real_time_the_node_hears_the_streams_only_while_it_measures(graph, simulated_actuator):
+def test_in_real_time_the_node_hears_the_streams_only_while_it_measures(graph):
     g = graph(lockstep=False)
     g.configure()
     subscribers = g.electronics.path.node.count_subscribers
@@ -290,8 +289,8 @@ def test_in_real_time_the_node_hears_the_streams_only_while_it_measures(graph, s
         assert g.change(Transition.TRANSITION_DEACTIVATE)
 
 
-def test_a_refused_estimate_leaves_no_result_and_zero_current(graph, simulated_actuator):
-    g = graph(simulated_actuator(contact_gap=230e-6))
+def test_a_refused_estimate_leaves_no_result_and_zero_current(graph):
+    g = graph(SimulatedActuator(contact_gap=230e-6))
     g.configure()
     g.electronics.send_sample()
     assert not g.change(Transition.TRANSITION_ACTIVATE)
@@ -325,8 +324,8 @@ def test_while_another_node_drives_the_coil_activation_is_refused(graph):
     assert {current for _, current in g.electronics.setpoints} == {0.5}
 
 
-def test_what_the_driver_refuses_is_refused_with_its_reason(graph, simulated_actuator):
-    g = graph(simulated_actuator(distort=lambda _, s: (0.0, s[1], s[2])))
+def test_what_the_driver_refuses_is_refused_with_its_reason(graph):
+    g = graph(SimulatedActuator(distort=lambda _, s: (0.0, s[1], s[2])))
     g.configure()
     g.electronics.send_sample()
 

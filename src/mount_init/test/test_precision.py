@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
 from mount_init.initialisation import Initialisation
 from mount_init.parameters import InitParameters
@@ -24,12 +25,12 @@ MS = 1_000_000
 
 
 @pytest.fixture(scope='module')
-def recorded(simulated_actuator, specimen):
+def recorded():
     """Return a function that gives the noise-free samples of a whole ramp, shape (N, 3), and the plant."""
 
     def record(contact_um, rest_um):
-        plant = simulated_actuator(contact_um * 1e-6, rest_um * 1e-6)
-        initialisation, samples = Initialisation(specimen, InitParameters()), []
+        plant = SimulatedActuator(contact_um * 1e-6, rest_um * 1e-6)
+        initialisation, samples = Initialisation(SPECIMEN, InitParameters()), []
         while not initialisation.finished:
             samples.append(plant.sample())
             plant.follow(initialisation.step(len(samples) * MS, *samples[-1]))
@@ -38,8 +39,8 @@ def recorded(simulated_actuator, specimen):
     return record
 
 
-def estimate(samples, specimen):
-    initialisation = Initialisation(specimen, InitParameters())
+def estimate(samples):
+    initialisation = Initialisation(SPECIMEN, InitParameters())
     for number, sample in enumerate(samples.tolist()):
         initialisation.step(number * MS, *sample)
     return initialisation.result()
@@ -60,16 +61,16 @@ def table_error(result, plant):
 
 
 @pytest.mark.parametrize(('contact_um', 'rest_um'), GAPS_UM)
-def test_gaps_and_table_meet_the_truth_without_and_with_noise(recorded, specimen, contact_um, rest_um):
+def test_gaps_and_table_meet_the_truth_without_and_with_noise(recorded, contact_um, rest_um):
     samples, plant = recorded(contact_um, rest_um)
 
-    exact = estimate(samples, specimen)
+    exact = estimate(samples)
     assert exact.rest_gap * 1e6 == pytest.approx(rest_um, abs=1.0)
     assert exact.contact_gap * 1e6 == pytest.approx(contact_um, abs=0.1)
     assert exact.contact_force == pytest.approx(1.4e-1 * (rest_um - contact_um), rel=0.015)
     assert table_error(exact, plant) < 0.01
 
-    noisy = [estimate(with_ripple_noise(samples, 1000 * contact_um + seed), specimen) for seed in SEEDS]
+    noisy = [estimate(with_ripple_noise(samples, 1000 * contact_um + seed)) for seed in SEEDS]
     rest_error = np.array([result.rest_gap * 1e6 - rest_um for result in noisy])
     contact_error = np.array([result.contact_gap * 1e6 - contact_um for result in noisy])
     assert np.abs(rest_error).max() < 4.0
@@ -83,8 +84,8 @@ def test_gaps_and_table_meet_the_truth_without_and_with_noise(recorded, specimen
     )
 
 
-def test_prototype_of_the_paper_is_found(simulated_actuator, specimen, run_initialisation):
-    result = run_initialisation(simulated_actuator(), specimen)
+def test_prototype_of_the_paper_is_found():
+    result = run_initialisation(SimulatedActuator())
     assert result.contact_gap * 1e6 == pytest.approx(349.0, abs=0.1)
     assert result.rest_gap * 1e6 == pytest.approx(508.0, abs=1.0)
     # section 3.2 measures 492 um at 0.2 A
@@ -97,21 +98,21 @@ def test_prototype_of_the_paper_is_found(simulated_actuator, specimen, run_initi
     assert result.table[0, 0] == pytest.approx(0.4725, rel=0.01)
 
 
-def test_outliers_do_not_pull_the_estimates(recorded, specimen):
+def test_outliers_do_not_pull_the_estimates(recorded):
     samples = with_ripple_noise(recorded(349, 508)[0], 1)
     random = np.random.default_rng(2)
     hit = random.random(len(samples)) < 0.03
     samples[hit, 1] *= random.choice([0.3, 3.0], size=hit.sum())
-    result = estimate(samples, specimen)
+    result = estimate(samples)
     assert result.rest_gap * 1e6 == pytest.approx(508.0, abs=4.0)
     assert result.contact_gap * 1e6 == pytest.approx(349.0, abs=2.0)
 
 
-def test_samples_with_nan_are_skipped_and_counted(recorded, specimen):
+def test_samples_with_nan_are_skipped_and_counted(recorded):
     samples = recorded(349, 508)[0]
     samples[::10, 0] = np.nan
     samples[5::10, 2] = np.inf
-    result = estimate(samples, specimen)
+    result = estimate(samples)
     assert result.evidence.skipped == 550
     assert result.evidence.samples == len(samples) - 550
     assert result.rest_gap * 1e6 == pytest.approx(508.0, abs=1.0)
@@ -119,17 +120,9 @@ def test_samples_with_nan_are_skipped_and_counted(recorded, specimen):
 
 
 @pytest.mark.parametrize('celsius', [-20.0, 80.0])
-def test_gaps_are_compensated_for_the_temperature_of_the_coil(
-    simulated_actuator, specimen, run_initialisation, celsius
-):
+def test_gaps_are_compensated_for_the_temperature_of_the_coil(celsius):
     """Contact at -20 degC is extrapolated from 80 degC; without compensation tens of um are left."""
-    plant = simulated_actuator()
-    warmer = celsius - 20.0
-    plant.coil = plant.coil._replace(
-        conductivity=plant.coil.conductivity / (1.0 + 0.0043 * warmer),
-        resistance=plant.coil.resistance * (1.0 + 0.0039 * warmer),
-    )
     parameters = InitParameters(coil_temperature_celsius=celsius, peak_current=2.5)
-    result = run_initialisation(plant, specimen, parameters)
+    result = run_initialisation(SimulatedActuator(celsius=celsius), SPECIMEN, parameters)
     assert result.rest_gap == pytest.approx(508e-6, abs=3e-6)
     assert result.contact_gap == pytest.approx(349e-6, abs=6e-6)

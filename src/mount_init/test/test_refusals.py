@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation, run_ramp
 
 from mount_init.errors import InitialisationError
 from mount_init.initialisation import OFF, Initialisation
@@ -14,13 +15,13 @@ HALF = 1375  # sample number: the peak of the ramp
 
 
 @pytest.fixture
-def refusal(simulated_actuator, specimen, run_initialisation):
+def refusal():
     """Return a function that gives the refusal of a faulty actuator."""
 
     def provoke(parameters=None, changes=None, **faults):
-        changed = dataclasses.replace(specimen, **(changes or {}))
+        changed = dataclasses.replace(SPECIMEN, **(changes or {}))
         with pytest.raises(InitialisationError) as raised:
-            run_initialisation(simulated_actuator(**faults), changed, InitParameters(**(parameters or {})))
+            run_initialisation(SimulatedActuator(**faults), changed, InitParameters(**(parameters or {})))
         return str(raised.value)
 
     return provoke
@@ -172,10 +173,10 @@ def test_a_fault_is_refused_with_value_limit_and_remedy(refusal, fault, sentence
     ],
 )
 def test_a_ramp_that_cannot_go_on_ends_at_once_and_from_its_end_on_only_zero_is_answered(
-    specimen, simulated_actuator, run_ramp, since, reading, ends, sentence
+    since, reading, ends, sentence
 ):
-    plant = simulated_actuator(distort=current_from(since, lambda _: reading))
-    initialisation = run_ramp(plant, specimen)
+    plant = SimulatedActuator(distort=current_from(since, lambda _: reading))
+    initialisation = run_ramp(plant)
     assert plant.number == initialisation.stamps[-1] // 1_000_000 == ends
     assert initialisation.step(10**12, 2.4, 1.0, 1.0) == OFF
     if sentence:
@@ -183,11 +184,11 @@ def test_a_ramp_that_cannot_go_on_ends_at_once_and_from_its_end_on_only_zero_is_
             initialisation.result()
 
 
-def test_a_ramp_that_has_not_ended_has_no_result(specimen):
+def test_a_ramp_that_has_not_ended_has_no_result():
     with pytest.raises(
         InitialisationError, match='0 of 2750 ripple samples received; is mount_driver active'
     ):
-        Initialisation(specimen, InitParameters()).result()
+        Initialisation(SPECIMEN, InitParameters()).result()
 
 
 @pytest.mark.parametrize(
@@ -197,13 +198,13 @@ def test_a_ramp_that_has_not_ended_has_no_result(specimen):
         ({'current_limit': 2.5}, r'peak_current .* must not exceed .*\(2\.500 A\)'),
     ],
 )
-def test_a_specimen_that_does_not_fit_the_ramp_is_refused(specimen, changes, sentence):
+def test_a_specimen_that_does_not_fit_the_ramp_is_refused(changes, sentence):
     with pytest.raises(InitialisationError, match=sentence):
-        Initialisation(dataclasses.replace(specimen, **changes), InitParameters())
+        Initialisation(dataclasses.replace(SPECIMEN, **changes), InitParameters())
 
 
-def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused(specimen, simulated_actuator):
-    plant, initialisation = simulated_actuator(), Initialisation(specimen, InitParameters())
+def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused():
+    plant, initialisation = SimulatedActuator(), Initialisation(SPECIMEN, InitParameters())
     while not initialisation.finished:
         plant.follow(initialisation.step((plant.number + 1) * 500_000, *plant.sample()))
     with pytest.raises(InitialisationError, match='at 2000 Hz, but sample_rate of mount_init is 1000 Hz'):
@@ -218,11 +219,9 @@ def test_ripple_at_another_rate_than_the_ramp_is_made_for_is_refused(specimen, s
         (0.1, math.nan, {'coil_resistance': None}),
     ],
 )
-def test_a_resistance_that_the_temperature_explains_or_nobody_knows_is_granted(
-    simulated_actuator, specimen, run_initialisation, ohm, celsius, changes
-):
+def test_a_resistance_that_the_temperature_explains_or_nobody_knows_is_granted(ohm, celsius, changes):
     parameters = InitParameters(coil_temperature_celsius=celsius, smallest_travel=2e-6)
-    plant = simulated_actuator(distort=of_resistance(ohm))
-    result = run_initialisation(plant, dataclasses.replace(specimen, **changes), parameters)
+    plant = SimulatedActuator(distort=of_resistance(ohm))
+    result = run_initialisation(plant, dataclasses.replace(SPECIMEN, **changes), parameters)
     assert result.evidence.supply.whole.ohm == pytest.approx(ohm, abs=1e-6)
     assert result.evidence.supply.whole.link_voltage == pytest.approx(14.0, abs=1e-6)

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
 from mount_init.errors import InitialisationError
 from mount_init.parameters import InitParameters
@@ -13,13 +14,13 @@ COLD = InitParameters(coil_temperature_celsius=20.0)
 
 
 @pytest.fixture
-def initialise_at(simulated_actuator, specimen, run_initialisation):
+def initialise_at():
     """Return a function that initialises with a supply (V) over the time (s) of the ramp."""
 
-    def initialise(supply, seed=None, resistance=2.5, specimen=specimen, parameters=COLD):
+    def initialise(supply, seed=None, resistance=2.5, specimen=SPECIMEN, parameters=COLD):
         random = np.random.default_rng(seed)
 
-        class Plant(simulated_actuator):
+        class Plant(SimulatedActuator):
             def sample(self):
                 self.supply = supply(1e-3 * self.number)
                 self.coil = self.coil._replace(link_voltage=self.supply, resistance=resistance)
@@ -72,9 +73,9 @@ def test_a_supply_that_changes_moves_the_gap_by_less_than_the_noise(initialise_a
         assert result.rest_gap * 1e6 == pytest.approx(steady.rest_gap * 1e6, abs=0.3)
 
 
-def test_at_the_supply_of_the_curves_readings_are_used_as_they_are_to_the_bit(initialise_at, specimen):
+def test_at_the_supply_of_the_curves_readings_are_used_as_they_are_to_the_bit(initialise_at):
     result = initialise_at(lambda _: 14.0, seed=1)
-    elsewhere = dataclasses.replace(specimen, bridge=specimen.bridge._replace(sample_phase=0.2))
+    elsewhere = dataclasses.replace(SPECIMEN, bridge=SPECIMEN.bridge._replace(sample_phase=0.2))
     other = initialise_at(lambda _: 14.0, seed=1, specimen=elsewhere)
     assert (result.rest_gap, result.contact_gap) == (other.rest_gap, other.contact_gap)
 
@@ -108,8 +109,8 @@ def test_a_supply_that_changes_too_unevenly_is_refused_with_its_range(initialise
         initialise_at(lambda now: 14.0 + np.sin(44.0 * now))
 
 
-def test_without_temperature_compensation_another_supply_is_refused(initialise_at, specimen):
-    plain = dataclasses.replace(specimen, temperature=None)
+def test_without_temperature_compensation_another_supply_is_refused(initialise_at):
+    plain = dataclasses.replace(SPECIMEN, temperature=None)
     initialise_at(lambda _: 14.4, specimen=plain)
     with pytest.raises(InitialisationError, match=r'12\.0 V. must lie within 12\.9 \.\. 15\.1 V'):
         initialise_at(lambda _: 12.0, specimen=plain)

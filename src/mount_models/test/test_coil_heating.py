@@ -10,7 +10,6 @@ from mount_models.quantity import ParameterError
 from mount_models.specimen import DEFAULT_SPECIMEN, default_specimen, specimen_from_mapping
 
 HEATING = CoilHeating()
-WITHOUT_COPPER = HEATING._replace(copper=0.0)
 
 
 def after(heating, celsius, current, duration, step=0.1):

@@ -56,15 +56,6 @@ def test_scale_multiplies_the_coefficient():
     )
 
 
-MONOTONE_BELOW_UM = {
-    40: (15.5, 30.1),
-    60: (12.9, 24.5),
-    80: (11.4, 21.1),
-    100: (10.4, 18.8),
-    120: (9.6, 17.2),
-}
-
-
 loads = st.floats(0.01, 350.0)
 directions = st.sampled_from([-1.0, 1.0])
 

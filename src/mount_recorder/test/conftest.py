@@ -1,13 +1,8 @@
 """What the tests of the recorder share."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
-
 from samples import write_drive
 
 

@@ -8,7 +8,6 @@ import threading
 import time
 
 import pytest
-from mcap.reader import make_reader
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -29,20 +28,22 @@ COUNT = 2000
 
 
 @pytest.fixture
-def make_recorder(context, tmp_path):
+def make_recorder(make_node, tmp_path):
     """Return a function that creates a recorder with parameters."""
-    made = []
+    values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS]}
+    return lambda **parameters: make_node(MountRecorder, **values | parameters)
 
-    def make(name='mount_recorder', **parameters):
-        values = {'uri': str(tmp_path / 'bag'), 'topics': [topic.name for topic in STREAMS], **parameters}
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountRecorder(name, context=context, parameter_overrides=overrides))
-        return made[-1]
 
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
+@pytest.fixture
+def recording(make_recorder, source):
+    """Return a recorder at work and the publishers of its streams by topic, matched on both sides."""
+    publishers = {topic: source.publisher(topic) for topic in STREAMS}
+    recorder = make_recorder()
+    assert recorder.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert recorder.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched by publishers')
+    wait_until(lambda: 'recording; 3 of 3' in recorder.judge().sentence, 'matched by recorder')
+    return recorder, publishers
 
 
 def publish_streams(publishers, count):
@@ -54,28 +55,15 @@ def publish_streams(publishers, count):
         threading.Event().wait(max(0.0, begin + (index + 1) * 1e-3 - time.monotonic()))
 
 
-def read(folder):
-    with (folder / f'{folder.name}_0.mcap').open('rb') as file:
-        found = {}
-        for _, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            found.setdefault(channel.topic, []).append(message.data)
-    return found
-
-
 def assert_all_recorded(folder, count):
-    found = read(folder)
     for topic in STREAMS:
-        assert found[f'/{topic.name}'] == [sample(topic, index) for index in range(count)]
+        recorded = [kept.raw for kept in read_back(folder, f'/{topic.name}')]
+        assert recorded == [sample(topic, index) for index in range(count)]
 
 
 @pytest.mark.real_time
-def test_three_streams_at_1_khz_are_recorded_without_loss(make_recorder, source, tmp_path):
-    publishers = {topic: source.publisher(topic) for topic in STREAMS}
-    recorder = make_recorder()
-    assert recorder.trigger_configure() == TransitionCallbackReturn.SUCCESS
-    assert recorder.trigger_activate() == TransitionCallbackReturn.SUCCESS
-    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched by publishers')
-    wait_until(lambda: 'recording; 3 of 3' in recorder.judge().sentence, 'matched by recorder')
+def test_three_streams_at_1_khz_are_recorded_without_loss(recording, tmp_path):
+    recorder, publishers = recording
     publish_streams(publishers, COUNT)
     # No wait: deactivation itself takes what is still under way.
     assert recorder.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
@@ -86,13 +74,8 @@ def test_three_streams_at_1_khz_are_recorded_without_loss(make_recorder, source,
     assert (offered['reliability'], offered['durability']) == ('reliable', 'volatile')
 
 
-def test_verdict_names_the_last_stamp_and_missing_samples(make_recorder, source):
-    publishers = {topic: source.publisher(topic) for topic in STREAMS}
-    recorder = make_recorder()
-    recorder.trigger_configure()
-    recorder.trigger_activate()
-    wait_until(lambda: all(p.get_subscription_count() for p in publishers.values()), 'matched by publishers')
-    wait_until(lambda: 'recording; 3 of 3' in recorder.judge().sentence, 'matched by recorder')
+def test_verdict_names_the_last_stamp_and_missing_samples(recording):
+    recorder, publishers = recording
     for index in (0, 1, 4):
         publishers[DISPLACEMENT].publish(sample(DISPLACEMENT, index))
     wait_until(lambda: recorder.judge().figures['last_stamp'] == START + 4 * PERIOD, 'written')
@@ -109,7 +92,7 @@ def test_latched_topic_received_before_activation_is_recorded(make_recorder, sou
     wait_until(lambda: '/session' in kept, 'latched message')
     recorder.trigger_activate()
     recorder.trigger_deactivate()
-    assert b'first' in read(tmp_path / 'bag')['/session'][0]
+    assert b'first' in read_back(tmp_path / 'bag', '/session')[0].raw
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import threading
 import time
 import tracemalloc
 from functools import partial
-from types import SimpleNamespace
 
 import pytest
+from bursts import check_burst
 from read_back import loss_statement, read_back
 from ros_testing import wait_until
 from samples import PERIOD, START, sample
@@ -18,7 +18,7 @@ from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.diagnosis import OnFull, judge
 from mount_recorder.recorder import ITEM_OVERHEAD, Recorder, Unobserved
 from mount_recorder.stamp_watch import StampWatch
-from mount_ros.nodes.diagnostics import WINDOW, ActiveFindings, Level, SlidingWindow
+from mount_ros.nodes.diagnostics import Level, SlidingWindow
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
@@ -35,10 +35,6 @@ class SlowDisk(BagWriter):
         if self.free is not None:
             self.free.wait()
         super().write(*message)
-
-
-class Fed(SimpleNamespace):
-    """A recorder of two topics, and the functions that hand it messages, one per nanosecond."""
 
 
 @pytest.fixture
@@ -279,14 +275,11 @@ def test_sound_recorder_says_how_many_topics_have_a_publisher():
     'key', ['lost', 'missing./displacement', 'misdated./displacement', 'malformed./displacement']
 )
 def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(key):
-    window, standing, verdicts = SlidingWindow({}), ActiveFindings(), []
-    for tenth in range(300):
-        figures = {**QUIET, 'received': 100 * tenth, key: 7 * min(max(tenth - 49, 0), 5)}
+    window = SlidingWindow({})
+
+    def judge_at(time, received, found):
+        figures = {**QUIET, 'received': received, key: found}
         unobserved = {'/displacement': Unobserved(1, '7 bytes; too short')}
-        found = judge(figures, window.earlier(tenth / 10, figures), unobserved)
-        found = standing.keep(found)
-        verdicts.append((found.level, found.sentence))
-    warned = [tenth for tenth, (level, _) in enumerate(verdicts) if level is Level.WARN]
-    assert (warned[0], len(warned)) == (50, warned[-1] - 49)
-    assert 50 + 10 * WINDOW <= warned[-1] + 1 <= 54 + 10 * WINDOW
-    assert len(set(verdicts)) == 2
+        return judge(figures, window.earlier(time, figures), unobserved)
+
+    check_burst(judge_at)

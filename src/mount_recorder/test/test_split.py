@@ -12,17 +12,13 @@ from small_disk import small_disk
 
 from mount_recorder.bag_writer import BagWriter, RecordingError
 from mount_recorder.record_file import RecordFile
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import DISPLACEMENT
 
 STRING = 'std_msgs/msg/String'
 COUNT = 20_000
 LIMIT = 120_000  # bytes
 AT_ONCE = 1  # bytes: each chunk fills a file
-
-
-def string(text):
-    data = text.encode() + b'\0'
-    return b'\0\1\0\0' + len(data).to_bytes(4, 'little') + data
 
 
 def test_no_file_becomes_larger_than_the_size_asked_for_and_the_description_lists_all(tmp_path):
@@ -64,9 +60,9 @@ def test_disk_too_full_for_the_next_file_ends_the_recording_with_all_before_it(t
 
     writer = BagWriter(tmp_path / 'bag', split_size=AT_ONCE, chunk_size=1, open_file=open_file)
     writer.add_topic('/text', STRING)
-    writer.write('/text', string('x'), 0)
+    writer.write('/text', string_message('x'), 0)
     with pytest.raises(RecordingError, match='closed and readable'):
-        writer.write('/text', string('y'), 10)
+        writer.write('/text', string_message('y'), 10)
     assert len(read_back(tmp_path / 'bag', '/text')) == 1
 
 
@@ -85,11 +81,11 @@ def test_a_file_whose_end_cannot_be_written_at_a_split_is_named_and_keeps_its_me
 
     writer = BagWriter(tmp_path / 'bag', split_size=AT_ONCE, chunk_size=1, open_file=BrokenFirst)
     writer.add_topic('/text', STRING)
-    writer.write('/text', string('x'), 0)
+    writer.write('/text', string_message('x'), 0)
     named = r'broken\); bag_0\.mcap ends without its summary but with whole chunks'
     for time in (10, 11):
         with pytest.raises(RecordingError, match=named):
-            writer.write('/text', string('y'), time)
+            writer.write('/text', string_message('y'), time)
     assert [text_in(kept.raw) for kept in read_back(tmp_path / 'bag', '/text')] == ['x']
 
 

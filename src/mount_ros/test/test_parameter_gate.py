@@ -28,11 +28,8 @@ class Subject(SafeLifecycleNode):
 
 
 @pytest.fixture
-def subject(context):
-    node = Subject(context=context)
-    yield node
-    node.close()
-    node.destroy_node()
+def subject(make_node):
+    return make_node(Subject)
 
 
 def _set(node, **values):

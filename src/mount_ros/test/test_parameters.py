@@ -27,32 +27,26 @@ class Marks(NamedTuple):
 
 
 @pytest.fixture
-def make_node(context):
-    made = []
-
+def make_subject(make_node):
     def make(*prefix, **overrides):
-        values = [Parameter(name.replace('__', '.'), value=value) for name, value in overrides.items()]
-        node = Node('subject', context=context, parameter_overrides=values)
-        made.append(node)
+        node = make_node(Node, 'subject', **overrides)
         declare(node, Settings(), *prefix)
         return node
 
-    yield make
-    for node in made:
-        node.destroy_node()
+    return make
 
 
-def test_defaults_are_read_back_as_they_were_declared(make_node):
-    assert read(make_node(), Settings()) == Settings()
+def test_defaults_are_read_back_as_they_were_declared(make_subject):
+    assert read(make_subject(), Settings()) == Settings()
 
 
-def test_given_values_are_read_in_nested_sets_too(make_node):
-    node = make_node(level=0.003, count=5, name='second', spring__stiffness=20.0)
+def test_given_values_are_read_in_nested_sets_too(make_subject):
+    node = make_subject(level=0.003, count=5, name='second', **{'spring.stiffness': 20.0})
     assert read(node, Settings()) == Settings(0.003, 5, 5.0, 'second', Spring(20.0))
 
 
-def test_unit_sentence_source_and_range_travel_with_the_parameter(make_node):
-    node = make_node()
+def test_unit_sentence_source_and_range_travel_with_the_parameter(make_subject):
+    node = make_subject()
     level = node.describe_parameter('level')
     assert level.description == 'when to act [m]; section 6'
     bounds = level.floating_point_range[0]
@@ -63,8 +57,8 @@ def test_unit_sentence_source_and_range_travel_with_the_parameter(make_node):
     assert (nested.from_value, nested.to_value) == (1.0, 1e6)
 
 
-def test_limits_that_are_no_range_of_ros_are_told_in_words(make_node):
-    node = make_node()
+def test_limits_that_are_no_range_of_ros_are_told_in_words(make_subject):
+    node = make_subject()
     assert not node.describe_parameter('open_ended').floating_point_range
     assert node.describe_parameter('open_ended').additional_constraints == '0 .. inf s'
     name = node.describe_parameter('name')
@@ -75,8 +69,8 @@ def test_limits_that_are_no_range_of_ros_are_told_in_words(make_node):
 
 
 @pytest.mark.parametrize('value', [-1.0, float('nan')])
-def test_what_ros_lets_through_is_refused_when_it_is_read_and_the_node_is_named(make_node, value):
-    node = make_node(open_ended=value)
+def test_what_ros_lets_through_is_refused_when_it_is_read_and_the_node_is_named(make_subject, value):
+    node = make_subject(open_ended=value)
     with pytest.raises(ParameterError, match=r'^open_ended \(.* s\) must lie within 0 \.\. inf s'):
         read(node, Settings())
 
@@ -105,20 +99,14 @@ def test_a_number_that_may_be_unknown_may_be_nan_and_no_other(context):
 
 
 @pytest.fixture
-def make_declaring(context):
-    made = []
-
+def make_declaring(make_node):
     def make(**overrides):
-        values = [Parameter(name, value=value) for name, value in overrides.items()]
-        node = ParameterNode('subject', context=context, parameter_overrides=values)
-        made.append(node)
+        node = make_node(ParameterNode, 'subject', **overrides)
         declare(node, Settings())
         declare(node, Marks())
         return node
 
-    yield make
-    for node in made:
-        node.destroy_node()
+    return make
 
 
 def test_a_whole_number_becomes_the_float_that_is_declared(make_declaring):
@@ -170,14 +158,14 @@ def test_what_does_not_fit_is_refused_in_words(make_declaring, atomically):
 # Values of a file.
 
 
-def test_a_file_gives_values_where_nobody_set_them(make_node):
-    node = make_node(level=0.002)  # set to its default on purpose
+def test_a_file_gives_values_where_nobody_set_them(make_subject):
+    node = make_subject(level=0.002)  # set to its default on purpose
     SpecimenValues(node).give(Settings(), '', {'level': 0.004, 'count': 7, 'spring.stiffness': 9.0, 'x': 1.0})
     assert read(node, Settings()) == Settings(0.002, 7, 5.0, 'first', Spring(9.0))
 
 
-def test_what_was_changed_after_a_file_stays_and_the_rest_follows_the_next_file(make_node):
-    node = make_node('plant')
+def test_what_was_changed_after_a_file_stays_and_the_rest_follows_the_next_file(make_subject):
+    node = make_subject('plant')
     values = SpecimenValues(node)
     values.give(Settings(), 'plant', {'level': 0.004, 'count': 7, 'open_ended': 1.0})
     node.set_parameters([Parameter('plant.level', value=0.005)])
@@ -185,6 +173,6 @@ def test_what_was_changed_after_a_file_stays_and_the_rest_follows_the_next_file(
     assert read(node, Settings(), 'plant') == Settings(0.005, 8)
 
 
-def test_a_value_that_the_parameter_refuses_is_told(make_node):
+def test_a_value_that_the_parameter_refuses_is_told(make_subject):
     with pytest.raises(ParameterError, match=r'subject: .*level'):
-        SpecimenValues(make_node()).give(Settings(), '', {'level': 0.5})
+        SpecimenValues(make_subject()).give(Settings(), '', {'level': 0.5})

@@ -27,7 +27,6 @@ def assembled_curve(currents):
     return np.array(inductances)
 
 
-FIXED = fixed_gap_curve(RAMP)
 ASSEMBLED = assembled_curve(RAMP)
 
 

@@ -93,9 +93,6 @@ def test_a_sample_after_the_end_of_its_phase_is_unknown():
     assert math.isfinite(skin_factor(late, 0.01, 0.8))
 
 
-COIL = RippleCoil()
-
-
 def test_core_and_copper_follow_their_own_coefficients():
     warm = coil_at(COIL, TemperatureCoefficients(core=0.002, copper=0.004), 70.0)
     assert warm.conductivity == pytest.approx(COIL.conductivity / 1.1)

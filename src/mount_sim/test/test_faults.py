@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from simulated_mounts import make_mount
 
 from mount_driver.can_library import can
 from mount_driver.protocol import MountCodec, Status
@@ -322,7 +323,7 @@ def test_a_hot_coil_is_reported_as_hot_as_it_is():
     assert faults.through('status', SOUND).coil_temperature_celsius == celsius
 
 
-def test_a_plant_has_its_fault_and_is_sound_again_behind_it(make_mount):
+def test_a_plant_has_its_fault_and_is_sound_again_behind_it():
     faulty, sound = make_mount(faults=('gap_blocked@0.05:0.05',)), make_mount()
     for number in range(290):
         for mount in (faulty, sound):

@@ -9,6 +9,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from simulated_mounts import make_mount
 
 from mount_driver.bus import Frame
 from mount_driver.clock import ElectronicsClock
@@ -145,7 +146,7 @@ class Link:
 
 
 @pytest.fixture
-def link(make_mount):
+def link():
     made = []
 
     def make(seed, wanted=None, **options):

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ros_testing import LIMIT
+from simulated_mounts import make_mount
 
 from mount_driver.can_library import can
 from mount_driver.protocol import AliveCounter, MountCodec, Setpoint
@@ -194,7 +195,7 @@ def test_the_time_of_arrival_is_that_of_the_bus_and_unknown_where_its_clock_is_a
 # Lock-step
 
 
-def test_in_lock_step_each_sample_waits_for_its_answer(ends, make_mount):
+def test_in_lock_step_each_sample_waits_for_its_answer(ends):
     host, mount, published = ends[1], make_mount(), []
     loop = _answered(ends, mount, published=published)
     assert mount.finished
@@ -209,7 +210,7 @@ def test_in_lock_step_each_sample_waits_for_its_answer(ends, make_mount):
     assert host.statuses[0].supply_voltage == pytest.approx(14.0)
 
 
-def test_lock_step_over_the_bus_equals_plain_function_calls(ends, make_mount):
+def test_lock_step_over_the_bus_equals_plain_function_calls(ends):
     over_bus, truths = make_mount(), []
     _answered(ends, over_bus, 1.0, SimpleNamespace(append=lambda number: truths.append(over_bus.truth_bytes)))
     plain, answer = make_mount(), None
@@ -220,19 +221,19 @@ def test_lock_step_over_the_bus_equals_plain_function_calls(ends, make_mount):
         answer = 1.0
 
 
-def test_an_answer_that_does_not_come_ends_the_run_and_names_the_sample(ends, make_mount):
+def test_an_answer_that_does_not_come_ends_the_run_and_names_the_sample(ends):
     mount = make_mount()
     with pytest.raises(NoAnswerError, match=r'sample 20 \(0\.020 s\) was not answered within 0\.5 s'):
         _answered(ends, mount, patience=0.5, count=20)
     assert mount.sample == 21
 
 
-def test_the_first_sample_waits_for_whoever_answers_it(ends, make_mount):
+def test_the_first_sample_waits_for_whoever_answers_it(ends):
     loop = _loop(make_mount(), ends[0])
     assert [loop.step_in_lockstep(0.0) for _ in range(9)] == [True] + [False] * 8  # no patience at all
 
 
-def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends, make_mount):
+def test_a_mount_beyond_the_range_of_its_sensor_goes_on_and_is_told(ends):
     """The rack is told to move farther than the sensor reaches, as a rough road can."""
     host = ends[1]
     mount = make_mount(lambda values: np.multiply(values, 80.0, out=values))  # to 80 mm
@@ -272,9 +273,7 @@ def _statuses(host, loop, damage):
     ],
     ids=['damaged', 'repeated', 'late', 'of wrong length', 'host restarted'],
 )
-def test_the_next_status_tells_of_a_doubtful_setpoint_frame_and_the_one_behind_it_no_more(
-    ends, make_mount, doubt
-):
+def test_the_next_status_tells_of_a_doubtful_setpoint_frame_and_the_one_behind_it_no_more(ends, doubt):
     end, host = ends
     loop = _loop(make_mount(timeline__duration=1.0), end)
     told = _statuses(host, loop, lambda number: doubt(host) if number == 350 else None)
@@ -284,9 +283,7 @@ def test_the_next_status_tells_of_a_doubtful_setpoint_frame_and_the_one_behind_i
 @pytest.mark.parametrize(
     ('late', 'samples'), [(0, 20), (1, 19), (5, 15), (19, 1), (20, 0), (200, 0), (-1, 0)]
 )
-def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_that(
-    ends, make_mount, late, samples
-):
+def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_that(ends, late, samples):
     end, host = ends
     mount, setpoints = make_mount(timeline__duration=1.0), []
     loop = _loop(mount, end)
@@ -305,7 +302,7 @@ def test_an_answer_holds_for_20_ms_from_when_it_was_due_and_not_at_all_behind_th
 # Faults and real time
 
 
-def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
+def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends):
     host, mount = ends[1], make_mount(faults=('deaf@0',))
     loop = _answered(ends, mount, 1.0)
     assert mount.truth['coil_current'] == 0.0
@@ -315,7 +312,7 @@ def test_a_deaf_end_switches_off_on_its_own_and_says_so(ends, make_mount):
     assert loop.figures.answered == 1  # the last one, after the run
 
 
-def test_electronics_that_are_asked_to_end_in_real_time_go_on_until_the_coil_is_discharged(ends, make_mount):
+def test_electronics_that_are_asked_to_end_in_real_time_go_on_until_the_coil_is_discharged(ends):
     mount = make_mount(timeline__duration=20.0)
     with _in_real_time(ends, mount):
         _switched_on(ends[1], mount)
@@ -337,7 +334,7 @@ def _next_sample(host):
     return sample
 
 
-def test_in_real_time_the_electronics_sample_by_their_clock_behind_the_end_of_the_run_too(ends, make_mount):
+def test_in_real_time_the_electronics_sample_by_their_clock_behind_the_end_of_the_run_too(ends):
     host, mount = ends[1], make_mount(timeline__duration=0.2)
     with _in_real_time(ends, mount) as loop:
         while len(host.samples) < 300:

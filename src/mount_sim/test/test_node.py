@@ -16,29 +16,16 @@ SUCCESS = TransitionCallbackReturn.SUCCESS
 
 
 @pytest.fixture
-def make_sim(context):
+def make_sim(make_node):
     """Return a function that creates a simulator on a virtual bus, on the bench for 20 s."""
-    made = []
-
-    def make(**parameters):
-        values = {
-            'interface': 'virtual',
-            'channel': 'test_sim_node',
-            'scenario': 'bench',
-            'timeline.start': 0.0,
-            'timeline.duration': 20.0,
-            **{name.replace('__', '.'): value for name, value in parameters.items()},
-        }
-        overrides = [Parameter(name, value=value) for name, value in values.items()]
-        made.append(MountSim(context=context, parameter_overrides=overrides))
-        return made[-1]
-
-    yield make
-    for node in made:
-        node.close()
-        node.destroy_node()
-    del node
-    made.clear()
+    values = {
+        'interface': 'virtual',
+        'channel': 'test_sim_node',
+        'scenario': 'bench',
+        'timeline.start': 0.0,
+        'timeline.duration': 20.0,
+    }
+    return lambda **parameters: make_node(MountSim, **values | parameters)
 
 
 @pytest.mark.parametrize('lockstep', [False, True])

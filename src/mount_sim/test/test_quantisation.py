@@ -8,7 +8,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mount_driver.protocol import Measurement, MountCodec, Setpoint, Status
-from mount_models.sampling import HIGHEST_CURRENT
 from mount_sim import quantisation
 
 CODEC = MountCodec()
@@ -49,6 +48,7 @@ def test_a_value_is_quantised_as_over_can_to_the_bit(name):
     @example(high)
     @example(low)
     @example(math.nextafter(high, math.inf))
+    @example(math.nextafter(low, -math.inf))
     @example(-0.0)
     @example(-1e-12)
     def agrees(value):
@@ -62,24 +62,3 @@ def test_a_value_is_quantised_as_over_can_to_the_bit(name):
         )
 
     agrees()
-
-
-@pytest.mark.parametrize(
-    ('scaling', 'expected'),
-    [
-        *((getattr(CODEC, name.lower()), (
-            getattr(quantisation, f'{name}_STEPS'),
-            -getattr(quantisation, f'{name}_LIMIT'),
-            getattr(quantisation, f'{name}_LIMIT'),
-        )) for name in ('DISPLACEMENT', 'COIL_CURRENT', 'CURRENT_RATE', 'FLUX_RATE')),
-        (CODEC.coil_temperature, (
-            quantisation.COIL_TEMPERATURE_STEPS,
-            quantisation.COIL_TEMPERATURE_LOWEST,
-            quantisation.COIL_TEMPERATURE_HIGHEST,
-        )),
-    ],
-)  # fmt: skip
-def test_steps_and_limits_are_those_of_the_dbc(scaling, expected):
-    assert (scaling.steps, scaling.raw_low, scaling.raw_high) == expected
-    assert CODEC.current.steps == quantisation.SETPOINT_STEPS
-    assert (CODEC.current.low, CODEC.current.high) == (0.0, HIGHEST_CURRENT)

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from mount_models.friction.coefficient import FrictionCoefficients
-from mount_models.friction.contact import FrictionContact
 from mount_models.quantity import ParameterError
 from mount_sim.rack import (
     GAPS,
@@ -55,9 +53,6 @@ def test_files_hold_what_was_measured(tmp_path):
     assert [file.name for file in files] == ['ripple_270um_+60degC.csv', 'ripple_290um_+60degC.csv']
     ripple = np.genfromtxt(files[0], delimiter=',', names=True, skip_header=1)
     assert ripple['gap_um'] == pytest.approx(270.0)
-
-
-CONTACT, COEFFICIENTS = FrictionContact(), FrictionCoefficients()
 
 
 def test_the_saw_tooth_grows_faster_after_every_second_turning_point():

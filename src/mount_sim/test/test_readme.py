@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from mount_models.quantity import quantities
+from readme_rows import readme_rows
+
 from mount_sim.electronics.faults import FAULTS
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import MOUNTS
@@ -11,23 +12,11 @@ README = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
 OWN = ('timeline', 'bench', 'motorway', 'sweep', 'recorded', 'idle', 'tip_in', 'electronics', 'temperature')
 
 
-def rows(parameters, prefix=''):
-    """The rows of the table for the numbers of a parameter set."""
-    for name, note in quantities(parameters).items():
-        default = getattr(parameters, name)
-        if not isinstance(default, int | float):
-            continue
-        yield (
-            f'| `{prefix}{name}` | {default:g} | {note.unit} '
-            f'| {note.low:g} .. {note.high:g} | {note.meaning} |'
-        )
-
-
 def test_every_number_that_can_be_set_is_listed_with_default_unit_range_and_meaning():
     listed = README.splitlines()
     for row in [
-        *rows(SimParameters()),
-        *(row for part in OWN for row in rows(getattr(SimParameters(), part), f'{part}.')),
+        *readme_rows(SimParameters()),
+        *(row for part in OWN for row in readme_rows(getattr(SimParameters(), part), f'{part}.')),
     ]:
         assert row in listed
 

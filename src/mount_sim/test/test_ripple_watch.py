@@ -11,7 +11,7 @@ from mount_models.coil.copper import CoilHeating
 from mount_models.specimen import default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator
-from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at, current_rate, flux_rate
 from mount_sim.quantisation import quantised_current_rate, quantised_flux_rate
 
 MS = 1_000_000
@@ -22,16 +22,11 @@ RISE = np.concatenate([np.linspace(0.0, 0.2, 50), np.full(300, 0.2), UP])
 RAMP = np.concatenate([np.zeros(100), RISE, np.full(20, 3.0), RISE[::-1], np.zeros(30)])  # as mount_init's
 DAMPING = 0.5 + 0.9 * np.abs(np.sin(50.0 * 1e-3 * np.arange(2000)))  # 8 Hz, 0.5 .. 1.4 A
 READY = np.full(2000, 0.4935)
-WARMER = 0.0043  # 1/K, of the core's resistivity
 
 
-def coil_at(celsius, volts=14.0):
-    warmer = celsius - 20.0
-    return COIL._replace(
-        link_voltage=volts,
-        conductivity=COIL.conductivity / (1.0 + WARMER * warmer),
-        resistance=COIL.resistance * (1.0 + 0.0039 * warmer),
-    )
+def supplied(celsius, volts):
+    """Return the coil at this temperature (degC) and supply (V)."""
+    return coil_at(COIL, TemperatureCoefficients(), celsius)._replace(link_voltage=volts)
 
 
 def readings(currents, coil=COIL, mechanics=MECHANICS, actuator=ACTUATOR, noise=0.01, seed=1):
@@ -91,9 +86,9 @@ def test_no_temperature_and_no_supply_makes_a_sound_coil_look_faulty(before, aft
     ramp, drive = RAMP, np.concatenate([DAMPING, READY])
     if before[1] < 12.0:
         ramp = np.minimum(RAMP, 2.6)  # what 9 V can drive so that the ripple is seen
-    assert fed(found, readings(ramp, coil_at(*before)), before[1], before[0]) is None
+    assert fed(found, readings(ramp, supplied(*before)), before[1], before[0]) is None
     assert not math.isnan(found.noise)
-    assert fed(found, readings(drive, coil_at(*after), seed=2), after[1], after[0]) is None
+    assert fed(found, readings(drive, supplied(*after), seed=2), after[1], after[0]) is None
 
 
 @pytest.mark.parametrize(
@@ -227,9 +222,6 @@ def test_a_frozen_ripple_is_found_once_the_current_moves(learnt):
         assert (fed(learnt, samples, begin=10_000 * (1 + found)) is not None) is found
 
 
-"""Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
-
-
 ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 125)) ** 2, READY])
 """Damped for one period of 8 Hz, up to 1.1 A; above 0.75 A for some 70 samples."""
 
@@ -237,10 +229,10 @@ ONCE = np.concatenate([READY, 0.5 + 0.6 * np.sin(np.linspace(0.0, 2.0 * np.pi, 1
 @pytest.mark.parametrize('volts', [9.0, 14.0, 16.0])
 def test_pads_that_wear_are_found_where_the_engine_is_damped_for_one_period_alone(volts):
     found = watch()
-    assert fed(found, readings(RAMP, coil_at(20.0, volts)), volts) is None
+    assert fed(found, readings(RAMP, supplied(20.0, volts)), volts) is None
     begin, worn = len(RAMP), MECHANICS._replace(contact_gap=260e-6)
-    assert fed(found, readings(ONCE, coil_at(20.0, volts)), volts, begin=begin) is None
-    doubt = fed(found, readings(ONCE, coil_at(20.0, volts), worn), volts, begin=begin + len(ONCE))
+    assert fed(found, readings(ONCE, supplied(20.0, volts)), volts, begin=begin) is None
+    doubt = fed(found, readings(ONCE, supplied(20.0, volts), worn), volts, begin=begin + len(ONCE))
     assert doubt is not None
     assert len(READY) + 300 <= doubt[0] < len(READY) + 350
     assert doubt[1].startswith('coil inductance by the ripple at ')

@@ -5,6 +5,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from simulated_mounts import make_mount, parameters
 
 from mount_models.arithmetic.series import series_of
 from mount_sim.excitation.building import build_excitation, write_excitation
@@ -27,7 +28,7 @@ DIGESTS = {
 
 
 @pytest.fixture(scope='module')
-def chosen(parameters, tmp_path_factory):
+def chosen(tmp_path_factory):
     """Return a function that gives the parameters of a scenario with a start between two blocks."""
     values = series_of(np.random.default_rng(5).standard_normal(40_000))
     shaken = Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, 0.0)
@@ -68,7 +69,7 @@ def test_rest_excitation_and_end_follow_each_other_however_they_are_asked_for(ch
 
 
 @pytest.mark.parametrize('scenario', ['motorway', 'bench'])
-def test_two_hours_take_no_more_memory_than_some_blocks(make_mount, scenario):
+def test_two_hours_take_no_more_memory_than_some_blocks(scenario):
     make_mount(scenario=scenario)  # loads what is compiled
     tracemalloc.start()
     mount = make_mount(scenario=scenario, timeline__duration=7200.0)

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from simulated_mounts import drive, make_mount
 
 from mount_models.quantity import ParameterError
 from mount_sim.excitation.excitation import Seat
 from mount_sim.plant.plant import Plant, PlantSimulation
 
 
-def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mount):
+def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers():
     """As on the bus: the answer to sample k is there when sample k+1 is taken, and acts from then on."""
     mount, answer, currents = make_mount(), None, []
     for number in range(6):
@@ -21,7 +22,7 @@ def test_a_setpoint_takes_effect_at_the_sample_after_the_one_it_answers(make_mou
 
 
 @pytest.mark.parametrize(('timeout', 'samples'), [(0.020, 20), (0.005, 5)])
-def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_mount, drive, timeout, samples):
+def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(timeout, samples):
     last = 50
     mount = make_mount(electronics__setpoint_timeout=timeout)
     enabled = []
@@ -38,7 +39,7 @@ def test_without_setpoints_the_electronics_go_to_0_ampere_on_their_own(make_moun
     assert enabled == [number < last + 1 + samples for number in range(300)]
 
 
-def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
+def test_a_setpoint_that_came_late_holds_the_shorter():
     mount, currents = make_mount(), []
     for number in range(60):
         mount.measure()
@@ -47,7 +48,7 @@ def test_a_setpoint_that_came_late_holds_the_shorter(make_mount):
     assert [number for number, current in enumerate(currents) if current > 0.0] == list(range(11, 16))
 
 
-def test_equal_seeds_give_equal_readings_to_the_bit(make_mount, drive):
+def test_equal_seeds_give_equal_readings_to_the_bit():
     def readings(seed):
         mount = make_mount(scenario='motorway', timeline__duration=1.0, seed=seed)
         numbers, truth = drive(mount, lambda number: 0.001 * number)
@@ -58,7 +59,7 @@ def test_equal_seeds_give_equal_readings_to_the_bit(make_mount, drive):
     assert readings(5)[1] != readings(6)[1]
 
 
-def test_the_noise_is_no_part_of_the_truth(make_mount, drive):
+def test_the_noise_is_no_part_of_the_truth():
     quiet, quiet_truth = drive(make_mount(electronics__displacement_noise=0.0))
     noisy, noisy_truth = drive(make_mount(electronics__displacement_noise=1e-4))
     assert quiet_truth.tobytes() == noisy_truth.tobytes()

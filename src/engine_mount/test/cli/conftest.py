@@ -1,6 +1,5 @@
-"""What the tests of this package share: small pictures, and the command as a user runs it."""
+"""What the tests of this package share: small pictures."""
 
-import command_line
 import pytest
 
 from engine_mount.experiments.harness import drawing
@@ -13,13 +12,3 @@ def small_pictures():
         patch.setattr(drawing, '_DPI', 20)
         patch.setattr(drawing, '_LAYOUT', None)
         yield
-
-
-@pytest.fixture(scope='session')
-def command():
-    return command_line.command
-
-
-@pytest.fixture(scope='session')
-def refused():
-    return command_line.refused

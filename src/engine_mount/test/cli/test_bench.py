@@ -4,6 +4,7 @@ import json
 
 import psutil
 import pytest
+from command_line import command
 
 from engine_mount.cli.bench.bench import BenchOrder, Comparison
 from engine_mount.cli.bench.graph import run_relay
@@ -11,7 +12,7 @@ from engine_mount.cli.bench.offline import imports
 from engine_mount.cli.commands import bench
 
 
-def test_figures_are_told_as_ratios_and_written(tmp_path, monkeypatch, command):
+def test_figures_are_told_as_ratios_and_written(tmp_path, monkeypatch):
     rows = {
         'x': Comparison('a thing', 2e-6, 'another', 8e-6),
         'y': Comparison('growth', 1.0, 'none', 0.0, 'B'),
@@ -37,7 +38,7 @@ def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain, tmp_path
 
 
 @pytest.mark.slow
-def test_one_sample_is_measured_beside_real_time(command):
+def test_one_sample_is_measured_beside_real_time():
     assert 'ratio' in command('bench', '--only', 'calls')
 
 

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from command_line import command, refused
 
 from mount_models.specimen import load_specimen
 from mount_sim.rack import drawn_rack, measure_force, record_ripple, write_columns
@@ -37,7 +38,7 @@ def changed(file, folder, **columns):
 
 
 @pytest.fixture(scope='module')
-def calibrated(files, tmp_path_factory, command):
+def calibrated(files, tmp_path_factory):
     folder = tmp_path_factory.mktemp('out')
     points, ripple = files
     specimen = ('--name', 'left', '--out', folder / 'left.yaml')
@@ -100,7 +101,7 @@ def one_stuck(table):
         ({'force_n': lambda t: -t['force_n']}, 'is the sign of the load cell right?'),
     ],
 )
-def test_doubtful_points_are_refused_and_no_file_is_written(files, tmp_path, refused, columns, sentence):
+def test_doubtful_points_are_refused_and_no_file_is_written(files, tmp_path, columns, sentence):
     doubtful = changed(files[0], tmp_path, **columns)
     targets = ['--out', tmp_path / 'o.yaml', '--json', tmp_path / 'o.json', '--figure', tmp_path / 'o.png']
     assert sentence in refused('calibrate', 'actuator', doubtful, *targets)
@@ -122,14 +123,14 @@ def test_doubtful_points_are_refused_and_no_file_is_written(files, tmp_path, ref
     ],
 )
 def test_ripple_and_options_that_make_no_sense_are_refused(
-    files, tmp_path, refused, monkeypatch, column, options, sentence
+    files, tmp_path, monkeypatch, column, options, sentence
 ):
     monkeypatch.chdir(tmp_path)
     file = changed(files[1][0], tmp_path, **({column: None} if column else {}))
     assert sentence in refused('calibrate', 'inductance', file, *options)
 
 
-def test_what_contradicts_the_other_recordings_is_refused_and_named(files, tmp_path, refused):
+def test_what_contradicts_the_other_recordings_is_refused_and_named(files, tmp_path):
     cold = files[1][:8]
     said = refused('calibrate', 'inductance', *cold, '--gap', f'{cold[4].name}=455')
     assert f'{cold[4].name}: by the' in said

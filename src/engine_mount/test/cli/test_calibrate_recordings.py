@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from command_line import command
 
 from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
@@ -52,7 +53,7 @@ def record(folder, gap, celsius=20.0, spoil=0, warming=0.0):
     return folder
 
 
-def test_force_and_gap_curves_come_out_of_recordings(tmp_path, command):
+def test_force_and_gap_curves_come_out_of_recordings(tmp_path):
     recordings = [record(tmp_path / f'held_{gap * 1e6:.1f}um', gap, spoil=40) for gap in GAPS]
     recordings += [record(tmp_path / f'warm_{gap * 1e6:.1f}um', gap, 80.0, spoil=40) for gap in GAPS[::2]]
     written, area = tmp_path / 'left.yaml', RACK.actuator.turns * RACK.actuator.gap_area

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from command_line import command
 from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
@@ -110,7 +111,7 @@ def test_wrong_use_drives_nothing(check, tmp_path, options, word):
     assert not (tmp_path / 'wrong').exists()
 
 
-def test_the_manoeuvres_are_listed(command):
+def test_the_manoeuvres_are_listed():
     listed = command('check', '--list').splitlines()
     assert listed[0].split()[:2] == ['rest', 'Standing,']
     assert len(listed) == 15

@@ -4,6 +4,7 @@ import json
 
 import pytest
 import yaml
+from command_line import command, refused
 
 import engine_mount
 from engine_mount.experiments import (
@@ -40,7 +41,7 @@ def check(outcome):
 # Contract and command.
 
 
-def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats(command):
+def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats():
     for name in NAMES:
         known = experiment_named(name)
         assert known.name == name
@@ -71,18 +72,18 @@ def test_every_experiment_stands_under_its_own_name_and_says_what_it_repeats(com
         (['sawtooth', '--set', 'sawtooth.lowest_speed=0.05'], 'must not lie above highest_speed (0.01 m/s)'),
     ],
 )
-def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path, refused):
+def test_a_wrong_order_is_refused_before_anything_is_made(arguments, sentence, tmp_path):
     out = tmp_path / 'out'
     assert sentence in refused('experiment', *arguments, '--out', out)
     assert not (out.exists() and any(out.iterdir()))
 
 
-def test_a_folder_that_holds_something_is_refused(tmp_path, refused):
+def test_a_folder_that_holds_something_is_refused(tmp_path):
     (tmp_path / 'precious').touch()
     assert 'is not empty; choose another folder' in refused('experiment', 'ramp_and_hold', '--out', tmp_path)
 
 
-def test_the_command_writes_figures_page_and_pictures(tmp_path, command):
+def test_the_command_writes_figures_page_and_pictures(tmp_path):
     out, figures, written = tmp_path / 'out', tmp_path / 'r.json', tmp_path / 'docs' / 'e.md'
     command(
         'experiment', 'ramp_and_hold', '--out', out, '--json', figures, '--page', written,

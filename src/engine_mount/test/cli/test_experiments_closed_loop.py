@@ -58,19 +58,6 @@ def test_the_rack_writes_recordings_pictures_and_plain_figures(rack):
 
 
 @pytest.mark.parametrize(
-    ('name', 'harmonics', 'loss_stiffness'),
-    [
-        (bench.HYDRO, (277.8, 5.03, 13.23, 2.01, 5.36, 1.02, 2.32, 0.50), 81e3),
-        (bench.OFF, (182.2, 0, 0, 0, 0, 0, 0, 0), 14e3),
-    ],
-)
-def test_mounts_without_control_have_their_known_harmonics_and_loss(rack, name, harmonics, loss_stiffness):
-    found = rack.figures['runs'][name]
-    assert found['harmonics_n'] == pytest.approx(harmonics, rel=0.01, abs=0.03)
-    assert found['loss_stiffness_n_per_m'] == pytest.approx(loss_stiffness, rel=0.01, abs=500.0)
-
-
-@pytest.mark.parametrize(
     ('damper', 'first', 'loss_stiffness'), [('viscous_1000', 190.8, 59e3), ('viscous_4000', 268.7, 198e3)]
 )
 def test_each_characteristic_gives_its_first_harmonic_and_loss(rack, damper, first, loss_stiffness):

@@ -6,19 +6,20 @@ import shutil
 from pathlib import Path
 
 import pytest
+from command_line import command, refused
+from references import REFERENCES_FOLDER
 
 from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
 from engine_mount.signals.sources.uris import SourceError
 
-REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
 CHANGE = ('--set', 'mount_control.highest_current=0.7')
 
 
 @pytest.fixture
 def fleet(tmp_path, monkeypatch):
     """A folder with one recording and a damaged one, read in this process."""
-    shutil.copytree(REFERENCES / 'gap', tmp_path / 'fleet' / 'gap')
+    shutil.copytree(REFERENCES_FOLDER / 'gap', tmp_path / 'fleet' / 'gap')
     (tmp_path / 'fleet' / 'broken.mcap').write_bytes(b'not a recording')
 
     def run_tasks(work, items, **_):
@@ -28,7 +29,7 @@ def fleet(tmp_path, monkeypatch):
     return tmp_path / 'fleet'
 
 
-def test_an_index_counts_a_damaged_recording_and_reads_nothing_twice(fleet, tmp_path, command):
+def test_an_index_counts_a_damaged_recording_and_reads_nothing_twice(fleet, tmp_path):
     figures, catalogue = tmp_path / 'index.json', tmp_path / 'catalogue'
     printed = command('fleet', 'index', fleet, '--out', catalogue, '--json', figures)
     assert printed.split()[:6] == ['read', '2', 'unchanged', '0', 'unreadable', '1']
@@ -42,7 +43,7 @@ def test_an_index_counts_a_damaged_recording_and_reads_nothing_twice(fleet, tmp_
     assert again.split()[:4] == ['read', '0', 'unchanged', '2']
 
 
-def test_a_replay_tells_how_many_have_no_figures_and_writes_what_it_tells(fleet, tmp_path, command):
+def test_a_replay_tells_how_many_have_no_figures_and_writes_what_it_tells(fleet, tmp_path):
     result = tmp_path / 'result'
     printed = command('fleet', 'replay', fleet, *CHANGE, '--out', result, '--json', tmp_path / 'f.json')
     assert 'recordings 2: 1 replayed, 1 failed' in printed
@@ -55,13 +56,13 @@ def test_a_replay_tells_how_many_have_no_figures_and_writes_what_it_tells(fleet,
     assert Path(figures['result']).is_file()
 
 
-def test_recordings_with_another_policy_are_told_apart(fleet, tmp_path, command):
+def test_recordings_with_another_policy_are_told_apart(fleet, tmp_path):
     change = ('--set', 'continuous_viscous.full_amplitude=0.0006')
     printed = command('fleet', 'replay', fleet, *change, '--out', tmp_path / 'result')
     assert 'recordings 2: 0 replayed, 1 with another policy, 1 failed' in printed
 
 
-def test_a_store_that_is_away_is_told_and_ends_with_1(fleet, tmp_path, monkeypatch, refused):
+def test_a_store_that_is_away_is_told_and_ends_with_1(fleet, tmp_path, monkeypatch):
     def away(uri):
         raise SourceError(f'{uri}: no answer')
 

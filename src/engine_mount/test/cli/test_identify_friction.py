@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from command_line import command, refused
 
 from engine_mount.cli.commands.options import with_repeated_options
 from engine_mount.experiments.harness.rack_recording import record_friction_rack
@@ -49,7 +50,7 @@ def test_several_paths_after_one_option_become_repeated_options():
 
 
 @pytest.mark.slow
-def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch, command):
+def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch):
     # a search from fewer starts on fewer samples: which law is best here is no close race
     for name, value in (('SEARCH_SAMPLES', 400), ('FINAL_SAMPLES', 1500), ('STARTS', 2), ('DRAWS', 4)):
         monkeypatch.setattr(ladder, name, value)
@@ -90,7 +91,7 @@ def test_files_give_parameters_and_a_ladder(rack, tmp_path, monkeypatch, command
         ('png', b'\x89PNG\r\n\0' * 9, 'are not read'),
     ],
 )
-def test_bad_files_are_refused_and_nothing_is_written(suffix, content, words, tmp_path, refused):
+def test_bad_files_are_refused_and_nothing_is_written(suffix, content, words, tmp_path):
     bad = tmp_path / f'bad.{suffix}'
     bad.write_bytes(content)
     targets = ('--json', tmp_path / 'f.json', '--out', tmp_path / 'f.yaml', '--figure', tmp_path / 'f2.png')
@@ -98,11 +99,11 @@ def test_bad_files_are_refused_and_nothing_is_written(suffix, content, words, tm
     assert list(tmp_path.iterdir()) == [bad]
 
 
-def test_one_file_alone_is_no_pair(rack, refused):
+def test_one_file_alone_is_no_pair(rack):
     assert 'the ladder needs at least 2' in refused('identify', 'friction', '--file', rack / '80.csv')
 
 
-def test_a_recording_of_the_rack_is_read_as_it_measured_and_identified(tmp_path, command):
+def test_a_recording_of_the_rack_is_read_as_it_measured_and_identified(tmp_path):
     rack = move(
         FrictionContact(), FrictionCoefficients(), *sawtooth_corners(2.5e-3, (2e-3, 4e-3, 6e-3, 8e-3)), 100.0
     )
@@ -132,7 +133,7 @@ def test_a_recording_of_the_rack_is_read_as_it_measured_and_identified(tmp_path,
     )
 
 
-def test_a_held_out_recording_must_be_unseen_under_another_name_too(rack, tmp_path, refused):
+def test_a_held_out_recording_must_be_unseen_under_another_name_too(rack, tmp_path):
     seen, copy, out = rack / '40.csv', tmp_path / 'other.csv', tmp_path / 'f.json'
     copy.write_bytes(seen.read_bytes())
     order = ('identify', 'friction', '--train', seen, '--json', out, '--held-out')
@@ -155,7 +156,7 @@ def test_the_hash_of_a_recording_is_that_of_its_data_in_order(tmp_path):
     assert recording_hash(other) == expected
 
 
-def test_parameters_need_ramp_and_sawtooth(rack, tmp_path, refused):
+def test_parameters_need_ramp_and_sawtooth(rack, tmp_path):
     out = tmp_path / 'f.yaml'
     said = refused('identify', 'friction', '--train', rack / 'ramp.csv', '--out', out)
     assert 'the sawtooth is missing' in said

@@ -4,6 +4,7 @@ import json
 import shutil
 
 import pytest
+from command_line import command
 
 import engine_mount
 from engine_mount.cli.commands.record import _print_losses
@@ -20,7 +21,7 @@ CHANGED = ('--set', 'switch_on_level=0.0007', '--set', 'policy=switched_viscous'
 
 
 @pytest.fixture(scope='module')
-def bags(tmp_path_factory, command):
+def bags(tmp_path_factory):
     """Return a folder with a run, a recording beside it that is cut off, one alone, and what is none."""
     folder = tmp_path_factory.mktemp('made') / 'bags'
     command('drive', *DRIVE, *CHANGED, '--out', folder / 'run')
@@ -32,7 +33,7 @@ def bags(tmp_path_factory, command):
     return folder
 
 
-def test_recordings_are_listed_with_what_they_are(bags, tmp_path, command):
+def test_recordings_are_listed_with_what_they_are(bags, tmp_path):
     printed = command('ls', bags, '--json', tmp_path / 'ls.json')
     assert max(map(len, printed.replace(str(bags), 'bags').splitlines())) <= 80
     assert f'{bags / "run"}: nothing lost, no faults\n' in printed
@@ -46,7 +47,7 @@ def test_recordings_are_listed_with_what_they_are(bags, tmp_path, command):
     assert [found[str(bags / name)]['sound'] for name in ('alone', 'broken')] == [None, False]
 
 
-def test_the_verdict_is_that_of_the_summary(bags, tmp_path, command):
+def test_the_verdict_is_that_of_the_summary(bags, tmp_path):
     shutil.copytree(bags / 'run', tmp_path / 'lost')
     summary = tmp_path / 'lost' / 'summary.json'
     summary.write_text(json.dumps({**json.loads(summary.read_text()), 'lost_samples': 3, 'faults': [{}]}))
@@ -54,7 +55,7 @@ def test_the_verdict_is_that_of_the_summary(bags, tmp_path, command):
     assert 'no recordings in' in command('ls', bags / 'notes')
 
 
-def test_a_recording_is_told_with_what_was_not_at_its_default(bags, tmp_path, command):
+def test_a_recording_is_told_with_what_was_not_at_its_default(bags, tmp_path):
     printed = command('info', bags / 'run', '--json', tmp_path / 'info.json')
     assert 'bench, core' in printed
     told = json.loads((tmp_path / 'info.json').read_text())
@@ -105,7 +106,7 @@ def test_record_beside_no_graph_says_that_nothing_came(tmp_path, messages, words
 
 
 @pytest.mark.parametrize('place', ['', 'recording', 'recording/recording_0.mcap'])
-def test_audit_and_recover_take_the_folder_of_a_run_its_recording_or_a_file(tmp_path, place, command):
+def test_audit_and_recover_take_the_folder_of_a_run_its_recording_or_a_file(tmp_path, place):
     run = tmp_path / 'run'
     run.mkdir()
     recorded(run / 'recording', {DISPLACEMENT: displacements(5)})

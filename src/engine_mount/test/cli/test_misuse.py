@@ -1,9 +1,7 @@
 """Wrong use of every command: exit code and one sentence that holds what was given, and nothing is done."""
 
 import pytest
-from typer.main import get_command
-
-from engine_mount.cli.command import app
+from command_line import command, commands, refused
 
 MISSING = 'nowhere [/x]'
 DRIVE = ('--core', '--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8')
@@ -39,20 +37,12 @@ REFUSED = {
 TAKES_NOTHING_THAT_CAN_BE_MISSING = {'calibrate rack', 'fleet example', 'prepare', 'status'}
 
 
-def leaves(group, prefix=''):
-    for name, command in group.commands.items():
-        if hasattr(command, 'commands'):
-            yield from leaves(command, f'{prefix}{name} ')
-        else:
-            yield prefix + name
-
-
 def test_every_command_is_in_the_table():
-    assert set(leaves(get_command(app))) == REFUSED.keys() | TAKES_NOTHING_THAT_CAN_BE_MISSING
+    assert set(commands()) == REFUSED.keys() | TAKES_NOTHING_THAT_CAN_BE_MISSING
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_what_is_not_there_is_named_as_it_was_given(name, refused, tmp_path, monkeypatch):
+def test_what_is_not_there_is_named_as_it_was_given(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert MISSING in refused(*name.split(), *REFUSED[name])
 
@@ -78,7 +68,7 @@ def test_what_is_not_there_is_named_as_it_was_given(name, refused, tmp_path, mon
         ('compare a', "Missing argument 'B'"),
     ],
 )
-def test_wrong_use_ends_with_2_and_a_remedy(words, sentence, refused, tmp_path, monkeypatch):
+def test_wrong_use_ends_with_2_and_a_remedy(words, sentence, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert sentence in refused(*words.split(), codes=(2,))
     assert not list(tmp_path.iterdir())
@@ -86,9 +76,7 @@ def test_wrong_use_ends_with_2_and_a_remedy(words, sentence, refused, tmp_path, 
 
 @pytest.mark.parametrize('name', ['drive', 'replay nowhere', 'experiment sweep'])
 @pytest.mark.parametrize('value', ['[x', '{', '"', '2026-99-99', '@x', 'a: b: c'])
-def test_a_value_that_yaml_cannot_read_is_a_wrong_use_with_a_remedy(
-    name, value, refused, tmp_path, monkeypatch
-):
+def test_a_value_that_yaml_cannot_read_is_a_wrong_use_with_a_remedy(name, value, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     printed = refused(*name.split(), '--set', f'mount_control.damper={value}', codes=(2,))
     assert f"the value '{value}' is " in printed
@@ -96,7 +84,7 @@ def test_a_value_that_yaml_cannot_read_is_a_wrong_use_with_a_remedy(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(command, refused, tmp_path):
+def test_a_folder_whose_name_is_markup_is_printed_as_it_is_called(tmp_path):
     folder = tmp_path / 'run [' / 'x] [mm]'
     folder.parent.mkdir()
     command('drive', *DRIVE, '--out', folder)

@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 import yaml
+from command_line import command, refused
 
 from engine_mount.recordings.recording import open_recording, recording_hash
 from engine_mount.recordings.session import recorded_session
@@ -37,7 +38,7 @@ def truth(folder, name):
     return np.asarray(open_recording(folder / 'recording')['/sim/truth'][name])
 
 
-def test_a_drive_over_a_road_tells_its_origin_and_can_be_moved(blocks, tmp_path, command):
+def test_a_drive_over_a_road_tells_its_origin_and_can_be_moved(blocks, tmp_path):
     options = ('--speed', '30/3.6', '--core', '--no-report', '--duration', 4, '--out', tmp_path / 'run')
     command('drive', '--road', blocks, *options)
     session = yaml.safe_load(recorded_session(open_recording(tmp_path / 'run' / 'recording')))
@@ -55,7 +56,7 @@ def test_a_drive_over_a_road_tells_its_origin_and_can_be_moved(blocks, tmp_path,
     command('report', tmp_path / 'moved')
 
 
-def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, tmp_path, command):
+def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, tmp_path):
     quick = ('--speed', '60/3.6', '--mount', 'elastomer', '--core', '--no-report', '--out')
     command('drive', '--road', blocks, *quick, tmp_path / 'first')
     words = ('--column', '/sim/chassis_acceleration.linear_acceleration.z', '--speed', '60/3.6')
@@ -75,5 +76,5 @@ def test_the_road_behind_a_recorded_acceleration_moves_the_engine_alike(blocks, 
         ('--speed 20 --scenario bench', 'or the file'),
     ],
 )
-def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, refused, words, sentence):
+def test_what_is_no_road_is_refused_before_anything_is_driven(blocks, words, sentence):
     assert sentence in refused('drive', '--road', blocks, '--core', *words.split())

@@ -1,14 +1,15 @@
 """The commands on recordings by URI: as on the same recording by path, and beside nothing of the cache."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import fsspec
 import pytest
+from command_line import command, refused
+from loaded_modules import modules_after
+from references import REFERENCES_FOLDER
 
-REFERENCE = Path(__file__).parents[4] / 'bags' / 'reference' / 'gap'
+REFERENCE = REFERENCES_FOLDER / 'gap'
 STORE = 'memory://drives'
 RUN = f'{STORE}/gap'
 KEPT = ('source', 'samples', 'equal_to_recorded', 'compared_setpoints', 'switch_on_s', 'peak_current_a')
@@ -30,7 +31,7 @@ def made(tmp_path):
     return sorted(path.name for path in (tmp_path / 'here').iterdir())
 
 
-def test_a_uri_gives_what_a_path_gives(command, refused):
+def test_a_uri_gives_what_a_path_gives():
     assert command('audit', RUN) == command('audit', REFERENCE) == command('audit', REFERENCE.as_uri())
     assert 'everything is equal' in command('compare', RUN, REFERENCE)
     refused('compare', f'{STORE}/nothing', REFERENCE, codes=(2,))
@@ -39,7 +40,7 @@ def test_a_uri_gives_what_a_path_gives(command, refused):
     assert told.split('\n', 1)[1] == command('info', REFERENCE).split('\n', 1)[1]
 
 
-def test_replay_takes_uris_of_a_recording_and_of_a_table(command):
+def test_replay_takes_uris_of_a_recording_and_of_a_table():
     command('replay', RUN, '--out', 'replayed', '--json', 'replayed.json')
     command('replay', REFERENCE, '--out', 'same', '--json', 'same.json')
     first, second = (json.loads(Path(name).read_text()) for name in ('replayed.json', 'same.json'))
@@ -49,7 +50,7 @@ def test_replay_takes_uris_of_a_recording_and_of_a_table(command):
 
 
 @pytest.mark.parametrize('inner', ['', '/gap_0.mcap'])
-def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner, command):
+def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner):
     command('cut', RUN + inner, '--to', '1s')
     command('recover', RUN + inner)
     command('report', RUN + inner)
@@ -58,23 +59,19 @@ def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner, com
     assert not [path for path in (tmp_path / 'copies').rglob('*') if 'recovered' in path.name]
 
 
-def test_ls_lists_this_machine_alone(refused):
+def test_ls_lists_this_machine_alone():
     said = refused('ls', 'sftp://driver:hunter2@host/a')
     assert 'info URI fetches one recording' in said
     assert 'hunter2' not in said
 
 
 @pytest.mark.parametrize('words', ['audit', 'info', 'view', 'report'])
-def test_a_uri_with_a_password_is_refused_without_telling_it(words, refused):
+def test_a_uri_with_a_password_is_refused_without_telling_it(words):
     said = refused(*words.split(), 'sftp://driver:hunter2@host/a')
     assert 'sftp://driver@host/a holds a password' in said
     assert 'hunter2' not in said
 
 
 def test_a_path_loads_no_library_of_stores():
-    tell = (
-        'import sys; from engine_mount.cli.fetching import local, beside; from pathlib import Path;'
-        'beside(local("bags/a", None), ""); print(*sys.modules)'
-    )
-    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
-    assert not {'fsspec', 'aiohttp', 'asyncssh', 'numpy', 's3fs'} & set(loaded.split())
+    loaded = modules_after('from engine_mount.cli.fetching import *; beside(local("bags/a", None), "")')
+    assert not {'fsspec', 'aiohttp', 'asyncssh', 'numpy', 's3fs'} & loaded

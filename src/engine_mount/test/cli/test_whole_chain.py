@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import command
 from scipy.optimize import brentq
 
 from engine_mount.drives.loop.recording import record_core
@@ -87,7 +88,7 @@ SPEEDS = [sign * 1e-3 * step for sign in (1.0, -1.0) for step in range(1, 11)]
 
 
 @pytest.fixture(scope='module')
-def file(tmp_path_factory, command):
+def file(tmp_path_factory):
     """Return the specimen file that the commands make of the recordings of a drawn rack."""
     folder = tmp_path_factory.mktemp('rack')
     command('calibrate', 'rack', '--out', folder, '--seed', SEED, '--noise', 0.01, '--drawn')
@@ -128,7 +129,7 @@ def test_a_drawn_actuator_with_drawn_pads_is_controlled_by_its_identified_files_
     assert tracking_error(drive, *policy_of(settings)) <= TRACKING_TARGET
 
 
-def test_the_shipped_specimen_is_what_make_identify_writes(tmp_path, command):
+def test_the_shipped_specimen_is_what_make_identify_writes(tmp_path):
     written = tmp_path / 'written.yaml'
     recipe = MAKEFILE.read_text().split('\nidentify:', 1)[1].split('\n\n', 1)[0].splitlines()[1:]
     assert len(recipe) == 4

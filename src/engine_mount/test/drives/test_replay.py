@@ -1,13 +1,12 @@
 """A replay as a call: the recorded answers where nothing is changed, others where something is."""
 
-from pathlib import Path
-
 import pytest
+from references import REFERENCES_FOLDER
 
 from engine_mount.drives.replay import replay, with_changes
 from mount_models.quantity import ParameterError
 
-REFERENCE = Path(__file__).resolve().parents[4] / 'bags' / 'reference' / 'opening'
+REFERENCE = REFERENCES_FOLDER / 'opening'
 
 
 def test_without_a_change_the_answers_are_those_recorded_and_nothing_is_written():

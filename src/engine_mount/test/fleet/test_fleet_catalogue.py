@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from references import REFERENCES_FOLDER
 
 import engine_mount
 from engine_mount.fleet.catalogue import index, rows_of
@@ -14,15 +15,13 @@ from engine_mount.fleet.places import places
 from engine_mount.fleet.tables import COLUMNS, schema_of
 from engine_mount.signals.sources.uris import SourceError
 
-REFERENCES = Path(__file__).parents[4] / 'bags' / 'reference'
-
 
 @pytest.fixture
 def drives(tmp_path):
     """A folder of recordings: one whole, one cut off, one without its description, and what is none."""
     folder = tmp_path / 'drives'
     for name in ('a/gap', 'b/rough', 'b/initialisation'):
-        shutil.copytree(REFERENCES / Path(name).name, folder / name)
+        shutil.copytree(REFERENCES_FOLDER / Path(name).name, folder / name)
     file = next((folder / 'b' / 'rough').glob('*.mcap'))
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     (folder / 'b' / 'initialisation' / 'metadata.yaml').unlink()
@@ -44,7 +43,7 @@ def test_a_row_tells_what_a_recording_is_and_what_was_lost_in_it(drives, tmp_pat
     assert (gap['kind'], gap['whole'], gap['reason'], gap['scenario']) == ('replay', True, '', 'motorway')
     assert gap['lost_samples'] == gap['faults'] == 0
     assert json.loads(gap['parameters'])['mount_sim.motorway.gap_depth'] == 0.03
-    recording = engine_mount.open(REFERENCES / 'gap')
+    recording = engine_mount.open(REFERENCES_FOLDER / 'gap')
     assert gap['rest_gap_m'] == recording['air_gap']['rest_gap'][-1]
     assert gap['peak_displacement_m'] == np.abs(recording['displacement']['mount']).max()
     rough = row_of(table, 'b/rough')
@@ -79,7 +78,7 @@ def test_only_what_changed_is_read_again_and_what_is_gone_leaves(drives, tmp_pat
     assert (catalogue / 'recordings.parquet').read_bytes() == before
     shutil.rmtree(drives / 'a' / 'gap')
     shutil.rmtree(drives / 'b' / 'rough')
-    shutil.copytree(REFERENCES / 'opening', drives / 'b' / 'rough')
+    shutil.copytree(REFERENCES_FOLDER / 'opening', drives / 'b' / 'rough')
     changed = index([drives], catalogue)
     assert inside == [str(drives / 'b' / 'rough')]
     assert (changed.read, changed.unchanged) == (1, 2)

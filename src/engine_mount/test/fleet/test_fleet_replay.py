@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from references import REFERENCES_FOLDER
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import parsed_changes
@@ -23,7 +24,6 @@ from engine_mount.settings.options import with_sample_rate
 from engine_mount.signals.sources.uris import SourceError
 from mount_recorder.session import session_text
 
-REFERENCES = Path(__file__).resolve().parents[4] / 'bags' / 'reference'
 CHANGES = parsed_changes({'highest_current': 0.7})
 NAMES = ['gap', 'opening', 'rough']
 
@@ -33,7 +33,7 @@ def fleet(tmp_path):
     """A folder with three recordings and one that is damaged."""
     folder = tmp_path / 'fleet'
     for name in NAMES:
-        shutil.copytree(REFERENCES / name, folder / name)
+        shutil.copytree(REFERENCES_FOLDER / name, folder / name)
     (folder / 'broken.mcap').write_bytes(b'not a recording')
     return folder
 
@@ -74,7 +74,7 @@ def test_figures_do_not_depend_on_how_many_samples_are_answered_at_once(driven, 
 
 
 def test_the_changed_level_shows_in_the_row_and_the_replay_as_recorded_is_what_was_recorded():
-    row = compare_setpoints(recorded_in(open_run(REFERENCES / 'opening')), CHANGES).row
+    row = compare_setpoints(recorded_in(open_run(REFERENCES_FOLDER / 'opening')), CHANGES).row
     assert row['as_recorded'] is True
     assert row['peak_current_a'] > row['peak_current_changed_a'] == 0.7
     assert row['setpoints_differing'] > 0
@@ -101,7 +101,7 @@ def test_a_closed_loop_tells_how_both_motions_differ_at_whatever_rate(tmp_path):
 
 def test_without_an_effect_nothing_differs():
     changes = parsed_changes({'longest_bridge': 0.03})
-    row = compare_setpoints(recorded_in(open_run(REFERENCES / 'gap')), changes).row
+    row = compare_setpoints(recorded_in(open_run(REFERENCES_FOLDER / 'gap')), changes).row
     assert row['setpoints_differing'] == row['switchings_moved'] == row['switchings_appeared'] == 0
     assert math.isnan(row['setpoint_difference_first_at_s'])
 

@@ -15,10 +15,10 @@ from mount_models.coil.correction import (
 )
 from mount_models.coil.crossing import find_crossing
 from mount_models.coil.gap import evaluate
-from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
+from mount_models.quantity import LawRefusedError, OutsideLawError
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator
-from mount_sim.plant.ripple import RippleCoil, incremental_inductance
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at, incremental_inductance
 
 MAGNET, COIL = ReluctanceActuator(), RippleCoil()
 GAPS = np.linspace(270e-6, 550e-6, 15)
@@ -26,17 +26,9 @@ CURRENTS = np.concatenate([np.full(1000, 0.2), np.linspace(0.2, 2.5, 1500)])
 JUDGED = np.linspace(300e-6, 500e-6, 9)
 
 
-def coil_at(celsius, coefficient=0.0043):
-    return with_values(
-        COIL,
-        conductivity=COIL.conductivity / (1.0 + coefficient * (celsius - 20.0)),
-        resistance=COIL.resistance * (1.0 + 0.0039 * (celsius - 20.0)),
-    )
-
-
 @functools.lru_cache
 def without_noise(celsius, gaps, coefficient):
-    coil, currents = coil_at(celsius, coefficient), CURRENTS.tolist()
+    coil, currents = coil_at(COIL, TemperatureCoefficients(core=coefficient), celsius), CURRENTS.tolist()
     return np.array(
         [[incremental_inductance(coil, MAGNET, current, gap) for current in currents] for gap in gaps]
     )
@@ -53,7 +45,7 @@ def recorded(celsius=20.0, seed=0, noise=0.01, gaps=GAPS, coefficient=0.0043):
 
 @functools.lru_cache
 def truth(gap, celsius=20.0, coefficient=0.0043):
-    coil = coil_at(celsius, coefficient)
+    coil = coil_at(COIL, TemperatureCoefficients(core=coefficient), celsius)
     currents = np.linspace(1.0, 2.4, 281)
     at_rest = incremental_inductance(coil, MAGNET, 0.2, gap)
     curve = [incremental_inductance(coil, MAGNET, current, gap) for current in currents]

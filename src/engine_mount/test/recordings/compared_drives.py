@@ -3,13 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-from recorded_drive import PERIOD, START, joint_state
-from rosbags.typesys import Stores, get_typestore
+from samples import PERIOD, START, joint_state
 
+import engine_mount
+from engine_mount.recordings.recording import Recording
 from mount_recorder.bag_writer import BagWriter
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import AIR_GAP, CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT, EVENT, SESSION
 
-_STORE = get_typestore(Stores.ROS2_JAZZY)
 _DELAY = 200_000  # ns from stamp to reception
 _TIME = {'sec': 9223372036, 'nsec': 854775807}
 LATCHED = {
@@ -19,10 +20,14 @@ LATCHED = {
 }
 
 
-def text(content: str) -> bytes:
-    """Return a `std_msgs/String`."""
-    message = _STORE.types['std_msgs/msg/String'](data=content)
-    return bytes(_STORE.serialize_cdr(message, 'std_msgs/msg/String'))
+def bag_of(folder: Path, topic: str, type_name: str, messages) -> Recording:
+    """Write a recording of one topic with a message each ms, and open it."""
+    writer = BagWriter(folder)
+    writer.add_topic(topic, type_name)
+    for index, raw in enumerate(messages):
+        writer.write(topic, raw, START + index * PERIOD)
+    writer.close()
+    return engine_mount.open(folder)
 
 
 def answers(count: int, *, on: int = 100, off: int = 300, phase: float = 0.0) -> dict[str, np.ndarray]:
@@ -63,7 +68,7 @@ def add_answers(
         writer.add_topic(
             f'{namespace}/{topic.name}', topic.type, lambda topic=topic: [LATCHED] * (topic in latched)
         )
-    writer.write(f'{namespace}/{SESSION.name}', text(session), start)
+    writer.write(f'{namespace}/{SESSION.name}', string_message(session), start)
     gap = joint_state(start, list(AIR_GAP.names), np.full(len(AIR_GAP.names), 4e-4), np.empty(0))
     writer.write(f'{namespace}/{AIR_GAP.name}', gap, start + 1, start)
     marked = dict(marks)
@@ -74,7 +79,7 @@ def add_answers(
                 raw = joint_state(stamp, list(topic.names), _row(topic, signals, index), np.empty(0))
                 writer.write(f'{namespace}/{topic.name}', raw, stamp + _DELAY, stamp + _DELAY // 2)
         if index in marked:
-            writer.write(f'{namespace}/{EVENT.name}', text(marked[index]), stamp + _DELAY)
+            writer.write(f'{namespace}/{EVENT.name}', string_message(marked[index]), stamp + _DELAY)
 
 
 def _row(topic, signals: dict[str, np.ndarray], index: int) -> np.ndarray:

@@ -1,20 +1,24 @@
 """What the tests share: small recordings, the genuine bags beside the repository."""
 
-import sys
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
-
-from recorded_drive import write_drive
+from samples import write_drive
 
 
 @pytest.fixture
 def drive(tmp_path) -> Path:
     """Return a recording of 500 samples of three topics."""
     return write_drive(tmp_path / 'drive', 500)
+
+
+@pytest.fixture
+def place(tmp_path) -> Callable[[], Path]:
+    """Return a new folder at each call."""
+    numbers = itertools.count()
+    return lambda: tmp_path / f'bag_{next(numbers)}'
 
 
 @pytest.fixture

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, write_drive
+from compared_drives import bag_of
+from samples import PERIOD, START, write_drive
 
 import engine_mount
 from engine_mount.recordings.audit import audit
@@ -43,13 +44,9 @@ def test_topics_without_a_rate_have_no_expectation(tmp_path):
 
 @pytest.mark.parametrize(('late', 'figures'), [(8, (6000, 0, 0)), (600, (None, None, None))])
 def test_a_few_late_stamps_are_no_losses_and_with_many_nothing_is_counted(tmp_path, late, figures):
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/displacement', DISPLACEMENT.type)
     stamps = START + PERIOD * np.arange(6000)
     stamps[np.random.default_rng(1).choice(5998, late, replace=False) + 1] += 7 * PERIOD // 10
-    for stamp in stamps.tolist():
-        writer.write('/displacement', ScalarsLayout(DISPLACEMENT).pack(stamp, (0.0,)), stamp)
-    writer.close()
-    entry = audit(engine_mount.open(tmp_path / 'bag'))['/displacement']
+    raws = [ScalarsLayout(DISPLACEMENT).pack(stamp, (0.0,)) for stamp in stamps.tolist()]
+    entry = audit(bag_of(tmp_path / 'bag', '/displacement', DISPLACEMENT.type, raws))['/displacement']
     assert (entry.expected, entry.lost, entry.duplicated) == figures
     assert (figures[0] is None) == ('beside the rate (limit 1 %): only counted' in entry.remark)

@@ -1,11 +1,9 @@
 """What recover and cut keep besides messages: metadata, sequence numbers, losses."""
 
-import itertools
-
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from recorded_drive import PERIOD, START, sample
+from samples import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings.audit import audit
@@ -18,13 +16,6 @@ from mount_ros.topics import DISPLACEMENT
 
 COUNT = 200
 NOTES = ({'vehicle': 'B', 'track': 'north'}, {'vehicle': 'B', 'track': 'south'})
-
-
-@pytest.fixture
-def place(tmp_path):
-    """Return a new folder at each call."""
-    numbers = itertools.count()
-    return lambda: tmp_path / f'bag_{next(numbers)}'
 
 
 def by_others(folder, end=True):

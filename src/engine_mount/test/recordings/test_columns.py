@@ -4,12 +4,12 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, joint_state
+from compared_drives import bag_of
+from samples import PERIOD, START, joint_state
 
 import engine_mount
 from engine_mount.recordings import SeriesError
 from engine_mount.recordings.mcap_file import McapFile
-from mount_recorder.bag_writer import BagWriter
 from mount_ros.topics import JOINT_STATE
 
 COUNT = 500
@@ -32,13 +32,12 @@ def test_columns_and_stamps_are_those_of_all_messages_in_one_pass(drive, monkeyp
 @pytest.fixture
 def changing(tmp_path):
     """Return a recording in which the last messages have one name more."""
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/displacement', JOINT_STATE)
+    raws = []
     for index in range(COUNT):
         names = ['mount'] if index < 400 else ['other', 'mount']
-        raw = joint_state(START + index * PERIOD, names, np.arange(float(len(names))) + index, np.empty(0))
-        writer.write('/displacement', raw, START + index * PERIOD)
-    writer.close()
+        numbers = np.arange(float(len(names))) + index
+        raws.append(joint_state(START + index * PERIOD, names, numbers, np.empty(0)))
+    bag_of(tmp_path / 'bag', '/displacement', JOINT_STATE, raws)
     return tmp_path / 'bag'
 
 
@@ -51,12 +50,8 @@ def test_a_column_that_not_every_message_has_is_that_of_all_messages(changing):
 
 
 def test_a_topic_without_stamps_has_its_columns(tmp_path):
-    writer = BagWriter(tmp_path / 'bag')
-    writer.add_topic('/number', 'std_msgs/msg/Float64')
-    for index in range(COUNT):
-        writer.write('/number', b'\0\1\0\0' + np.float64(index).tobytes(), START + index * PERIOD)
-    writer.close()
-    recording = engine_mount.open(tmp_path / 'bag')
+    raws = [b'\0\1\0\0' + np.float64(index).tobytes() for index in range(COUNT)]
+    recording = bag_of(tmp_path / 'bag', '/number', 'std_msgs/msg/Float64', raws)
     recording.load_columns({'number': ['data']})
     np.testing.assert_array_equal(recording['number']['data'], np.arange(COUNT))
     with pytest.raises(SeriesError, match='no header with a stamp'):
@@ -76,13 +71,12 @@ def test_memory_grows_by_the_columns_and_not_by_the_messages(tmp_path):
     names = [f'a long name of a number {place}' for place in range(40)]
     counts = 6000, 12000  # both have so many chunks that several are read together
     for count in counts:
-        writer = BagWriter(tmp_path / f'bag_{count}')
-        writer.add_topic('/displacement', JOINT_STATE)
-        for index in range(count):
-            raw = joint_state(START + index * PERIOD, names, np.full(40, float(index)), np.empty(0))
-            writer.write('/displacement', raw, START + index * PERIOD)
-        writer.close()
-    assert len(raw) > 1500
+        raws = [
+            joint_state(START + index * PERIOD, names, np.full(40, float(index)), np.empty(0))
+            for index in range(count)
+        ]
+        bag_of(tmp_path / f'bag_{count}', '/displacement', JOINT_STATE, raws)
+    assert len(raws[0]) > 1500
     some = {'displacement': names[:1]}
     # At first what is compiled is loaded.
     folders = [tmp_path / f'bag_{count}' for count in (counts[0], *counts)]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from compared_drives import add_answers, answers
 from mcap.writer import Writer
-from recorded_drive import START
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from samples import START
 
 import engine_mount
 from engine_mount.recordings.compare import compare

@@ -1,6 +1,5 @@
 """Comparing recordings of several mounts: each by its own clock, under its own name."""
 
-import numpy as np
 import pytest
 from compared_drives import START, add_answers, answers
 
@@ -12,12 +11,6 @@ from mount_recorder.bag_writer import BagWriter
 COUNT = 400
 SIGNALS = answers(COUNT)
 LATER = START + 90_000_000_000
-
-
-def changed(place: int, by: float) -> dict[str, np.ndarray]:
-    current = SIGNALS['current'].copy()
-    current[place] += by
-    return {**SIGNALS, 'current': current}
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Pieces of a recording: nothing in them is changed."""
 
-import itertools
-
 import numpy as np
 import pytest
 from compared_drives import START, answers, write_answers
@@ -26,13 +24,6 @@ MARKS = ((50, '{time: 1, kind: fault, text: cable}'), (250, 'just a sentence'), 
 def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp('whole') / 'whole'
     return engine_mount.open(write_answers(folder, answers(COUNT), marks=MARKS))
-
-
-@pytest.fixture
-def place(tmp_path):
-    """Return a new folder at each call."""
-    numbers = itertools.count()
-    return lambda: tmp_path / f'bag_{next(numbers)}'
 
 
 def _messages(recording) -> dict[str, list[tuple[int, int, bytes]]]:

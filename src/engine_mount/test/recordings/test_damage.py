@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from recorded_drive import sample
+from samples import PERIOD, START, sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
@@ -21,8 +21,6 @@ from mount_ros.topics import AIR_GAP, COIL_RIPPLE, CURRENT_SETPOINT, DISPLACEMEN
 
 TIMES = 200
 LATCHED = b'\x00\x01\x00\x00\x02\x00\x00\x00a\x00'
-START = 1_700_000_000_000_000_000
-PERIOD = 1_000_000
 
 
 @pytest.fixture(scope='module')

@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from recorded_drive import write_drive
 from ros_testing import mutated
+from samples import write_drive
 
 import engine_mount
 from engine_mount.recordings import ReadingError

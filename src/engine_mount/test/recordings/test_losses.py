@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compared_drives import answers, text
+from compared_drives import answers
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from recorded_drive import PERIOD, RECORDED, START, joint_state
 from ros_testing import serialised
+from samples import PERIOD, RECORDED, START, joint_state
 
 import engine_mount
 from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_answers
@@ -15,6 +15,7 @@ from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import as_json, losses, sentences
 from engine_mount.recordings.times import NO_TIMES
 from mount_recorder.bag_writer import BagWriter
+from mount_ros.messages.cdr import string_message
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,
@@ -108,7 +109,7 @@ def write(folder: Path, *, unanswered=range(0), lost=range(0), no_ripple=range(0
                 writer.write('/diagnostics', report(*status), stamp + 300_000)
         for sample, mark in marks:
             if sample == index:
-                writer.write('/event', text(mark), stamp + 400_000)
+                writer.write('/event', string_message(mark), stamp + 400_000)
     writer.close()
     return engine_mount.open(folder)
 

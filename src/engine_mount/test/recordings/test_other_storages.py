@@ -6,9 +6,9 @@ import sqlite3
 
 import numpy as np
 import pytest
-from recorded_drive import PERIOD, START, sample
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
+from samples import PERIOD, START, by_rosbags, sample
 
 import engine_mount
 from engine_mount.recordings import ReadingError
@@ -56,9 +56,7 @@ def test_other_bags_are_read_as_ours_and_copies_are_plain(tmp_path, monkeypatch,
     assert recover(folder, tmp_path / 'recovered').complete
     expected = [('/displacement', START + i * PERIOD, sample(DISPLACEMENT, i)) for i in range(COUNT)]
     for out in ('bag', 'cut', 'recovered'):
-        with Reader(tmp_path / out) as reader:
-            found = [(connection.topic, time, bytes(raw)) for connection, time, raw in reader.messages()]
-        assert found == expected
+        assert by_rosbags(tmp_path / out) == expected
 
 
 def test_a_database_is_read_without_its_description(tmp_path):

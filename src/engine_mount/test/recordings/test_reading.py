@@ -2,33 +2,20 @@
 
 import numpy as np
 import pytest
+from compared_drives import bag_of
 from mcap.writer import CompressionType, IndexType, Writer
-from recorded_drive import PERIOD, START, joint_state, sample, write_drive
-from rosbags.typesys import Stores, get_typestore
+from samples import PERIOD, START, joint_state, sample, write_drive
 
 import engine_mount
 from engine_mount.recordings import ReadingError, SeriesError
 from mount_recorder.bag_writer import BagWriter
 from mount_recorder.schemas import schema_text
-from mount_ros.messages.scalars import ScalarsLayout
+from mount_ros.messages.cdr import string_message, wrench
+from mount_ros.messages.scalars import OneNumberLayout, ScalarsLayout
 from mount_ros.topics import COIL_RIPPLE, DISPLACEMENT, JOINT_STATE, SIM_MOUNT_FORCE
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 STRING = 'std_msgs/msg/String'
 INDICES = np.arange(500)
-
-
-def string(text):
-    return bytes(STORE.serialize_cdr(STORE.types[STRING](data=text), STRING))
-
-
-def bag_of(folder, topic, type_name, messages):
-    writer = BagWriter(folder)
-    writer.add_topic(topic, type_name)
-    for index, raw in enumerate(messages):
-        writer.write(topic, raw, START + index * PERIOD)
-    writer.close()
-    return engine_mount.open(folder)
 
 
 def test_columns_carry_names_numbers_units_and_stamps(drive):
@@ -98,24 +85,8 @@ def test_names_in_another_order_at_equal_length_are_noticed(tmp_path):
 
 
 def test_instruments_are_read_by_path(tmp_path):
-    types = STORE.types
-    vector = types['geometry_msgs/msg/Vector3']
-    raws = [
-        bytes(
-            STORE.serialize_cdr(
-                types['geometry_msgs/msg/WrenchStamped'](
-                    header=types['std_msgs/msg/Header'](
-                        stamp=types['builtin_interfaces/msg/Time'](sec=index, nanosec=5), frame_id='rack'
-                    ),
-                    wrench=types['geometry_msgs/msg/Wrench'](
-                        force=vector(x=0.0, y=0.0, z=10.0 * index), torque=vector(x=0.0, y=0.0, z=0.0)
-                    ),
-                ),
-                SIM_MOUNT_FORCE.type,
-            )
-        )
-        for index in range(5)
-    ]
+    layout = OneNumberLayout(wrench)
+    raws = [layout.pack(index * 1_000_000_000 + 5, 10.0 * index) for index in range(5)]
     series = bag_of(tmp_path / 'bag', '/sim/mount_force', SIM_MOUNT_FORCE.type, raws)['sim/mount_force']
     np.testing.assert_array_equal(series['wrench.force.z'], 10.0 * np.arange(5))
     np.testing.assert_array_equal(series.stamps, np.arange(5) * 1_000_000_000 + 5)
@@ -124,7 +95,7 @@ def test_instruments_are_read_by_path(tmp_path):
 
 
 def test_garbled_message_is_refused_with_its_number(tmp_path):
-    raws = [string('fine'), b'\x00\x01\x00\x00\xff\xff\xff\x7fx']
+    raws = [string_message('fine'), b'\x00\x01\x00\x00\xff\xff\xff\x7fx']
     recording = bag_of(tmp_path / 'bag', '/event', STRING, raws)
     with pytest.raises(SeriesError, match='message 1'):
         list(recording['event'].messages())
@@ -223,7 +194,7 @@ def test_messages_outside_of_chunks_are_refused_with_the_way_out(tmp_path):
         writer = Writer(file, use_chunking=False)
         writer.start('ros2', 'another')
         writer.register_channel('/event', 'cdr', writer.register_schema(STRING, 'ros2msg', b'string data'))
-        writer.add_message(1, START, string('the text'), START)
+        writer.add_message(1, START, string_message('the text'), START)
         writer.finish()
     with pytest.raises(ReadingError, match='outside of chunks: copy it by rosbags-convert'):
         engine_mount.open(tmp_path / 'other.mcap')

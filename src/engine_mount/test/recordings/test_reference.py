@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import yaml
-from compared_drives import START, answers, text, write_answers
-from recorded_drive import joint_state
+from compared_drives import START, answers, write_answers
 from reference_differences import differences_from_reference
+from samples import joint_state
 
 import engine_mount
 from engine_mount.recordings.reference import (
@@ -14,6 +14,7 @@ from engine_mount.recordings.reference import (
     accept,
 )
 from mount_recorder.bag_writer import BagWriter
+from mount_ros.messages.cdr import string_message
 from mount_ros.messages.force_table import table_message
 from mount_ros.topics import (
     AIR_GAP,
@@ -43,7 +44,7 @@ def _run(folder, *, shift=0, topics=(*INPUTS, *ANSWERS), session='scenario: benc
         if topic in topics:
             writer.write(f'/{topic.name}', raw, START + index * 1_000_000)
 
-    write(SESSION, text(session), 0)
+    write(SESSION, string_message(session), 0)
     for index in range(begin, count):
         stamp = START + index * 1_000_000
         for topic in (DISPLACEMENT, COIL_RIPPLE, CURRENT_SETPOINT, CONTROL_TRACE):

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from samples import PERIOD, START
 
 from engine_mount.recordings.times import misdated, missing_samples, redated, stamp_statistics
 from mount_recorder.stamp_watch import StampWatch
 
 RATE = 1000.0
-PERIOD = 1_000_000
-START = 1_700_000_000_000_000_000
 
 
 def stamps_of(indices):

@@ -56,6 +56,16 @@ def look(name='a', *, moved=False, **row):
     return Look(whole, [f'engine-mount report {name}'], signals)
 
 
+def page_with(row):
+    """Return a page about one row more."""
+    table = pyarrow.concat_tables([result(), pyarrow.Table.from_pylist([row])], promote_options='permissive')
+    return fleet_report(table, [], '', 'F')
+
+
+def sections_of(page):
+    return {section.name: section for section in page.sections}
+
+
 def test_a_figure_is_paired_with_itself_after_the_change_where_both_are_known():
     (current, switched) = pairs_of(result())
     assert (current.name, current.unit, current.meaning) == (
@@ -82,7 +92,7 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
     away = Look({'recording': 'b', 'mount': '', 'asked': 'setpoints', 'peak_current_a': 2.0}, reason='away')
     page = fleet_report(result(), [look(peak_current_a=1.0), away], 'peak_current_a', 'tuned')
     assert page.title == 'Fleet tuned: setpoints for the recorded displacement'
-    sections = {section.name: section for section in page.sections}
+    sections = sections_of(page)
     assert list(sections) == ['overview', 'worst', 'peak_current_a', 'look_1', 'look_2', 'failures']
     assert 'is another question' in sections['overview'].words[0]
     told = {
@@ -101,9 +111,7 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
 def test_recordings_with_another_policy_are_no_failures():
     rows = result().to_pylist()
     told = dict.fromkeys(NUMBERS) | {'reason': 'fifth: no effect', 'outcome': 'another policy'}
-    more = pyarrow.Table.from_pylist([{**rows[0], **told, 'recording': 'fifth'}])
-    page = fleet_report(pyarrow.concat_tables([result(), more], promote_options='permissive'), [], '', 'F')
-    sections = {section.name: section for section in page.sections}
+    sections = sections_of(page_with({**rows[0], **told, 'recording': 'fifth'}))
     text = [str(getattr(cell, 'text', cell)) for cell in sections['overview'].findings[0].text]
     assert ' '.join(text) == '5 recordings: 3 replayed (10 s), 1 with another policy and 1 failed'
     assert sections['another_policy'].tables[0].rows == [('1', 'fifth: no effect', 'fifth')]
@@ -112,15 +120,14 @@ def test_recordings_with_another_policy_are_no_failures():
 
 def test_a_reason_of_several_recordings_stands_once_with_all_of_them():
     row = {**result().to_pylist()[2], 'reason': 'sixth/<b> is no MCAP file', 'recording': 'sixth'}
-    more = pyarrow.Table.from_pylist([row])
-    page = fleet_report(pyarrow.concat_tables([result(), more], promote_options='permissive'), [], '', 'F')
-    failures = next(section for section in page.sections if section.name == 'failures')
-    assert failures.tables[0].rows == [('2', '.../<b> is no MCAP file', 'broken\nsixth')]
+    assert sections_of(page_with(row))['failures'].tables[0].rows == [
+        ('2', '.../<b> is no MCAP file', 'broken\nsixth')
+    ]
 
 
 def test_the_picture_shows_the_stretch_around_the_largest_difference():
     page = fleet_report(result(), [look(peak_current_a=1.0)], 'peak_current_a', 'Fleet')
-    section = next(section for section in page.sections if section.name == 'look_1')
+    section = sections_of(page)['look_1']
     assert section.commands == ['engine-mount report a']
     given, setpoints, _ = section.chart.panels
     assert given.label == 'recorded displacement (mm)'
@@ -134,14 +141,14 @@ def test_the_picture_shows_nothing_beyond_the_ends_of_the_recording(at, view):
     signals = Signals(time, np.sin(time), (np.zeros_like(time), np.where(abs(time - at) < 1e-6, 1.0, 0.0)))
     row = {'recording': 'a', 'mount': '', 'asked': 'setpoints', 'peak_current_a': 1.0}
     page = fleet_report(result(), [Look(row, signals=signals)], 'peak_current_a', 'Fleet')
-    chart = next(section.chart for section in page.sections if section.name == 'look_1')
+    chart = sections_of(page)['look_1'].chart
     assert chart.view == pytest.approx(view)
 
 
 def test_in_a_closed_loop_the_picture_shows_both_motions_over_the_acceleration():
     row = {'peak_current_a': 1.0, 'displacement_difference_largest_m': 5e-5}
-    section = fleet_report(result('displacement'), [look(moved=True, **row)], 'peak_current_a', 'Fleet')
-    chart = next(section.chart for section in section.sections if section.name == 'look_1')
+    page = fleet_report(result('displacement'), [look(moved=True, **row)], 'peak_current_a', 'Fleet')
+    chart = sections_of(page)['look_1'].chart
     assert [panel.label for panel in chart.panels] == [
         'recorded acceleration of the chassis (m/s²)',
         'simulated displacement (mm)',

@@ -1,13 +1,9 @@
 """What the tests share: an environment without keys and copies of the user, and stores to fetch from."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-# The tests are imported one by one (importmode importlib); what they share is found by this path.
-sys.path.insert(0, str(Path(__file__).parent))
-
+from references import REFERENCES_FOLDER
 from served_stores import Bucket, HttpStore, know_host, name_s3_store, s3_server, sftp_store
 
 
@@ -26,7 +22,7 @@ def own_home(tmp_path_factory, monkeypatch):
 @pytest.fixture
 def reference() -> Path:
     """Return a recording of this project, a rosbag2 folder with one MCAP file."""
-    return Path(__file__).parents[4] / 'bags' / 'reference' / 'gap'
+    return REFERENCES_FOLDER / 'gap'
 
 
 @pytest.fixture(scope='session')

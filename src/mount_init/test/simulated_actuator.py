@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
-import pytest
 
 from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import Initialisation, InitialisationResult
@@ -13,8 +12,9 @@ from mount_init.parameters import InitParameters
 from mount_models.specimen import Specimen, default_specimen
 from mount_sim.plant.closing import ClosingMechanics, closed_state
 from mount_sim.plant.reluctance import ReluctanceActuator, mean_incremental_inductance
-from mount_sim.plant.ripple import RippleCoil, current_rate, flux_rate
+from mount_sim.plant.ripple import RippleCoil, TemperatureCoefficients, coil_at, current_rate, flux_rate
 
+SPECIMEN = default_specimen()
 SAMPLE_TIME_NS = 1_000_000
 STEPS_PER_SAMPLE = 10
 LOOP_BANDWIDTH = 2.0 * math.pi * 400.0  # rad/s
@@ -37,7 +37,8 @@ def advance(state, setpoint, mechanics, actuator, coil, supply, time_step, bandw
 class SimulatedActuator:
     """The truth behind the samples; `distort(number, sample) -> sample` injects faults into what is read.
 
-    `supply` (V) limits the current loop alone, `noise` is the relative scatter of L_i of each ripple.
+    `supply` (V) limits the current loop alone, `noise` is the relative scatter of L_i of each
+    ripple; core and coil are at `celsius` (degC).
     """
 
     def __init__(
@@ -47,11 +48,12 @@ class SimulatedActuator:
         noise: float = 0.0,
         seed: int = 0,
         supply: float = 14.0,
+        celsius: float = 20.0,
         distort: Callable[[int, Sample], Sample] | None = None,
     ):
         self.mechanics = ClosingMechanics(contact_gap=contact_gap, rest_gap=rest_gap)
         self.actuator = ReluctanceActuator()
-        self.coil = RippleCoil()
+        self.coil = coil_at(RippleCoil(), TemperatureCoefficients(), celsius)
         self.supply = supply
         self.state = np.array([0.0, rest_gap])
         self.number = 0
@@ -93,45 +95,25 @@ class SimulatedActuator:
         return np.array(forces)
 
 
-def initialise(
+def run_initialisation(
     plant: SimulatedActuator,
-    specimen: Specimen,
+    specimen: Specimen = SPECIMEN,
     parameters: InitParameters | None = None,
     temperatures: TemperatureReadings | None = None,
 ) -> InitialisationResult:
     """Run a whole initialisation against `plant`, as plain function calls."""
-    return run(plant, specimen, parameters, temperatures).result()
+    return run_ramp(plant, specimen, parameters, temperatures).result()
 
 
-def run(
+def run_ramp(
     plant: SimulatedActuator,
-    specimen: Specimen,
+    specimen: Specimen = SPECIMEN,
     parameters: InitParameters | None = None,
     temperatures: TemperatureReadings | None = None,
 ) -> Initialisation:
-    """Like `initialise`, up to the end of the ramp."""
+    """Like `run_initialisation`, up to the end of the ramp."""
     initialisation = Initialisation(specimen, parameters or InitParameters(), temperatures)
     while not initialisation.finished:
         stamp = (plant.number + 1) * SAMPLE_TIME_NS
         plant.follow(initialisation.step(stamp, *plant.sample()))
     return initialisation
-
-
-@pytest.fixture(scope='session')
-def specimen():
-    return default_specimen()
-
-
-@pytest.fixture(scope='session')
-def simulated_actuator():
-    return SimulatedActuator
-
-
-@pytest.fixture(scope='session')
-def run_ramp():
-    return run
-
-
-@pytest.fixture(scope='session')
-def run_initialisation():
-    return initialise

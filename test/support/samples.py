@@ -1,8 +1,9 @@
-"""Small recordings whose numbers are known."""
+"""Samples whose numbers are known, and recordings of them, for the tests of writer and reader."""
 
 from pathlib import Path
 
 import numpy as np
+from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from mount_recorder.bag_writer import BagWriter
@@ -26,6 +27,12 @@ def write_drive(folder: Path, count: int, skipped: range = range(0), **options) 
             writer.write(f'/{topic.name}', sample(topic, index), stamp + 200_000)
     writer.close()
     return folder
+
+
+def by_rosbags(folder: Path) -> list[tuple[str, int, bytes]]:
+    """Return topic, time of reception (ns) and bytes of each message, as `rosbags` reads them."""
+    with Reader(folder) as reader:
+        return [(connection.topic, time, bytes(raw)) for connection, time, raw in reader.messages()]
 
 
 def sample(topic: Topic, index: int) -> bytes:
