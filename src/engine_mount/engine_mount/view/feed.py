@@ -1,4 +1,4 @@
-"""Where messages come from: a running graph (`view.py`), or a recording by the clock."""
+"""Where messages come from: a running graph (`running_graph.py`), or a recording by the clock."""
 
 import threading
 import time

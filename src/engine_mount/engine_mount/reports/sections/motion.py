@@ -20,7 +20,6 @@ from engine_mount.reports.drawing.chart import (
     Span,
     level_lines,
 )
-from engine_mount.reports.drawing.picture import draw_chart
 from engine_mount.reports.sections.periodic import (
     amplitude_density,
     cycle_work,
@@ -267,6 +266,8 @@ def draw_drive(subject: Subject, begin: float, title: str, *files: Path) -> None
 
     Right, where there is a current, its highest moment in detail. Raises `ValueError` without any signal.
     """
+    from engine_mount.reports.drawing.picture import draw_chart  # what draws takes a second to load
+
     chart, setpoint = traces([subject]).chart, subject['setpoint']
     if chart is None or chart.limits is None:
         raise ValueError('neither displacement nor current was recorded')
