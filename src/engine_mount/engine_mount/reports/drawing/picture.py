@@ -67,7 +67,7 @@ def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None) -> None:
     for dots in panel.dots:
         axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
-        for value in (level.value, -level.value) if level.both else (level.value,):
+        for value in (level.value, -level.value):
             axes.axhline(value, color=level.colour, linestyle=_STYLES[level.dash], linewidth=1.0)
         axes.annotate(
             level.name, (0.0, level.value), xycoords=('axes fraction', 'data'), textcoords='offset points',

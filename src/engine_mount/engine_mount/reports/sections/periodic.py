@@ -86,18 +86,18 @@ def decibels(amplitudes: Array) -> Array:
     return np.asarray(20.0 * np.log10(known))
 
 
-def amplitude_density(values: Array, rate: float, segment: float = _SEGMENT) -> tuple[Array, Array]:
+def amplitude_density(values: Array, rate: float) -> tuple[Array, Array]:
     """Return frequencies (Hz) and one-sided amplitude spectral density (unit / sqrt(Hz)) of `values`.
 
     `values` are evenly spaced at `rate` (Hz) and known. The sum of its squares times the spacing of the
     frequencies is the variance. Hann window, half overlap, the mean of each segment taken off. A signal
-    shorter than `segment` (s) is one segment (Welch's method).
+    shorter than a segment of 2.048 s is one segment (Welch's method).
     """
     if len(values) < 8:
         raise ValueError(f'a spectrum needs at least 8 samples, these are {len(values)}')
     from scipy.signal import welch  # loads long
 
-    length = min(len(values), round(segment * rate))
+    length = min(len(values), round(_SEGMENT * rate))
     frequency, power = welch(values, rate, 'hann', length)
     return frequency, np.sqrt(power)
 

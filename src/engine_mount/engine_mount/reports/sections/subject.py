@@ -147,12 +147,12 @@ class Subject:
         """Return stamps (ns) as times of the report."""
         return (stamps - self.zero) / 1e9
 
-    def curve(self, what: str, x: Array, y: Array, *, steps: bool = False) -> Curve:
+    def curve(self, what: str, x: Array, y: Array) -> Curve:
         """Return a curve in the colour of this recording, with its name where there are several."""
         mount = self.run.mount
         own = '' if mount.startswith('friction') and mount != 'friction_off' else COLOUR_OF.get(mount, '')
         label = f'{what}, {self.name}' if self._several else what
-        return Curve(label, x, y, own or COLOURS[self._place % len(COLOURS)], steps=steps)
+        return Curve(label, x, y, own or COLOURS[self._place % len(COLOURS)])
 
     @functools.cached_property
     def session(self) -> str:
