@@ -61,7 +61,7 @@ def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
     """
     _check_coverage(lines)
     loads = np.array([line.normal_force for line in lines])
-    with_load = float(np.ptp(loads)) > _SAME_LOAD * float(loads.mean())
+    with_load = np.ptp(loads) > _SAME_LOAD * loads.mean()
     unloaded = [] if with_load else [3]
     fits = {}
     for side, sign in (('p', 1.0), ('n', -1.0)):
@@ -154,6 +154,6 @@ def _fit(
         return (form(known, speed, 1.0 + 0.01 * known[3] * load) - values) * weight
 
     ends = [least_squares(residuals, start, bounds=bounds, x_scale='jac') for start in starts]
-    best = min(ends, key=lambda end: float(end.cost))
+    best = min(ends, key=lambda end: end.cost)
     best.x[unloaded] = 0.0
     return best.x.tolist(), covariance_of(best) * np.outer(_PER_100_N, _PER_100_N)

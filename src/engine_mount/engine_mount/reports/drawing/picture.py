@@ -107,6 +107,6 @@ def _shown(curve: Curve, limits: Limits | None) -> tuple[Array, Array]:
         x, y = x[inside], y[inside]
     if len(x) <= _POINTS:
         return x, y
-    step = 2.0 * float(x[-1] - x[0]) / _POINTS
+    step = 2.0 * (x[-1] - x[0]) / _POINTS
     pairs = ranges(x, y, step)
     return np.repeat(x[0] + step * (np.arange(len(pairs)) + 0.5), 2), pairs.ravel()
