@@ -12,21 +12,14 @@ from pathlib import Path
 from engine_mount.identification.fitting import Progress, silent
 from engine_mount.identification.force_law import ActuatorCalibration, fit_force_law
 from engine_mount.identification.inductance import InductanceCalibration, calibrate_inductance
-from engine_mount.identification.rack import RACK, FileValues, read_force, read_ripple
-from engine_mount.signals.mapping import Mapping, with_options
+from engine_mount.identification.rack import FileValues, read_force, read_ripple
+from engine_mount.signals.mapping import Mapping
 from mount_models.coil.correction import CONDUCTIVITY_COEFFICIENT
 from mount_models.specimen import chosen_specimen
 
 Place = str | os.PathLike[str]
 
 _FLOOR = 0.006  # chosen: weights as 2 N of 330 N
-
-
-def _mapping(columns: Mapping | dict[str, str] | None) -> Mapping:
-    if isinstance(columns, Mapping):
-        return columns
-    texts = [f'{name}={text}' for name, text in (columns or {}).items()]
-    return with_options(Mapping(), texts, known=RACK)
 
 
 def actuator(
@@ -45,7 +38,7 @@ def actuator(
     current and falling with the gap within the measured range; and the readers' errors.
     """
     paths = [Path(file) for file in files]
-    points = read_force(paths, _mapping(columns), values or FileValues())
+    points = read_force(paths, columns or {}, values or FileValues())
     fit = fit_force_law(*points, _FLOOR * float(points.force.max()), progress)
     return ActuatorCalibration(fit, chosen_specimen(str(base)), paths)
 
@@ -79,9 +72,10 @@ def inductance(
         turns_area=turns_area or starting.turns_area,
         bridge=starting.bridge._replace(link_voltage=supply or starting.bridge.link_voltage),
     )
-    recordings = read_ripple(paths, _mapping(columns), values or FileValues(), starting.turns_area)
-    chosen = CONDUCTIVITY_COEFFICIENT if coefficient is None else coefficient
-    return calibrate_inductance(recordings, starting, paths, chosen, held_out)
+    recordings = read_ripple(paths, columns or {}, values or FileValues(), starting.turns_area)
+    if coefficient is None:
+        coefficient = CONDUCTIVITY_COEFFICIENT
+    return calibrate_inductance(recordings, starting, paths, coefficient, held_out)
 
 
 def rack(

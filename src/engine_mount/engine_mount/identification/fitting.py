@@ -37,9 +37,9 @@ def covariance_of(fit: OptimizeResult) -> FloatArray:
     norms = np.linalg.norm(jacobian, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
     freedom = max(1, residuals.size - int(np.count_nonzero(norms)))
-    scatter = float(residuals @ residuals) / freedom
+    scatter = residuals @ residuals / freedom
     inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), hermitian=True)
-    return np.asarray(scatter * inverse / np.outer(scale, scale))
+    return scatter * inverse / np.outer(scale, scale)
 
 
 def relative_rms(error: FloatArray, signal: FloatArray) -> float:

@@ -98,7 +98,7 @@ class ForceLawFit:
     @property
     def measured_from(self) -> float:
         """The lowest current that was measured (A); below, the law is continued to 0 N at 0 A. 0 if near."""
-        lowest = float(self.points.current.min())
+        lowest = self.points.current.min()
         return lowest if lowest > _FROM_ZERO * self.law.current_high else 0.0
 
     def residuals(self) -> dict[str, float]:
@@ -219,13 +219,13 @@ def fit_force_law(
         return ForceLaw(a1, a2, a3, a4, a5, *box)
 
     def misfit(unknowns: FloatArray) -> FloatArray:
-        return np.asarray((checked_force(law_of(unknowns), currents, gaps) - forces) / tolerance)
+        return (checked_force(law_of(unknowns), currents, gaps) - forces) / tolerance
 
     def slopes(unknowns: FloatArray) -> FloatArray:
         of_coefficients = _coefficient_slopes(law_of(unknowns), currents, gaps)[:, belongs_to]
-        return np.asarray(of_coefficients * powers / tolerance[:, np.newaxis])
+        return of_coefficients * powers / tolerance[:, np.newaxis]
 
-    strongest, highest = float(forces.max()), box[2]
+    strongest, highest = forces.max(), box[2]
     scales = strongest, strongest / highest, 1.0 / highest, highest, strongest / highest**2
     high = np.repeat([_WIDE * scale for scale in scales], ORDERS)
     low = -high
@@ -243,13 +243,13 @@ def fit_force_law(
     for number, start in enumerate(candidates):
         progress(number / (len(candidates) + 1), 'fitting')
         ends.append(search(start, _SHORT_SEARCH, 'soft_l1'))  # outliers pull the first searches little
-    best = min(ends, key=lambda end: float(end.cost))
+    best = min(ends, key=lambda end: end.cost)
     if not far_points(forces, np.abs(misfit(best.x))).size:
         progress(len(candidates) / (len(candidates) + 1), 'fitting')
         best = search(best.x, _LONG_SEARCH, 'linear')  # with outliers it would hide them
     law = law_of(best.x)
     check_outliers(points, checked_force(law, currents, gaps), tolerance)
-    _check_law(law, float(currents.min()))
+    _check_law(law, currents.min())
     unmapping = block_diag(*(_unmapping(domain, order) for order in ORDERS))
     return ForceLawFit(law, points, unmapping @ covariance_of(best) @ unmapping.T)
 
@@ -311,14 +311,14 @@ class _Problem(NamedTuple):
 
 def _starts(problem: _Problem, domain: tuple[float, float]) -> list[FloatArray]:
     """Return coefficients of a1 .. a5 in the mapped gap to start from, the best first, at last Table 1."""
-    highest = float(problem.current.max())
+    highest = problem.current.max()
     trials = [
         ([sharpness / highest, 0.0, 0.0, 0.0], [knee * highest, lean * knee * highest])
         for knee, lean, sharpness in itertools.product(_KNEES, _LEANS, _SHARPNESSES)
     ]
     groups = gap_groups(problem.gap)
     if len(groups) >= 3:
-        gaps = [float(problem.gap[group].mean()) for group in groups]
+        gaps = [problem.gap[group].mean() for group in groups]
         best = np.array([_best_knee(problem, group) for group in groups])
         sharpness = [float(np.median(best[:, 1])), 0.0, 0.0, 0.0]
         trials.append((sharpness, polyfit(gaps, best[:, 0], 1).tolist()))
@@ -333,7 +333,7 @@ def _starts(problem: _Problem, domain: tuple[float, float]) -> list[FloatArray]:
 def _completed(problem: _Problem, sharp: list[float], at: list[float]) -> tuple[float, FloatArray]:
     """Return misfit and all coefficients for given polynomials a3 and a4."""
     gap, current, force, tolerance = problem
-    lines, parabolas = _shapes(current, np.asarray(polyval(gap, sharp)), np.asarray(polyval(gap, at)))
+    lines, parabolas = _shapes(current, polyval(gap, sharp), polyval(gap, at))
     columns = [
         (shape / tolerance)[:, np.newaxis] * gap[:, np.newaxis] ** np.arange(4)
         for shape in (lines, lines * current, parabolas)
@@ -345,14 +345,14 @@ def _completed(problem: _Problem, sharp: list[float], at: list[float]) -> tuple[
 
 def _best_knee(problem: _Problem, group: npt.NDArray[np.intp]) -> FloatArray:
     """Return current and sharpness of the best knee of one gap on a grid."""
-    highest = float(problem.current.max())
+    highest = problem.current.max()
     grid = _GRID * (highest, 1.0 / highest)
     current, tolerance = problem.current[group], problem.tolerance[group]
     # all trials of a gap at once: to solve them one by one takes about as long as the search that follows
     lines, parabolas = _shapes(current, grid[:, 1:], grid[:, :1])
     columns = np.stack([lines, lines * current, parabolas], axis=2)
     misfits = _solved(columns / tolerance[:, np.newaxis], problem.force[group] / tolerance)[1]
-    return np.asarray(grid[np.argmin(misfits)])
+    return grid[np.argmin(misfits)]
 
 
 def _shapes(current: FloatArray, sharpness: FloatArray, knee: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -373,4 +373,4 @@ def _solved(columns: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     normal = across @ scaled + _RIDGE * np.eye(scaled.shape[-1])
     solution = np.linalg.solve(normal, (across @ values)[..., np.newaxis])
     left = (scaled @ solution)[..., 0] - values
-    return solution[..., 0] / scale, np.asarray(np.sum(left**2, axis=-1))
+    return solution[..., 0] / scale, np.sum(left**2, axis=-1)

@@ -77,7 +77,7 @@ def checked_points(gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayL
 def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
     """Return the places of points that share a gap (m), by rising gap; measured gaps may scatter a little."""
     order = np.argsort(gap, kind='stable')
-    span = float(gap[order[-1]] - gap[order[0]])
+    span = gap[order[-1]] - gap[order[0]]
     apart = np.diff(gap[order]) > max(_SAME_GAP, 0.01 * span)
     return np.split(order, np.flatnonzero(apart) + 1)
 

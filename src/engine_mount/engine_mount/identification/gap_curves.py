@@ -16,10 +16,12 @@ _FEWEST_AT_REST = 20  # chosen
 _REST_HALF_WIDTH = 0.02  # A, chosen: there the inductance is straight over the current
 _CROSSING_HALF_WIDTH = 0.2  # A, chosen
 _FEWEST_GAPS = 6  # chosen: a cubic and two to judge it
+_HIGHEST_DEGREE = 5  # chosen
 _CONTRADICTION = 3e-6  # m, chosen: below it a point is as good as its gap could be set
 _FAR = 10.0  # standard deviations, chosen: few points are a poor measure of their scatter
 _NEARLY = 1.1  # chosen
 _INVERSE_ERROR = 0.05e-6  # m
+_GRID = np.linspace(-1.0, 1.0, 101)  # of a curve, over its scaled gap
 _BEYOND_DOUBT = 2.0  # standard deviations, chosen
 
 
@@ -42,7 +44,7 @@ class GapPoint(NamedTuple):
     inductance: float
     inductance_std: float
     crossing_current: float
-    crossing_std: float
+    crossing_current_std: float
 
 
 class CurveFit(NamedTuple):
@@ -90,19 +92,19 @@ def measured_point(
 def _rest_inductance(z: FloatArray, values: FloatArray) -> tuple[float, float]:
     """Return the inductance (H) at the rest current and its std: a line through the samples around it."""
     deviation = np.abs(values - np.median(values))
-    kept = deviation <= max(4.0 * 1.4826 * float(np.median(deviation)), 0.02 * abs(float(np.median(values))))
+    kept = deviation <= max(4.0 * 1.4826 * np.median(deviation), 0.02 * abs(np.median(values)))
     z, values = z[kept], values[kept]
     powers = np.stack([np.ones_like(z), z], axis=1)
     if np.ptp(z) < 0.1:
         powers = powers[:, :1]  # the current was held: nothing to be said of a slope
     solution, *_ = np.linalg.lstsq(powers, values, rcond=None)
-    scatter = float(np.sum((values - powers @ solution) ** 2)) / max(1, values.size - powers.shape[1])
-    spread = float(np.linalg.inv(powers.T @ powers)[0, 0])
+    scatter = np.sum((values - powers @ solution) ** 2) / max(1, values.size - powers.shape[1])
+    spread = np.linalg.inv(powers.T @ powers)[0, 0]
     return float(solution[0]), math.sqrt(scatter * spread)
 
 
 @single_threaded()
-def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) -> GapCalibration:
+def calibrate_gap_curves(points: Sequence[GapPoint]) -> GapCalibration:
     """Return the curves through points at one temperature, both ways.
 
     The degree is the lowest that predicts each point from the others nearly as well as the best one. Raises
@@ -117,19 +119,8 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
             f'{gaps.size} given: {", ".join(f"{gap * 1e6:.1f}" for gap in gaps)} um: record more gaps, and '
             'each temperature and gap once'
         )
-    inductance, crossing = (
-        _fit_curve(
-            what,
-            points,
-            np.array([getattr(point, value) for point in points]),
-            np.array([getattr(point, std) for point in points]),
-            highest_degree,
-        )
-        for what, value, std in (
-            ('inductance at the rest current', 'inductance', 'inductance_std'),
-            ('crossing current', 'crossing_current', 'crossing_std'),
-        )
-    )
+    inductance = _fit_curve('inductance at the rest current', points, 'inductance')
+    crossing = _fit_curve('crossing current', points, 'crossing_current')
     curves = GapCurves(
         inductance.polynomial,
         _inverse_curve(inductance.polynomial),
@@ -140,32 +131,31 @@ def calibrate_gap_curves(points: Sequence[GapPoint], highest_degree: int = 5) ->
     return GapCalibration(curves, inductance, crossing, tuple(points))
 
 
-def _fit_curve(
-    what: str, points: Sequence[GapPoint], values: FloatArray, stds: FloatArray, highest_degree: int
-) -> CurveFit:
-    """Return the curve through `values` (n,) with deviations `stds` (n,) at the gaps of `points`."""
-    gaps = np.array([point.gap for point in points])
+def _fit_curve(what: str, points: Sequence[GapPoint], name: str) -> CurveFit:
+    """Return the curve through the values `name` of `points`, in words `what`, over their gaps."""
+    gaps, values, stds = (
+        np.array([getattr(point, each) for point in points]) for each in ('gap', name, f'{name}_std')
+    )
     low, high = float(gaps.min()), float(gaps.max())
     centre, scale = 0.5 * (low + high), 0.5 * (high - low)
     z = (gaps - centre) / scale
-    floor = 1e-6 * float(np.median(np.abs(values)))
+    floor = 1e-6 * np.median(np.abs(values))
     weights = 1.0 / np.hypot(np.hypot(stds, np.median(stds)), floor)
     _check_agreement(what, points, z, values, weights)
     trials = []
-    for degree in range(2, min(highest_degree, gaps.size - 3) + 1):
+    for degree in range(2, min(_HIGHEST_DEGREE, gaps.size - 3) + 1):
         coefficients, left_out, unscaled = _weighted(z, values, weights, degree)
-        trials.append((float(np.sqrt(np.mean((left_out * weights) ** 2))), coefficients, unscaled))
+        trials.append((np.sqrt(np.mean((left_out * weights) ** 2)), coefficients, unscaled))
     best = min(trial[0] for trial in trials)
     _, coefficients, unscaled = next(trial for trial in trials if trial[0] <= _NEARLY * best)
     polynomial = ScaledPolynomial(centre, scale, tuple(coefficients.tolist()), low, high)
     off = evaluate(polynomial, gaps) - values
     errors = off / np.maximum(np.abs(slope(polynomial, gaps)), 1e-12)
-    scatter = float(np.sum((off * weights) ** 2)) / (gaps.size - coefficients.size)
+    scatter = np.sum((off * weights) ** 2) / (gaps.size - coefficients.size)
     covariance = max(scatter, 1e-3) * unscaled
-    grid = np.linspace(-1.0, 1.0, 101)
-    powers = polyvander(grid, coefficients.size - 1)
-    slopes = slope(polynomial, np.linspace(low, high, 101))
-    _check_slopes(what, low + scale * (grid + 1.0), slopes, scale, covariance)
+    slopes = slope(polynomial, np.linspace(low, high, _GRID.size))
+    _check_slopes(what, polynomial, slopes, covariance)
+    powers = polyvander(_GRID, coefficients.size - 1)
     gap_std = _deviations(powers, covariance) / np.maximum(np.abs(slopes), 1e-12)
     return CurveFit(
         polynomial, covariance, errors, float(np.sqrt(np.mean(errors**2))), float(np.max(gap_std))
@@ -174,23 +164,21 @@ def _fit_curve(
 
 def _deviations(rows: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the standard deviations of the products of `rows` with coefficients of that covariance."""
-    return np.asarray(np.sqrt(np.einsum('ij,jk,ik->i', rows, covariance, rows)))
+    return np.sqrt(np.einsum('ij,jk,ik->i', rows, covariance, rows))
 
 
-def _check_slopes(
-    what: str, gaps: FloatArray, slopes: FloatArray, scale: float, covariance: FloatArray
-) -> None:
+def _check_slopes(what: str, curve: ScaledPolynomial, slopes: FloatArray, covariance: FloatArray) -> None:
     """Raise `LawRefusedError` unless the curve rises, or falls, with the gap beyond doubt of its scatter."""
-    z, degree = (gaps - gaps.mean()) / scale, len(covariance) - 1
-    powers = np.arange(degree + 1) * z[:, np.newaxis] ** np.maximum(np.arange(degree + 1) - 1, 0)
-    doubtful = (
-        np.sign(slopes[slopes.size // 2]) * slopes <= _BEYOND_DOUBT * _deviations(powers, covariance) / scale
-    )
+    orders = np.arange(len(covariance))
+    powers = orders * _GRID[:, np.newaxis] ** np.maximum(orders - 1, 0)
+    unsure = _BEYOND_DOUBT * _deviations(powers, covariance) / curve.scale
+    doubtful = np.sign(slopes[slopes.size // 2]) * slopes <= unsure
     if doubtful.any():
         raise LawRefusedError(
             f'the {what} must rise or fall steadily with the gap to separate gaps; at '
-            f'{gaps[np.argmax(doubtful)] * 1e6:.0f} um it does not, beyond {_BEYOND_DOUBT:g} standard '
-            'deviations: narrow the range of gaps, or choose another rest current or crossing inductance'
+            f'{1e6 * (curve.centre + curve.scale * _GRID[np.argmax(doubtful)]):.0f} um it does not, beyond '
+            f'{_BEYOND_DOUBT:g} standard deviations: narrow the range of gaps, or choose another rest '
+            'current or crossing inductance'
         )
 
 
@@ -230,8 +218,8 @@ def _check_agreement(
         others = np.arange(z.size) != place
         coefficients, _, _ = _weighted(z[others], values[others], weights[others], degree)
         error = (values - polyval(z, coefficients)) * weights
-        scatter = float(np.sqrt(np.sum(error[others] ** 2) / (z.size - degree - 2)))
-        steepness = abs(float(polyval(z[place], polyder(coefficients))))
+        scatter = np.sqrt(np.sum(error[others] ** 2) / (z.size - degree - 2))
+        steepness = abs(polyval(z[place], polyder(coefficients)))
         as_gap = 0.5 * (points[-1].gap - points[0].gap) / (weights[place] * max(steepness, 1e-12))
         judged.append((abs(error[place]) / scatter, place, abs(error[place]) * as_gap, scatter * as_gap))
     times, place, off, scatter = max(judged)

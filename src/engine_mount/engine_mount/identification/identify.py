@@ -13,7 +13,7 @@ from pathlib import Path
 from engine_mount.identification.fitting import IdentificationError, Progress, silent
 from engine_mount.identification.friction.coefficients import fit_coefficients
 from engine_mount.identification.friction.files import friction_mapping, read_recording
-from engine_mount.identification.friction.ladder import Rung, fit_ladder, law_error
+from engine_mount.identification.friction.ladder import fit_ladder, law_error
 from engine_mount.identification.friction.laws import all_laws
 from engine_mount.identification.friction.ramp_hold import fit_ramp_hold, mean_contact
 from engine_mount.identification.friction.recording import FrictionRecording
@@ -164,13 +164,13 @@ def _try_pairs(
             'give another one'
         )
 
-    def fit(one: FrictionRecording) -> list[Rung]:
-        def named(share: float, law: str) -> None:
-            progress(share, f'{one.name}: {law}')
-
-        return fit_ladder(all_laws([one]), [one], [], named, seed)
-
-    ladders = [fit(each) for each in recordings]
+    ladders = [
+        fit_ladder(
+            all_laws([one]), [one], [],
+            lambda share, law, name=one.name: progress(share, f'{name}: {law}'), seed,
+        )
+        for one in recordings
+    ]  # fmt: skip
     for (one, ladder), (other, _) in itertools.permutations(zip(recordings, ladders, strict=True), 2):
         rungs = [each._replace(held_out_error=law_error(each.law, each.values, [other])) for each in ladder]
         result.pairs.append(Pair(one.name, other, rungs))

@@ -47,7 +47,7 @@ def draw_force_law(fit: Any, file: Path) -> None:
     law, points = fit.law, fit.points
     current, groups, curves = np.linspace(0.0, law.current_high, 200), gap_groups(points.gap), []
     for place, group in enumerate(groups[:: max(1, len(groups) // _DRAWN_GAPS)]):
-        gap = float(points.gap[group].mean())
+        gap = points.gap[group].mean()
         curves += [
             Curve(points.current[group], points.force[group], f'C{place % 10}.'),
             Curve(current, checked_force(law, current, gap), f'C{place % 10}-', f'{1e6 * gap:.0f} µm'),

@@ -4,7 +4,9 @@ import re
 from collections.abc import Mapping as Keys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,25 +22,27 @@ from engine_mount.signals.units import ZERO_CELSIUS
 from mount_models.coil.gap import measured_inductance
 from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE
 
+_by_size = partial(Quantity, by_size=True)
 RACK = by_name(
-    Quantity('gap', 'length', 'air gap', 20e-6, 5e-3, by_size=True, mapped='air_gap'),
-    Quantity(
-        'current', 'current', 'current of the coil', 0.05, 20.0, (f'{COIL_RIPPLE.name}.coil_current',),
-        by_size=True,
-    ),
-    Quantity(
-        'force', 'force', 'force of the actuator', 2.0, 2e4, ('sim/clamp_force.wrench.force.z',),
-        by_size=True,
-    ),
-    Quantity('inductance', 'inductance', 'inductance of the coil', 1e-3, 1.0, by_size=True),
-    Quantity('current_rate', 'current/time', 'slope of the current', 10.0, 1e5, by_size=True),
-    Quantity('flux_rate', 'flux density/time', 'slope of the flux density', 5.0, 1e5, by_size=True),
-    Quantity(
-        'coil_temperature', 'temperature', 'temperature of the coil', 213.15, 523.15, by_size=True,
+    _by_size('gap', 'length', 'air gap', 20e-6, 5e-3, mapped='air_gap'),
+    _by_size('current', 'current', 'current of the coil', 0.05, 20.0, (f'{COIL_RIPPLE.name}.coil_current',)),
+    _by_size('force', 'force', 'force of the actuator', 2.0, 2e4, ('sim/clamp_force.wrench.force.z',)),
+    _by_size('inductance', 'inductance', 'inductance of the coil', 1e-3, 1.0),
+    _by_size('current_rate', 'current/time', 'slope of the current', 10.0, 1e5),
+    _by_size('flux_rate', 'flux density/time', 'slope of the flux density', 5.0, 1e5),
+    _by_size(
+        'coil_temperature',
+        'temperature',
+        'temperature of the coil',
+        213.15,
+        523.15,
         mapped='temperature',
     ),
-)  # fmt: skip
+)
 """What a rack measures, with the range of its largest value; titles are topic and field in recordings."""
+
+Choices: TypeAlias = Mapping | Keys[str, str]
+"""The columns of files: a mapping, or {quantity: 'COLUMN:UNIT'}."""
 _GAP_IN_NAME = re.compile(r'(?<![\d.])(\d+(?:\.\d+)?)um(?![a-z])', re.IGNORECASE)
 _CELSIUS_IN_NAME = re.compile(r'([+-]?\d+(?:\.\d+)?)degC', re.IGNORECASE)
 _FEWEST = 8  # chosen: fewer points are no measurement
@@ -61,14 +65,16 @@ class FileValues:
 
     def gap_of(self, file: Path) -> float:
         """Return the gap (m) that is given or in the name; raises `IdentificationError` without either."""
+        if file in self.gap:
+            return self.gap[file]
         named = _GAP_IN_NAME.search(_bare_name(file))
-        if file not in self.gap and named is None:
+        if named is None:
             kind = '' if file.is_dir() else file.suffix
             raise IdentificationError(
                 f'{file}: its air gap is not known; add --gap {file.name}=UM, a column gap_um, or the gap to '
                 f'its name, as in ripple_349um{kind}'
             )
-        return self.gap.get(file, float(named[1]) * 1e-6 if named else 0.0)
+        return float(named[1]) * 1e-6
 
     def celsius_of(self, file: Path) -> float:
         """Return the temperature (degC) that is given or in the name; raises `IdentificationError`."""
@@ -82,7 +88,7 @@ class FileValues:
         return celsius
 
 
-def read_force(files: Sequence[Path], mapping: Mapping, values: FileValues) -> ForcePoints:
+def read_force(files: Sequence[Path], mapping: Choices, values: FileValues) -> ForcePoints:
     """Return the points of all files, each with a gap by column, by option or by its name.
 
     Raises `IdentificationError` and the readers' errors.
@@ -114,7 +120,7 @@ def _means(current: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def read_ripple(
-    files: Sequence[Path], mapping: Mapping, values: FileValues, turns_area: float
+    files: Sequence[Path], mapping: Choices, values: FileValues, turns_area: float
 ) -> list[RippleRecording]:
     """Return one recording for each file and gap; `turns_area` (m^2) makes inductances of slopes.
 
@@ -127,7 +133,7 @@ def read_ripple(
         read = _ripple_from_table if is_table else _ripple_from_topics
         recordings += read(file, mapping, values, turns_area)
     for recording in recordings:
-        share = float(np.mean(~(recording.inductance > 0.0)))
+        share = np.mean(~(recording.inductance > 0.0))
         if share > _LARGEST_INVALID:
             raise IdentificationError(
                 f'{recording.name}: {share:.0%} of the inductances are not positive, at most '
@@ -137,7 +143,7 @@ def read_ripple(
 
 
 def _ripple_from_table(
-    file: Path, mapping: Mapping, values: FileValues, turns_area: float
+    file: Path, mapping: Choices, values: FileValues, turns_area: float
 ) -> list[RippleRecording]:
     columns = select_rows(
         recording_place(file), mapping, {name: RACK[name] for name in RACK if name != 'force'}, ('current',)
@@ -170,7 +176,7 @@ def _ripple_from_table(
 
 
 def _ripple_from_topics(
-    file: Path, mapping: Mapping, values: FileValues, turns_area: float
+    file: Path, mapping: Choices, values: FileValues, turns_area: float
 ) -> list[RippleRecording]:
     recording = open_run(file)
     series, warmth = recording[COIL_RIPPLE.name], COIL_TEMPERATURE.name

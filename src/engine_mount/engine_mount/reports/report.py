@@ -149,7 +149,7 @@ def subjects_of(recordings: Sequence[Recording]) -> list[Subject]:
     return subjects
 
 
-def make_report(subjects: Sequence[Subject], on_step: OnStep = lambda share, what: None) -> Report:
+def make_report(subjects: Sequence[Subject], on_step: OnStep) -> Report:
     """Return the report of `subjects`; in the place of a section that could not be made stands why."""
     made: list[Section] = []
     failures: list[str] = []

@@ -1,4 +1,4 @@
-"""Where messages come from: a running graph (`view.py`), or a recording by the clock."""
+"""Where messages come from: a running graph (`running_graph.py`), or a recording by the clock."""
 
 import threading
 import time
@@ -114,11 +114,11 @@ class RecordedFeed:
         for owner, (topic, _) in enumerate(self._series):
             before = np.flatnonzero(self._owners[:due] == owner)
             if topic.rate == 0.0 and before.size:
-                receive(self.message(int(before[-1])))
+                receive(self.message(before[-1]))
         started = time.monotonic()
         while due < len(self) and not self._ending.wait(_PERIOD):
             position = self._begin + self._rate * (time.monotonic() - started)
-            end = int(np.searchsorted(self._seconds, position, side='right'))
+            end = np.searchsorted(self._seconds, position, side='right')
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1

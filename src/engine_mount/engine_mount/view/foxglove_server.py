@@ -56,9 +56,14 @@ class FoxgloveServer(LocalServer):
             }
             for name, topic in self._topics.items()
         ]
-        server = {'capabilities': ['time'], 'supportedEncodings': ['cdr'], 'metadata': {}}
-        greeting = {'op': 'serverInfo', 'name': 'engine mount', **server}
-        return [json.dumps(greeting), json.dumps({'op': 'advertise', 'channels': channels})]
+        server = {
+            'op': 'serverInfo',
+            'name': 'engine mount',
+            'capabilities': ['time'],
+            'supportedEncodings': ['cdr'],
+            'metadata': {},
+        }
+        return [json.dumps(server), json.dumps({'op': 'advertise', 'channels': channels})]
 
     def receive(self, viewer: Viewer, text: str) -> None:
         """Change the subscriptions of a viewer; what is no such request changes nothing."""

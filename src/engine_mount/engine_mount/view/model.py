@@ -81,7 +81,7 @@ PANELS: dict[str, tuple[str, float, tuple[float, ...]]] = {
 
 
 class Model:
-    """What is known of the graph that a feed shows; `listen` gets each new interval.
+    """What is known of the graph that a feed shows; `on_interval` gets each new interval.
 
     An exception in its thread or in that of the feed ends the view: `failure` says which, and `on_failure` is
     called there.
@@ -102,17 +102,14 @@ class Model:
         self._time, self._number, self._newest = 0.0, 0, 0  # s, intervals, ns of arrival
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._serve, name='view', daemon=True)
-        self._listeners: list[Callable[[Interval], None]] = []
+        self.on_interval: Callable[[Interval], None] = lambda interval: None
+        """Called with each interval from the thread of the model."""
         if beside:
             Alternatives({}).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
 
     def take(self, message: Message) -> None:
         """Take a message; cheap, from any thread."""
         self._arrived.append(message)
-
-    def listen(self, listener: Callable[[Interval], None]) -> None:
-        """Call `listener` with each interval from now on, from the thread of the model."""
-        self._listeners.append(listener)
 
     def start(self) -> None:
         """Begin to make intervals."""
@@ -187,9 +184,7 @@ class Model:
                 due += 1.0 / INTERVALS_PER_SECOND
                 self._ending.wait(max(0.0, due - time.monotonic()))
                 count = len(self._arrived)
-                interval = self.interval([self._arrived.popleft() for _ in range(count)])
-                for listener in self._listeners:
-                    listener(interval)
+                self.on_interval(self.interval([self._arrived.popleft() for _ in range(count)]))
         except Exception as error:
             self.fail(f'{type(error).__name__}: {error}')
 
@@ -235,4 +230,4 @@ def _latencies(series: Mapping[Topic, Series]) -> Array:
         _, first, second = np.intersect1d(samples.stamps, answers.stamps, return_indices=True)
     except (KeyError, SeriesError, ValueError):
         return np.empty(0)
-    return np.asarray((answers.publish_times[second] - samples.publish_times[first]) * 1e-9)
+    return (answers.publish_times[second] - samples.publish_times[first]) * 1e-9

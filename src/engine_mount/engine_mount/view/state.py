@@ -23,7 +23,13 @@ _FIGURES = {
     **{
         f'CAN {name.replace("_", " ")}': ('mount_driver', name, '')
         for name in (
-            *('lost', 'corrupt', 'late', 'resent', 'wrong_sequence', 'error_frames', 'refused'),
+            'lost',
+            'corrupt',
+            'late',
+            'resent',
+            'wrong_sequence',
+            'error_frames',
+            'refused',
             'setpoint_timeouts',
         )
     },

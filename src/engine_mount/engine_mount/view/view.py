@@ -4,24 +4,15 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import rclpy
-from rclpy.context import Context
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
-
-from engine_mount.view.feed import Fail, Feed, FeedError, Message, Receive, RecordedFeed
+from engine_mount.view.feed import Feed, FeedError, Message, Receive, RecordedFeed
 from engine_mount.view.model import Model
 from mount_bringup.graph.shutdown import ending_signals
-from mount_recorder.collector import Collector
-from mount_ros.environment import loopback_refusal, prepare_environment
-from mount_ros.qos import control_qos
-from mount_ros.topics import TOPICS, Topic
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 @contextmanager
@@ -41,6 +32,8 @@ def open_feed(
     if recording is not None:
         feed = RecordedFeed(recording, rate, begin, namespace)
     else:
+        from engine_mount.view.running_graph import RunningGraph  # ROS, which no recording needs
+
         feed = RunningGraph(domain, namespace)
     try:
         yield feed
@@ -117,56 +110,16 @@ def wait_for_state(model: Model, limit: float) -> None:
         time.sleep(0.05)
 
 
-_PERIOD = 0.02  # s, chosen: less than a picture of the page
-
-
-class RunningGraph:
-    """The graph of one mount in a ROS domain and namespace."""
-
-    def __init__(self, domain: int, namespace: str = ''):
-        """Raises `FeedError` where no process can reach another."""
-        if refusal := loopback_refusal():
-            raise FeedError(refusal)
-        prepare_environment()
-        self._context = Context()
-        rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node(
-            'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
-        )
-        self._collector: Collector | None = None
-        self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
-        self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
-        self._stopped = False
-
-    def start(self, receive: Receive, on_failure: Fail) -> None:
-        """Begin to take messages."""
-        self._collector = Collector(self._node, period=_PERIOD, on_failure=on_failure)
-        for topic in TOPICS:
-            hand_over = partial(_hand_over, receive, topic)
-            self._collector.collect(topic, hand_over, control_qos(topic, lockstep=False))
-        self._collector.start()
-
-    def stop(self) -> None:
-        """End the subscriptions and leave the middleware."""
-        if self._stopped:
-            return
-        self._stopped = True
-        if self._collector is not None:
-            self._collector.stop()
-        self._node.destroy_node()
-        rclpy.try_shutdown(context=self._context)
-
-
-def _hand_over(receive: Receive, topic: Topic, raw: bytes, received: int, sent: int) -> None:
-    receive(Message(topic, raw, received, sent))
-
-
 _STYLES = {'ok': 'green', 'warning': 'yellow', 'error': 'red', 'silent': 'bright_black'}
 _EVENTS = 6  # chosen: the last ones
 
 
-def status_screen(model: Model, title: str) -> RenderableType:
+def status_screen(model: Model, title: str) -> 'RenderableType':
     """Return nodes, figures and events, for 80 columns."""
+    from rich.console import Group  # the page needs none of it
+    from rich.table import Table
+    from rich.text import Text
+
     state = model.state_json()
     nodes, figures = (Table.grid(padding=(0, 2)) for _ in range(2))
     for node in state['nodes']:

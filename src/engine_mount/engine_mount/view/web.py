@@ -29,7 +29,7 @@ class Web(LocalServer):
         self._model, self._title = model, title
         self.address = f'http://{host}:{port}/{self.query}'
         """What to type into a browser."""
-        model.listen(self._add)
+        model.on_interval = self._add
 
     def routes(self) -> list[web.RouteDef]:
         """Return the files of the page and its stream."""

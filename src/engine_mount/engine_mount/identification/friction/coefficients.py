@@ -33,6 +33,8 @@ _SAME_LOAD = 0.05
 _TYPICAL_A = 0.005
 """Error of a that the form of Eq (14) is allowed (chosen): noise alone would trust long strokes too much."""
 _TYPICAL_B_MM = 0.3
+_OFFSET_BOUNDS = [-5.0, 1e-4, 1e-3, 0.0], [5.0, 5.0, 10.0, 0.9]
+_SLOPE_BOUNDS = [-30.0, -100.0, -10.0, -2.0], [30.0, 100.0, 10.0, 2.0]
 _PER_100_N = np.array([1.0, 1.0, 1.0, 0.01])  # rises with the load are fitted per 100 N
 
 
@@ -59,21 +61,27 @@ def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
     """
     _check_coverage(lines)
     loads = np.array([line.normal_force for line in lines])
-    with_load = float(np.ptp(loads)) > _SAME_LOAD * float(loads.mean())
-    values: dict[str, float] = {}
-    covariances: dict[tuple[str, ...], FloatArray] = {}
+    with_load = np.ptp(loads) > _SAME_LOAD * loads.mean()
+    unloaded = [] if with_load else [3]
+    fits = {}
     for side, sign in (('p', 1.0), ('n', -1.0)):
         one_way = [line for line in lines if line.velocity * sign > 0.0]
-        (level, gain, shift, rise), covariance = _offset_fit(one_way, with_load)
-        names = (f'a_{side}1', f'a_{side}2', f'a_{side}3', f'alpha_{side}2')
-        values |= dict(zip(names, (level, gain, shift, 0.01 * rise), strict=True))
-        values[f'alpha_{side}1'] = 1.0 - 0.01 * rise * NORMALISED_AT
-        covariances[names] = covariance
-    (offset, first, second, rise), covariance = _slope_fit(lines, with_load)
-    names = ('b_offset', 'b_1', 'b_2', 'beta_2')
-    values |= dict(zip(names, (offset, first, second, 0.01 * rise), strict=True))
-    values['beta_1'] = 1.0 - 0.01 * rise * NORMALISED_AT
-    covariances[names] = covariance
+        spread = max(float(np.mean([line.a for line in one_way])), 0.05)
+        starts = [[spread, 0.3 * spread, shift, rise] for shift in (0.1, 0.4, 1.5) for rise in (0.1, 0.4)]
+        fits[f'a_{side}1', f'a_{side}2', f'a_{side}3', f'alpha_{side}2'] = _fit(
+            one_way, 'a', 1.0, _TYPICAL_A, _offset, starts, _OFFSET_BOUNDS, unloaded
+        )
+    starts = [[offset, -10.0, -1.0, rise] for offset in (10.0, -10.0) for rise in (0.2, 0.8)]
+    # without different loads b_offset and B_1 are one number
+    unloaded = [] if with_load else [0, 3]
+    fits['b_offset', 'b_1', 'b_2', 'beta_2'] = _fit(
+        lines, 'b', 1e-3, _TYPICAL_B_MM, _slope, starts, _SLOPE_BOUNDS, unloaded
+    )
+    values: dict[str, float] = {}
+    for names, ((*others, rise), _) in fits.items():
+        rise *= 0.01
+        values |= zip(names, (*others, rise), strict=True)
+        values[names[3].replace('2', '1')] = 1.0 - rise * NORMALISED_AT
     fitted = FrictionCoefficients(
         **values,
         slope_velocity_limit=max(abs(line.velocity) for line in lines),
@@ -85,7 +93,7 @@ def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
                                         - np.array([getattr(each, name) for each in lines])))))
         for name, form in (('a', offset_coefficient), ('b', slope_coefficient))
     )  # fmt: skip
-    return CoefficientFit(fitted, a_rms, 1e-3 * b_rms, covariances)
+    return CoefficientFit(fitted, a_rms, 1e-3 * b_rms, {names: found[1] for names, found in fits.items()})
 
 
 def _check_coverage(lines: Sequence[StrokeLine]) -> None:
@@ -108,63 +116,44 @@ def _check_coverage(lines: Sequence[StrokeLine]) -> None:
             )
 
 
-def _columns(lines: Sequence[StrokeLine], name: str, factor: float) -> tuple[FloatArray, ...]:
-    """Return speeds (mm/s), loads above 100 N (N), values of a or b, and their deviations."""
+def _offset(unknowns: FloatArray, speed: FloatArray, rise: FloatArray) -> FloatArray:
+    """Return a by A_1, A_2, A_3 at speeds (mm/s), with its rise with the load."""
+    return (unknowns[0] + unknowns[1] * np.log(unknowns[2] + speed)) * rise
+
+
+def _slope(unknowns: FloatArray, speed: FloatArray, rise: FloatArray) -> FloatArray:
+    """Return b (1/mm) by b_offset, B_1, B_2 at speeds (mm/s), with its rise with the load."""
+    return unknowns[0] + (unknowns[1] + unknowns[2] * speed) * rise
+
+
+def _fit(
+    lines: Sequence[StrokeLine],
+    name: str,
+    factor: float,
+    typical: float,
+    form: Callable[[FloatArray, FloatArray, FloatArray], FloatArray],
+    starts: list[list[float]],
+    bounds: tuple[list[float], list[float]],
+    unloaded: list[int],
+) -> tuple[list[float], FloatArray]:
+    """Return the unknowns of `form` and the rise per 100 N, and their covariance, by searches from `starts`.
+
+    `name` is a or b, times `factor` with an error of `typical`; unknowns that are `unloaded` are 0, for only
+    different loads tell them.
+    """
     speed = np.array([1e3 * abs(line.velocity) for line in lines])
     load = np.array([line.normal_force for line in lines]) - NORMALISED_AT
     values, deviations = (
         np.array([factor * getattr(line, each) for line in lines]) for each in (name, f'{name}_deviation')
     )
-    return speed, load, values, deviations
-
-
-def _offset_fit(lines: Sequence[StrokeLine], with_load: bool) -> tuple[list[float], FloatArray]:
-    """Return A_1, A_2, A_3, s (per 100 N) of one direction, and their covariance."""
-    speed, load, a, deviation = _columns(lines, 'a', 1.0)
-    weight = 1.0 / np.hypot(_TYPICAL_A, deviation)
+    weight = 1.0 / np.hypot(typical, deviations)
 
     def residuals(unknowns: FloatArray) -> FloatArray:
-        level, gain, shift, rise = unknowns
-        factor = 1.0 + (0.01 * rise * load if with_load else 0.0)
-        return np.asarray(((level + gain * np.log(shift + speed)) * factor - a) * weight)
+        known = unknowns.copy()
+        known[unloaded] = 0.0
+        return (form(known, speed, 1.0 + 0.01 * known[3] * load) - values) * weight
 
-    spread = max(float(a.mean()), 0.05)
-    values, covariance = _best(
-        residuals,
-        [[spread, 0.3 * spread, shift, rise] for shift in (0.1, 0.4, 1.5) for rise in (0.1, 0.4)],
-        [-5.0, 1e-4, 1e-3, 0.0],
-        [5.0, 5.0, 10.0, 0.9],
-    )
-    return [*values[:3], values[3] if with_load else 0.0], covariance
-
-
-def _slope_fit(lines: Sequence[StrokeLine], with_load: bool) -> tuple[list[float], FloatArray]:
-    """Return b_offset, B_1, B_2, s_b (per 100 N), and their covariance."""
-    speed, load, b, deviation = _columns(lines, 'b', 1e-3)
-    weight = 1.0 / np.hypot(_TYPICAL_B_MM, deviation)
-
-    def residuals(unknowns: FloatArray) -> FloatArray:
-        offset, first, second, rise = unknowns
-        factor = 1.0 + (0.01 * rise * load if with_load else 0.0)
-        # without different loads b_offset and B_1 are one number
-        return np.asarray(((offset if with_load else 0.0) + (first + second * speed) * factor - b) * weight)
-
-    (offset, first, second, rise), covariance = _best(
-        residuals,
-        [[offset, -10.0, -1.0, rise] for offset in (10.0, -10.0) for rise in (0.2, 0.8)],
-        [-30.0, -100.0, -10.0, -2.0],
-        [30.0, 100.0, 10.0, 2.0],
-    )
-    return [offset if with_load else 0.0, first, second, rise if with_load else 0.0], covariance
-
-
-def _best(
-    residuals: Callable[[FloatArray], FloatArray],
-    starts: list[list[float]],
-    low: list[float],
-    high: list[float],
-) -> tuple[list[float], FloatArray]:
-    """Return the best end of searches from all `starts`, and its covariance."""
-    ends = [least_squares(residuals, start, bounds=(low, high), x_scale='jac') for start in starts]
-    best = min(ends, key=lambda end: float(end.cost))
+    ends = [least_squares(residuals, start, bounds=bounds, x_scale='jac') for start in starts]
+    best = min(ends, key=lambda end: end.cost)
+    best.x[unloaded] = 0.0
     return best.x.tolist(), covariance_of(best) * np.outer(_PER_100_N, _PER_100_N)

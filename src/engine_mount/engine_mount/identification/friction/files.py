@@ -145,7 +145,7 @@ def _rig_normal_force(
     if clamp == 'none':
         return np.ones(2)
     if clamp == 'rest':
-        levels = [float(pulls[time <= time[0] + _REST].mean(axis=0).sum())] * 2
+        levels = [pulls[time <= time[0] + _REST].mean(axis=0).sum()] * 2
     else:
         levels = []
         for sign in (1.0, -1.0):

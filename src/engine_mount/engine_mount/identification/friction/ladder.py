@@ -87,8 +87,8 @@ def law_error(law: FrictionLaw, values: FloatArray, recordings: Sequence[Frictio
     error = signal = 0.0
     for recording in recordings:
         force = predicted_force(law, values, recording)
-        error += float(((force - recording.force) ** 2).sum())
-        signal += float((recording.force**2).sum())
+        error += ((force - recording.force) ** 2).sum()
+        signal += (recording.force**2).sum()
     return math.sqrt(error / signal)
 
 
@@ -131,7 +131,7 @@ class _Search:
         self.size = np.where(first != 0.0, np.abs(first), 1.0)
         self.bounds = self.unknowns(self.low), self.unknowns(self.high)
         self.first = self.unknowns(first)
-        self.scale = math.sqrt(sum(float((each.force**2).sum()) for each in recordings))
+        self.scale = math.sqrt(sum((each.force**2).sum() for each in recordings))
 
     def unknowns(self, values: FloatArray) -> FloatArray:
         with np.errstate(divide='ignore', invalid='ignore'):
@@ -139,7 +139,7 @@ class _Search:
 
     def values(self, unknowns: FloatArray) -> FloatArray:
         values = np.where(self.logarithmic, np.exp(np.clip(unknowns, -700.0, 700.0)), unknowns) * self.size
-        return np.asarray(np.clip(values, self.low, self.high))
+        return np.clip(values, self.low, self.high)
 
     def start(self, random: np.random.Generator | None = None) -> FloatArray:
         """Return the first start, or one that is drawn around it."""
@@ -148,7 +148,7 @@ class _Search:
             draw = _SPREAD * random.standard_normal(middle.size)
             middle = np.where(self.logarithmic, middle + draw, middle * np.exp(draw))
         margin = 1e-6 * (high - low)
-        return np.asarray(np.clip(middle, low + margin, high - margin))
+        return np.clip(middle, low + margin, high - margin)
 
     def residuals(self, unknowns: FloatArray) -> FloatArray:
         values = self.values(unknowns)
@@ -159,7 +159,7 @@ class _Search:
         return np.nan_to_num(np.concatenate(errors) / self.scale, nan=1.0, posinf=1.0, neginf=-1.0)
 
     def cost(self, unknowns: FloatArray) -> float:
-        return 0.5 * float((self.residuals(unknowns) ** 2).sum())
+        return 0.5 * (self.residuals(unknowns) ** 2).sum()
 
     def run(self, start: FloatArray, evaluations: int) -> tuple[FloatArray, float]:
         """Return (unknowns, cost) of one search that begins at `start`."""
@@ -168,4 +168,4 @@ class _Search:
             self.residuals, start, bounds=self.bounds, x_scale=1.0, diff_step=1e-4, ftol=1e-7, xtol=1e-7,
             max_nfev=evaluations,
         )  # fmt: skip
-        return np.asarray(fit.x), float(fit.cost)
+        return fit.x, fit.cost

@@ -53,8 +53,8 @@ def simple_laws(training: Sequence[FrictionRecording]) -> list[FrictionLaw]:
     """Return the laws of the literature, from Coulomb to elastic play, with starts for `training`."""
     levels, stiffness = friction_levels(training), typical_stiffness(training)
     force = max(each.force_rms for each in training)
-    stroke = max(float(np.ptp(each.displacement)) for each in training)
-    speed = max(float(np.abs(np.diff(each.displacement)).max()) / each.dt for each in training)
+    stroke = max(np.ptp(each.displacement) for each in training)
+    speed = max(np.abs(np.diff(each.displacement)).max() / each.dt for each in training)
     # friction over normal force, sliding to either side
     mu = (Parameter('mu_p', '1', 1e-3, 1e6), Parameter('mu_n', '1', 1e-3, 1e6))
     viscous = Parameter('d', 'N s/m', 0.0, 1e8, False)
@@ -92,7 +92,7 @@ def friction_levels(recordings: Sequence[FrictionRecording]) -> tuple[float, flo
 
 def typical_stiffness(recordings: Sequence[FrictionRecording]) -> float:
     """Return a stiffness (N/m) that yields within a twentieth of the stroke."""
-    stroke = max(float(np.ptp(each.displacement)) for each in recordings)
+    stroke = max(np.ptp(each.displacement) for each in recordings)
     return 20.0 * max(each.force_rms for each in recordings) / stroke
 
 
@@ -182,7 +182,7 @@ def pad_law(
     Loads and speeds are related to those of the training: alpha and beta are 1 at the mean load, do not
     change beyond the lowest and the highest, and stay 1 where only one load was trained.
     """
-    loads = [float(each.normal_force.mean()) for each in training]
+    loads = [each.normal_force.mean() for each in training]
     reference, lowest, highest = float(np.mean(loads)), min(loads), max(loads)
     with_load = highest - lowest > _LOAD_SPREAD * reference
     top_speed = max(
@@ -192,7 +192,7 @@ def pad_law(
     def simulate(
         values: FloatArray, displacement: FloatArray, dt: float, normal_force: FloatArray
     ) -> FloatArray:
-        *of_a, s_p, s_n, b_offset, b_1, b_2, s_b, c_r, d_r, c_re = (float(value) for value in values)
+        *of_a, s_p, s_n, b_offset, b_1, b_2, s_b, c_r, d_r, c_re = values.tolist()
         if not with_load:
             s_p = s_n = s_b = 0.0
         coefs = FrictionCoefficients(

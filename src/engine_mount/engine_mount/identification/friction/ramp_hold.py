@@ -161,7 +161,7 @@ def fit_relaxation(time: FloatArray, displacement: FloatArray, fit_from: float) 
     scale = abs(x[-1])
 
     def error(unknown: FloatArray) -> FloatArray:
-        return np.asarray(unknown[0] - unknown[1] * np.exp(-t / unknown[2]) - x / scale, np.float64)
+        return unknown[0] - unknown[1] * np.exp(-t / unknown[2]) - x / scale
 
     found = least_squares(error, (1.0, 0.2, 0.2 * t[-1]), bounds=((-10, -10, 1e-3), (10, 10, 100))).x
     return Relaxation(float(found[0]) * scale, float(found[1]) * scale, float(found[2]))
@@ -202,7 +202,7 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     model = response.at(time)
     model_x, model_force = model[0] + zero_x, model[1] + zero_force
     misfits = relative_rms(model_x - x, x), relative_rms(model_force - force, force)
-    _check_response(name, response, misfits, float(time[-1]))
+    _check_response(name, response, misfits, time[-1])
     contact = response.contact()
     covariance = _contact_covariance(response, (covariance_of(fit) * np.outer(scale, scale))[:7, :7])
     deviation = FrictionContact(*np.sqrt(covariance.diagonal().clip(0.0)).tolist())
@@ -248,9 +248,9 @@ def _start(
     hold = slice(min(top + max(1, (top - begin) // 10), count - 10), None)
     if desired is not None:
         gap = (desired - x)[hold]
-        stiffness = float(gap @ force[hold] / (gap @ gap))
+        stiffness = gap @ force[hold] / (gap @ gap)
     else:
-        stiffness = -float(np.polyfit(smooth_x[hold], smooth_force[hold], 1)[0])
+        stiffness = -np.polyfit(smooth_x[hold], smooth_force[hold], 1)[0]
     if not stiffness > 0.0:
         raise IdentificationError(
             f'{name}: while held, force and displacement change by {stiffness:.3g} N/m together; a rack '
@@ -260,7 +260,7 @@ def _start(
     held = smooth_x[hold]
     height = np.clip(held[0] / x_end, 0.1, 0.98)
     passed = (held - held[0]) > 0.63 * (x_end - held[0])
-    lag = max(float(time[hold][np.argmax(passed)] - time[hold][0]), 4.0 * step)
+    lag = max(time[hold][np.argmax(passed)] - time[hold][0], 4.0 * step)
     total = x_end + force_end / stiffness
     return RampResponse(x_end, height, lag, stiffness, total, time[begin] - 0.1 * ramp, ramp)
 
@@ -297,7 +297,7 @@ def _contact_covariance(response: RampResponse, covariance: FloatArray) -> Float
         sides = [np.array(response) + sign * step * (np.arange(7) == place) for sign in (1.0, -1.0)]
         up, down = (np.array(RampResponse(*side).contact()) for side in sides)
         slopes[:, place] = (up - down) / (2.0 * step)
-    return np.asarray(slopes @ covariance @ slopes.T)
+    return slopes @ covariance @ slopes.T
 
 
 def _first_level(values: FloatArray) -> float:
@@ -308,4 +308,4 @@ def _first_level(values: FloatArray) -> float:
 def _noise(values: FloatArray) -> float:
     """Return the noise of a channel; of a channel without noise, a thousandth of its range."""
     noise = float(np.median(np.abs(np.diff(values, 2)))) / (0.6745 * np.sqrt(6.0))
-    return max(noise, 1e-3 * float(np.ptp(values)))
+    return max(noise, 1e-3 * np.ptp(values))

@@ -48,7 +48,7 @@ class FrictionRecording:
     @property
     def time(self) -> FloatArray:
         """Time from the first sample, s."""
-        return np.asarray(np.arange(self.force.size) * self.dt, np.float64)
+        return np.arange(self.force.size) * self.dt
 
     @property
     def force_rms(self) -> float:
@@ -108,8 +108,8 @@ def smoothed_displacement(recording: FrictionRecording) -> FloatArray:
     The noise is taken from the fourth difference, to which smooth motion does not contribute.
     """
     raw = recording.displacement
-    noise = float(np.median(np.abs(np.diff(raw, 4)))) / (0.6745 * math.sqrt(70.0))
-    typical_step = float(np.sqrt(np.mean(np.diff(raw) ** 2)))
+    noise = np.median(np.abs(np.diff(raw, 4))) / (0.6745 * math.sqrt(70.0))
+    typical_step = np.sqrt(np.mean(np.diff(raw) ** 2))
     if noise == 0.0 or typical_step == 0.0:
         return raw
     # slope of a line through w noisy samples: sigma sqrt(12 / w^3) per sample
@@ -119,7 +119,7 @@ def smoothed_displacement(recording: FrictionRecording) -> FloatArray:
         return raw
     from scipy.signal import savgol_filter  # loads long
 
-    return np.asarray(savgol_filter(raw, window, 2), float)
+    return savgol_filter(raw, window, 2)
 
 
 def thinned(recording: FrictionRecording, samples: int) -> FrictionRecording:
@@ -130,7 +130,7 @@ def thinned(recording: FrictionRecording, samples: int) -> FrictionRecording:
     count = recording.force.size // factor * factor
 
     def means(values: FloatArray) -> FloatArray:
-        return np.asarray(values[:count].reshape(-1, factor, *values.shape[1:]).mean(axis=1))
+        return values[:count].reshape(-1, factor, *values.shape[1:]).mean(axis=1)
 
     return replace(
         recording,
@@ -150,7 +150,7 @@ def _check_time(name: str, times: FloatArray) -> None:
             f'{name}: time must rise; {times[place]:.6f} s is followed by {times[place + 1]:.6f} s at sample '
             f'{place + 1}: sort the samples or remove repeated ones'
         )
-    longest = LONGEST_GAP_STEPS * float(np.median(steps))
+    longest = LONGEST_GAP_STEPS * np.median(steps)
     if steps.max() > longest + 1e-12:
         raise IdentificationError(
             f'{name}: {steps.max():.4f} s without samples at {times[steps.argmax()]:.3f} s; at most '
@@ -171,7 +171,7 @@ def _check_motion(name: str, displacement: FloatArray, force: FloatArray) -> Non
         longest = int(np.argmax(np.diff(changes)))
         first, last = changes[longest] + 1, changes[longest + 1]
         moved = np.abs(np.diff(other_values))
-        share = float(moved[first:last].sum() / moved.sum())
+        share = moved[first:last].sum() / moved.sum()
         if share > STUCK_SHARE and np.ptp(other_values[first : last + 1]) > 0.2 * np.ptp(other_values):
             raise IdentificationError(
                 f'{name}: {channel} repeats {values[first]:g} for {last - first + 1} samples during '
@@ -183,10 +183,10 @@ def _check_motion(name: str, displacement: FloatArray, force: FloatArray) -> Non
 def _check_magnitudes(
     name: str, displacement: FloatArray, force: FloatArray, clamp: FloatArray, limits: tuple[float, float]
 ) -> None:
-    stroke = float(np.ptp(displacement))
+    stroke = np.ptp(displacement)
     for words, unit, value, (low, high) in (
         ('displacement spans', 'm', stroke, STROKE_RANGE),
-        ('friction force reaches', 'N', float(np.abs(force).max()), FORCE_RANGE),
+        ('friction force reaches', 'N', np.abs(force).max(), FORCE_RANGE),
     ):
         if not low <= value <= high:
             raise IdentificationError(
@@ -198,7 +198,7 @@ def _check_magnitudes(
             f'{name}: normal force falls to {clamp.min():.3g} N; it must stay above 0 N: choose a stretch '
             'with the contact closed, or check sign and zero of the load cell'
         )
-    coefficient = float(np.percentile(np.abs(force), 95) / np.median(clamp))
+    coefficient = np.percentile(np.abs(force), 95) / np.median(clamp)
     low, high = limits
     if coefficient > high:
         raise IdentificationError(

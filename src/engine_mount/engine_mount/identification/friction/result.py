@@ -115,7 +115,7 @@ class FrictionIdentification:
     def best(self) -> str:
         """The law with the least error, held out if anything is."""
         judged = 'held_out_error' if self.pairs or self.held_out else 'train_error'
-        return min(self.ladder, key=lambda name: float(self.ladder[name][judged]))
+        return min(self.ladder, key=lambda name: self.ladder[name][judged])
 
     def all_cases(self) -> list[Case]:
         """Return the cases of the recordings and of the ladder."""

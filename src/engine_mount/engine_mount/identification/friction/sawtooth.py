@@ -80,7 +80,7 @@ class SlipRegions(NamedTuple):
 def kind_of_motion(recording: FrictionRecording) -> str:
     """Return 'ramp', 'sawtooth' or 'other motion'; a motion to one side only that is no ramp is refused."""
     time, raw, x = recording.time, recording.displacement, smoothed_displacement(recording)
-    span = float(np.ptp(x))
+    span = np.ptp(x)
     if not turning_points(x):
         held = np.abs(x - x[-max(1, x.size // 20) :].mean()) < 0.25 * span
         if held.mean() > _HELD:
@@ -105,14 +105,15 @@ def stroke_lines(recording: FrictionRecording, contact: FrictionContact) -> list
     xi = deflection_from_force(
         recording.force, recording.dt, contact.tangential_stiffness, contact.tangential_damping
     )
-    lines = [_line(recording, contact, xi, *stroke) for stroke in strokes(recording)]
-    settled = [line for line in lines if line is not None]
-    if not settled:
+    lines = [
+        line for stroke in strokes(recording) if (line := _line(recording, contact, xi, *stroke)) is not None
+    ]
+    if not lines:
         raise IdentificationError(
             f'{recording.name}: no stroke slides for {SHORTEST_WINDOW:g} s or more at constant speed; use '
             'longer strokes or lower speeds'
         )
-    return settled
+    return lines
 
 
 def strokes(recording: FrictionRecording) -> list[tuple[int, int, float]]:
@@ -140,7 +141,7 @@ def slip_regions(recording: FrictionRecording, contact: FrictionContact) -> Slip
 
 def turning_points(displacement: FloatArray) -> list[int]:
     """Return the samples at which the displacement turns, with strokes of at least a fifth of its range."""
-    least = _LEAST_STROKE * float(np.ptp(displacement))
+    least = _LEAST_STROKE * np.ptp(displacement)
     turns: list[int] = []
     low = high = 0
     direction = 0
@@ -178,7 +179,7 @@ def _sliding_window(
 
     Behind the turning point the contact first unloads and loads the spring c_Re.
     """
-    swing = 2.0 * float(np.median(np.abs(recording.force[first : last + 1])))
+    swing = 2.0 * np.median(np.abs(recording.force[first : last + 1]))
     travel = _SETTLING_TRAVEL * swing / contact.contact_stiffness
     settled = first + round(max(_SETTLING, travel / max(abs(velocity), 1e-9)) / recording.dt)
     return slice(settled, max(last - round(_EDGE / recording.dt), settled))
@@ -209,12 +210,12 @@ def _line(
         for values in (xi, force)
     )
     relief = rise / (span * contact.contact_stiffness)
-    centre, freedom = float(u.mean()), u.size - 2
+    centre, freedom = u.mean(), u.size - 2
     matrix = np.column_stack([np.ones_like(u), u - centre])
     (level, slope), *_ = np.linalg.lstsq(matrix, mu, rcond=None)
     residual = mu - matrix @ np.array([level, slope])
-    variance = float(residual @ residual) / freedom
-    slope_variance = variance / max(float(((u - centre) ** 2).sum()), 1e-300)
+    variance = residual @ residual / freedom
+    slope_variance = variance / max(((u - centre) ** 2).sum(), 1e-300)
     deviations = (
         float(np.sqrt(variance / u.size + centre**2 * slope_variance)),
         float(np.sqrt(slope_variance)),

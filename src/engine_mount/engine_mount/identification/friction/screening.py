@@ -122,16 +122,16 @@ def subtract_zero(recording: FrictionRecording, zero_from: str = '') -> tuple[Fr
 def first_look(recording: FrictionRecording) -> FirstLook:
     """Return the zero of the force and the shares of the way of a recording that moves to and fro."""
     loop = _Loop(thinned(recording, LOOK_SAMPLES))
-    middle = 0.5 * float(loop.force.max() + loop.force.min())
+    middle = 0.5 * (loop.force.max() + loop.force.min())
     starts = [
         np.array([-0.1, -0.1, np.log(stiffness), play, 0.0, zero])
         for zero, stiffness, play in itertools.product((0.0, middle), _STIFFNESSES, _PLAYS)
     ]
-    starts.sort(key=lambda start: float((loop.residuals(_inside(start)) ** 2).sum()))
-    best = min((loop.search(start) for start in starts[:_FINISHED]), key=lambda end: float(end.cost))
+    starts.sort(key=lambda start: (loop.residuals(_inside(start)) ** 2).sum())
+    best = min((loop.search(start) for start in starts[:_FINISHED]), key=lambda end: end.cost)
     # the weight of a sample is known only now: what is left over hangs together over many samples
     left = loop.law(best.x) + best.x[5] - loop.force
-    variance = float(np.mean(left**2)) * _correlated_samples(left)
+    variance = np.mean(left**2) * _correlated_samples(left)
     loop.weight = 1.0 / np.sqrt(max(variance, 1e-12))
     return loop.look(loop.search(best.x))
 
@@ -219,7 +219,7 @@ def case_of(recording: FrictionRecording, look: FirstLook) -> Case | None:
     A contact that never slips, mostly sticks, or mostly crosses a play, and a force that is not of friction:
     no coefficient is written to a specimen from any.
     """
-    name, stroke = recording.name, float(np.ptp(recording.displacement))
+    name, stroke = recording.name, np.ptp(recording.displacement)
     other = _other_cause(recording, look)
     if other:
         return Case(
@@ -232,7 +232,7 @@ def case_of(recording: FrictionRecording, look: FirstLook) -> Case | None:
         f'{2e3 * look.play:.2g} mm on {look.in_play:.0%}'
     )
     if look.sliding < NEVER:
-        most = float(np.abs(recording.force - look.zero).max())
+        most = np.abs(recording.force - look.zero).max()
         return Case(
             'never slips',
             f'{name}: the contact never slips: {shares}; up to {most:.0f} N its spring of '
@@ -260,10 +260,7 @@ def _other_cause(recording: FrictionRecording, look: FirstLook) -> str:
         'velocity': velocity,
         'acceleration': np.gradient(velocity, recording.dt),
     }
-    shares = {
-        name: float(force @ each) ** 2 / (float(each @ each) * float(force @ force))
-        for name, each in motions.items()
-    }
+    shares = {name: (force @ each) ** 2 / ((each @ each) * (force @ force)) for name, each in motions.items()}
     most = max(shares, key=shares.__getitem__)
     better = 1.0 - shares[most] < _BETTER * (1.0 - look.explained)
     if look.explained >= EXPLAINED and not better:

@@ -62,12 +62,11 @@ class Dots(Curve):
 
 @dataclass(frozen=True)
 class Level:
-    """A horizontal line at `value`; `both` draws it at minus `value` too."""
+    """Horizontal lines at `value` and minus `value`."""
 
     name: str
     value: float
     dash: str = DASHED
-    both: bool = False
     colour: str = LEVEL_COLOUR
 
 
@@ -112,9 +111,9 @@ class Chart:
     ticks: Sequence[float] = ()  # of the x axis; empty: chosen by the drawing
 
 
-def level_lines(levels: Mapping[str, float], *, both: bool = True) -> list[Level]:
+def level_lines(levels: Mapping[str, float]) -> list[Level]:
     """Return displacements (m) by their labels as lines over mm, by turns dashed and dotted."""
     return [
-        Level(f'{name}, {1e3 * value:g} mm', 1e3 * value, dash, both)
+        Level(f'{name}, {1e3 * value:g} mm', 1e3 * value, dash)
         for (name, value), dash in zip(levels.items(), cycle((DASHED, DOTTED)), strict=False)
     ]

@@ -55,7 +55,7 @@ def even_numbers(x: Array, y: Array, budget: int) -> dict[str, Any]:
     """
     step = float(np.median(np.diff(x)))
     places = (x - x[0]) / step
-    count = round(float(places[-1])) + 1
+    count = round(places[-1]) + 1
     grid = np.round(places).astype(np.int64)
     even = count <= budget and np.all(np.abs(places - grid) <= _UNEVEN) and np.all(np.diff(grid) > 0)
     if even:
@@ -64,7 +64,7 @@ def even_numbers(x: Array, y: Array, budget: int) -> dict[str, Any]:
     else:
         step *= max(1, -(-2 * count // budget))
         values = ranges(x, y, step).ravel()
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    low, high = np.nanmin(values), np.nanmax(values)
     size = (high - low) / _STEPS or 1.0
     steps = np.round((values - low) / size) - 32767
     text = _text(np.where(np.isnan(steps), _UNKNOWN, steps).astype('<i2'))
@@ -74,7 +74,7 @@ def even_numbers(x: Array, y: Array, budget: int) -> dict[str, Any]:
 def ranges(x: Array, y: Array, step: float) -> Array:
     """Return (n, 2): the lowest and the highest known value of each `step` of a rising x."""
     group = ((x - x[0]) / step + 1e-9).astype(np.int64)
-    found = np.full((int(group[-1]) + 1, 2), np.nan)
+    found = np.full((group[-1] + 1, 2), np.nan)
     begins = np.flatnonzero(np.diff(group, prepend=-1))
     found[group[begins], 0] = np.fmin.reduceat(y, begins)
     found[group[begins], 1] = np.fmax.reduceat(y, begins)

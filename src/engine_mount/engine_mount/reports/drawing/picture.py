@@ -67,7 +67,7 @@ def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None) -> None:
     for dots in panel.dots:
         axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
-        for value in (level.value, -level.value) if level.both else (level.value,):
+        for value in (level.value, -level.value):
             axes.axhline(value, color=level.colour, linestyle=_STYLES[level.dash], linewidth=1.0)
         axes.annotate(
             level.name, (0.0, level.value), xycoords=('axes fraction', 'data'), textcoords='offset points',
@@ -107,6 +107,6 @@ def _shown(curve: Curve, limits: Limits | None) -> tuple[Array, Array]:
         x, y = x[inside], y[inside]
     if len(x) <= _POINTS:
         return x, y
-    step = 2.0 * float(x[-1] - x[0]) / _POINTS
+    step = 2.0 * (x[-1] - x[0]) / _POINTS
     pairs = ranges(x, y, step)
     return np.repeat(x[0] + step * (np.arange(len(pairs)) + 0.5), 2), pairs.ravel()

@@ -54,8 +54,7 @@ def levels_of(policy: Policy, parameters: Any) -> dict[str, float]:
 
 def switching(seen: Seen) -> Switching:
     """Return the times at which damping was switched."""
-    on, off = switching_times(seen.time, seen.damping_active)
-    return Switching(tuple(on.tolist()), tuple(off.tolist()))
+    return Switching(*(tuple(each.tolist()) for each in switching_times(seen.time, seen.damping_active)))
 
 
 def tracking_error(drive: DriveSignals, policy: Policy, parameters: Any) -> float:

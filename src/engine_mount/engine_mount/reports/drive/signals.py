@@ -126,7 +126,7 @@ def _seen(recording: Recording, zero: int) -> Seen:
 
 def _sorted(stamps: Times) -> tuple[Times, slice | NDArray[np.intp]]:
     """Return stamps (ns) sorted, and their places; no copies where they rise."""
-    if bool((stamps[1:] > stamps[:-1]).all()):
+    if (stamps[1:] > stamps[:-1]).all():
         return stamps, slice(None)
     order = np.argsort(stamps)
     return stamps[order], order

@@ -72,7 +72,7 @@ def summarise(
         'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
         'peak_current_a': peak,
         'tracking_error_rms': error,
-        **_latencies(run),
+        **{name: _known(run[name]) for name in ('latency_median_s', 'latency_p99_s')},
     }
 
 
@@ -151,10 +151,6 @@ def _switching_text(figures: Figures) -> str:
     shown = [f'{on:.2f} s to {end}' for on, end in zip(ons, ends, strict=True)]
     more = f' and {len(shown) - _SWITCHINGS} more' if len(shown) > _SWITCHINGS else ''
     return f'on from {", ".join(shown[:_SWITCHINGS])}{more}'
-
-
-def _latencies(run: Figures) -> dict[str, float | None]:
-    return {name: _known(run[name]) for name in ('latency_median_s', 'latency_p99_s')}
 
 
 def _known(value: float) -> float | None:

@@ -144,10 +144,10 @@ def _first_sample(stamps: NDArray[np.int64], excited: Mapping[str, Array], simul
     if name is None:
         raise UndampedError('the recording holds no excitation')
     recorded, ours, places = excited[name], getattr(simulated, name), _samples(stamps, simulated.sample_time)
-    clearest = int(np.argmax(np.abs(recorded)))
+    clearest = np.argmax(np.abs(recorded))
     for candidate in (np.flatnonzero(ours == recorded[clearest]) - places[clearest]).tolist():
         within = candidate + places < len(ours)
         whole = candidate >= 0 and 2 * np.count_nonzero(within) > len(places)
         if whole and np.array_equal(ours[candidate + places[within]], recorded[within]):
-            return int(candidate)
+            return candidate
     raise UndampedError('the excitation that was recorded is not that of the session')

@@ -68,14 +68,12 @@ def spread(pair: Pair) -> Section:
     for (name, colour, dash), values in zip(looks, both, strict=True):
         counts = np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
         curves.append(Curve(name, edges, counts, colour, dash, steps=True, width=1.6))
-    panels, limits = [Panel('number of rows', curves)], (float(edges[0]), float(edges[-1]))
+    panels, limits = [Panel('number of rows', curves)], (edges[0], edges[-1])
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
     form = '{:g}'.format if pair.whole else number
-    rows = [
-        (word, *(form(float(np.quantile(values, share))) for values in both)) for word, share in _QUANTILES
-    ]
+    rows = [(word, *(form(np.quantile(values, share)) for values in both)) for word, share in _QUANTILES]
     table = Table((f'value{behind}', 'as recorded', 'changed'), rows, title='Quantiles', folded=True)
-    moved = int(np.count_nonzero(both[0] != both[1]))
+    moved = np.count_nonzero(both[0] != both[1])
     words = [
         f'{_capital(_OF_ONE_SIDE.sub("", pair.meaning))}, in the column {pair.name}. '
         f'{moved} of {len(pair.before)} rows have another value with the change.'
@@ -92,7 +90,7 @@ def _edges(values: Array, count: int, whole: bool) -> Array:
 
     Of `count` rows 2 count^(1/3) bins (Rice's rule), so that few values make no comb.
     """
-    low, high = float(values.min()), float(values.max())
+    low, high = values.min(), values.max()
     bins = min(_MOST_BINS, max(1, round(2.0 * np.cbrt(count))))
     if whole or high == low:
         step = max(1.0, np.ceil((high - low) / bins))

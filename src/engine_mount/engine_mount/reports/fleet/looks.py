@@ -140,7 +140,7 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
     time, moved = signals.time, signals.displacements
     before, after = moved or signals.setpoints
     size = np.abs(after - before)
-    place = int(np.nanargmax(size)) if np.isfinite(size).any() else 0
+    place = np.nanargmax(size) if np.isfinite(size).any() else 0
     part = slice(*np.searchsorted(time, [time[place] - AROUND, time[place] + AROUND]))
     largest = slice(place, place + 1 if size[place] > 0.0 else place)
     x, given = time[part], signals.given[part]
@@ -160,9 +160,9 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
         ]
     origin = 'first displacement sample' if moved is None else 'beginning of the recorded acceleration'
     # at first what is around the difference is seen, and nothing beyond the ends of the recording
-    begin = min(float(time[place]) - AT_FIRST, float(time[-1]) - 2.0 * AT_FIRST)
-    begin = max(begin, float(time[0]))
-    view = begin, min(begin + 2.0 * AT_FIRST, float(time[-1]))
+    begin = min(time[place] - AT_FIRST, time[-1] - 2.0 * AT_FIRST)
+    begin = max(begin, time[0])
+    view = begin, min(begin + 2.0 * AT_FIRST, time[-1])
     return Chart(name, title, f'seconds from the {origin}', panels, view=view)
 
 

@@ -20,7 +20,6 @@ from engine_mount.reports.drawing.chart import (
     Span,
     level_lines,
 )
-from engine_mount.reports.drawing.picture import draw_chart
 from engine_mount.reports.sections.periodic import (
     amplitude_density,
     cycle_work,
@@ -66,7 +65,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
         signals = [(each, signal) for each in subjects if (signal := each[quantity]) is not None]
         if not signals:
             continue
-        ends += [float(signal.time[place]) for _, signal in signals for place in (0, -1)]
+        ends += [signal.time[place] for _, signal in signals for place in (0, -1)]
         curves = [each.curve(what, signal.time, factor * signal.values) for each, signal in signals]
         lines = level_lines(levels) if quantity == 'displacement' else []
         if quantity == 'displacement' and not isinstance(calm := first.undamped, str):
@@ -125,13 +124,13 @@ def hysteresis(subjects: Sequence[Subject]) -> Section:
     said = []
     for subject in subjects:
         stretch, how = _loop_stretch(subject)
-        before = sum(map(len, groups.values()))
+        drawn = False
         for what, curves in groups.items():
             force = None if what == 'friction force' and subject.run.without_friction else subject[what]
             x, y, _ = _together(subject['true displacement'], force, stretch)
             if len(x) > 2:
                 curves.append(subject.curve(what, _MM * x, y))
-        drawn = sum(map(len, groups.values())) > before
+                drawn = True
         said.append((subject, how if drawn else 'no force was recorded'))
     panels = [Panel(f'{what} (N)', curves) for what, curves in groups.items() if curves]
     title = 'Loss hysteresis'
@@ -249,7 +248,8 @@ def _together(
 ) -> tuple[Array, Array, Array]:
     """Return displacement, force and time at the samples of the force within `stretch`, both known."""
     if moved is None or force is None or stretch is None:
-        return np.empty(0), np.empty(0), np.empty(0)
+        nothing = np.empty(0)
+        return nothing, nothing, nothing
     inside = (force.time >= stretch[0]) & (force.time <= stretch[1])
     time, y = force.time[inside], force.values[inside]
     known = np.isfinite(moved.values)
@@ -267,6 +267,8 @@ def draw_drive(subject: Subject, begin: float, title: str, *files: Path) -> None
 
     Right, where there is a current, its highest moment in detail. Raises `ValueError` without any signal.
     """
+    from engine_mount.reports.drawing.picture import draw_chart  # what draws takes a second to load
+
     chart, setpoint = traces([subject]).chart, subject['setpoint']
     if chart is None or chart.limits is None:
         raise ValueError('neither displacement nor current was recorded')

@@ -30,15 +30,15 @@ def dominant_sine(time: Array, values: Array) -> Sine:
         return Sine(math.nan, math.nan, math.nan)
     centred = values - values.mean()
     spectrum = np.abs(np.fft.rfft(centred * np.hanning(len(centred))))
-    line = 1 + int(np.argmax(spectrum[1:]))
-    spacing = 1.0 / (len(values) * float(np.median(np.diff(time))))
+    line = 1 + np.argmax(spectrum[1:])
+    spacing = 1.0 / (len(values) * np.median(np.diff(time)))
     near = (max(line - 1.5, 0.25) * spacing, (line + 1.5) * spacing)
     found = minimize_scalar(
         lambda each: _residual(time, values, each), bounds=near, method='bounded', options={'xatol': 1e-9}
     )
     frequency = float(found.x)
     amplitude = float(_amplitudes(time, values, frequency, 1)[0])
-    share = 1.0 - float(found.fun) / float(centred @ centred)
+    share = 1.0 - found.fun / (centred @ centred)
     return Sine(frequency, amplitude, share)
 
 
@@ -64,7 +64,7 @@ def whole_periods(time: Array, frequency: float, most: int) -> tuple[slice, int]
 
     The slice holds both ends of the stretch, so that a loop over it closes.
     """
-    spacing = float(np.median(np.diff(time)))
+    spacing = np.median(np.diff(time))
     periods = min(most, int((time[-1] - time[0]) * frequency + 1e-6))
     samples = round(periods / (frequency * spacing))
     return slice(len(time) - 1 - samples, len(time)), periods
@@ -82,22 +82,21 @@ def cycle_work(displacement: Array, force: Array, periods: int) -> float:
 
 def decibels(amplitudes: Array) -> Array:
     """Return 20 log10 of `amplitudes`, NaN where one is 0."""
-    known = np.where(np.asarray(amplitudes) > 0.0, amplitudes, np.nan)
-    return np.asarray(20.0 * np.log10(known))
+    return 20.0 * np.log10(np.where(amplitudes > 0.0, amplitudes, np.nan))
 
 
-def amplitude_density(values: Array, rate: float, segment: float = _SEGMENT) -> tuple[Array, Array]:
+def amplitude_density(values: Array, rate: float) -> tuple[Array, Array]:
     """Return frequencies (Hz) and one-sided amplitude spectral density (unit / sqrt(Hz)) of `values`.
 
     `values` are evenly spaced at `rate` (Hz) and known. The sum of its squares times the spacing of the
     frequencies is the variance. Hann window, half overlap, the mean of each segment taken off. A signal
-    shorter than `segment` (s) is one segment (Welch's method).
+    shorter than a segment of 2.048 s is one segment (Welch's method).
     """
     if len(values) < 8:
         raise ValueError(f'a spectrum needs at least 8 samples, these are {len(values)}')
     from scipy.signal import welch  # loads long
 
-    length = min(len(values), round(segment * rate))
+    length = min(len(values), round(_SEGMENT * rate))
     frequency, power = welch(values, rate, 'hann', length)
     return frequency, np.sqrt(power)
 

@@ -76,11 +76,11 @@ def coil_load(time: Array, current: Array, resistance: float) -> CoilLoad:
     known, held = np.isfinite(current), np.diff(time, append=time[-1:])
     if len(time) > 1:
         held[-1] = np.median(held[:-1])
-    duration = float(held[known].sum())
+    duration = held[known].sum()
     if duration <= 0.0:
         return CoilLoad(0.0, *(math.nan,) * 4)
     flowing = current[known]
-    mean_square = float(np.sum(flowing**2 * held[known])) / duration
+    mean_square = np.sum(flowing**2 * held[known]) / duration
     heat = resistance * mean_square
     return CoilLoad(duration, math.sqrt(mean_square), float(np.max(np.abs(flowing))), heat, heat * duration)
 
@@ -102,7 +102,7 @@ def tracking(subjects: Sequence[Subject]) -> Section:
             error = 'damping was never on, so there is no error to tell'
         said += [(subject, error), (subject, found.remark)]
         if not wanted:
-            strongest = float(found.time[np.nanargmax(np.abs(found.wanted))])
+            strongest = found.time[np.nanargmax(np.abs(found.wanted))]
             view = (strongest - _BEFORE, strongest + _AFTER)
         damping = damping or subject.damping or []
         place = len(wanted)
@@ -176,7 +176,7 @@ def parameters(subjects: Sequence[Subject]) -> Section:
 def _current(subject: Subject) -> tuple[Signal | None, str]:
     """Return the current that is known for most of the recording, and what it is; the truest of equals."""
     found = [(signal, what) for name, what in _CURRENTS.items() if (signal := subject[name]) is not None]
-    lengths = [int(np.count_nonzero(np.isfinite(signal.values))) for signal, _ in found]
+    lengths = [np.count_nonzero(np.isfinite(signal.values)) for signal, _ in found]
     for (signal, what), length in zip(found, lengths, strict=True):
         if length > 0 and length >= _COVERING * max(lengths):
             return signal, what

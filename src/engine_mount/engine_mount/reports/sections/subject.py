@@ -147,12 +147,12 @@ class Subject:
         """Return stamps (ns) as times of the report."""
         return (stamps - self.zero) / 1e9
 
-    def curve(self, what: str, x: Array, y: Array, *, steps: bool = False) -> Curve:
+    def curve(self, what: str, x: Array, y: Array) -> Curve:
         """Return a curve in the colour of this recording, with its name where there are several."""
         mount = self.run.mount
         own = '' if mount.startswith('friction') and mount != 'friction_off' else COLOUR_OF.get(mount, '')
         label = f'{what}, {self.name}' if self._several else what
-        return Curve(label, x, y, own or COLOURS[self._place % len(COLOURS)], steps=steps)
+        return Curve(label, x, y, own or COLOURS[self._place % len(COLOURS)])
 
     @functools.cached_property
     def session(self) -> str:
@@ -295,7 +295,7 @@ class Subject:
         begin, end = self._steady_candidate(moved)
         inside = (moved.time >= begin) & (moved.time <= end)
         sine = dominant_sine(moved.time[inside], moved.values[inside])
-        held = float(np.ptp(moved.time[inside])) if inside.any() else 0.0
+        held = np.ptp(moved.time[inside]) if inside.any() else 0.0
         return ((begin, end), sine) if sine.share >= _SINE_SHARE and held * sine.frequency >= 3.0 else None
 
     def _steady_candidate(self, moved: Signal) -> tuple[float, float]:
@@ -303,10 +303,10 @@ class Subject:
         if longest[1] - longest[0] >= 2.0 * _SETTLING:
             return max(longest[0] + _SETTLING, longest[1] - _STEADY), longest[1]
         squares = np.nan_to_num(moved.values) ** 2
-        spacing = float(np.median(np.diff(moved.time))) if len(moved.time) > 1 else 1.0
+        spacing = np.median(np.diff(moved.time)) if len(moved.time) > 1 else 1.0
         width = min(len(squares), max(1, round(_STEADY / spacing)))
         sums = np.cumsum(np.concatenate([[0.0], squares]))
-        first = int(np.argmax(sums[width:] - sums[:-width]))
+        first = np.argmax(sums[width:] - sums[:-width])
         return float(moved.time[first]), float(moved.time[first + width - 1])
 
     def _read(self, topic: str, column: str) -> Signal | None:

@@ -36,11 +36,10 @@ function placeOf(x, value) { // the first place whose x is at least `value`
   return low;
 }
 
-function valuesAt({ x, y, rising }, at) { // those known nearest to x, the lowest first
+function valuesAt({ x, y, rising }, at) { // those nearest to x, the lowest first
   if (!rising || !(at >= x[0] && at <= x[x.length - 1])) return [];
   const after = placeOf(x, at), nearest = after > 0 && at - x[after - 1] < x[after] - at ? after - 1 : after;
-  const found = [nearest - 1, nearest, nearest + 1].filter((place) => x[place] === x[nearest]).map((place) => y[place]);
-  return [Math.min(...found), Math.max(...found)];
+  return [nearest - 1, nearest, nearest + 1].filter((place) => x[place] === x[nearest]).map((place) => y[place]);
 }
 
 function niceStep(span, count) {
@@ -49,7 +48,7 @@ function niceStep(span, count) {
 }
 
 function written(value, span, log) { // digits that tell apart a two-thousandth of what is shown
-  if (value === undefined || !isFinite(value)) return '–';
+  if (!isFinite(value)) return '–';
   if (log) return value.toPrecision(3);
   return value.toFixed(Math.min(6, Math.max(0, Math.ceil(-Math.log10(span / 2000)))));
 }
@@ -130,7 +129,7 @@ function verticalOf({ spec, lines }, from, to) {
   const take = (value) => { if (value < low) low = value; if (value > high) high = value; };
   for (const { x, y, hidden } of lines)
     if (!hidden) for (let place = 0; place < x.length; place += 1) if (x[place] >= from && x[place] <= to) take(y[place]);
-  for (const { value, both } of spec.levels) { take(value); if (both) take(-value); }
+  for (const { value } of spec.levels) { take(value); take(-value); }
   spec.least.forEach(take);
   if (spec.log) {
     if (!(high > 0)) return [-1, 1];
@@ -154,15 +153,18 @@ function paintPanel(chart, panel, width, ink) {
   const [from, to] = chart.shown, [low, high] = verticalOf(panel, from, to);
   const right = width - RIGHT, bottom = height - (last ? BOTTOM : 4);
   const x = (value) => LEFT + ((right - LEFT) * (value - from)) / (to - from);
-  const y = (value) => bottom - ((bottom - TOP) * ((spec.log ? Math.log10(value) : value) - low)) / (high - low);
-  const area = { x, y, right, bottom, low, high };
-  paintFrame(paint, chart, spec, area, last, width, ink);
+  const down = (value) => bottom - ((bottom - TOP) * (value - low)) / (high - low), y = (value) => down(spec.log ? Math.log10(value) : value);
+  const area = { x, y, down, right, bottom, low, high, last, ink };
+  paintFrame(paint, chart, spec, area);
   paint.save();
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
   const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
-  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, chart.shown, area);
-  paintLevels(paint, spec.levels, area, ink);
-  if (chart.spike !== null) { paint.strokeStyle = ink('--ink'); stroke(paint, Math.round(x(chart.spike)) + 0.5, 0, Math.round(x(chart.spike)) + 0.5, bottom); }
+  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
+  paintLevels(paint, spec.levels, area);
+  if (chart.spike !== null) {
+    const at = Math.round(x(chart.spike)) + 0.5;
+    paint.strokeStyle = ink('--ink'); stroke(paint, at, 0, at, bottom);
+  }
   if (chart.dragged) {
     const [begin, end] = chart.dragged.map(x);
     paint.globalAlpha = 0.2; paint.fillStyle = ink('--ink'); paint.fillRect(begin, 0, end - begin, bottom); paint.globalAlpha = 1;
@@ -176,8 +178,8 @@ function paintPanel(chart, panel, width, ink) {
   }
 }
 
-function paintFrame(paint, chart, spec, { x, right, bottom, low, high }, last, width, ink) {
-  const [from, to] = chart.shown;
+function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, last, ink }) {
+  const [from, to] = chart.shown, width = right + RIGHT;
   paint.fillStyle = colourOf(chart.spec.span_colour);
   paint.globalAlpha = 0.15;
   for (const { begin, end } of chart.spec.spans) {
@@ -189,9 +191,9 @@ function paintFrame(paint, chart, spec, { x, right, bottom, low, high }, last, w
   paint.textAlign = 'right'; paint.textBaseline = 'middle';
   const step = spec.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
   for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
-    const y = Math.round(bottom - ((bottom - TOP) * (place * step - low)) / (high - low)) + 0.5;
+    const value = place * step, y = Math.round(down(value)) + 0.5;
     stroke(paint, LEFT, y, right, y);
-    paint.fillText(spec.log ? Number((10 ** (place * step)).toPrecision(2)) : Number((place * step).toPrecision(6)), LEFT - 6, y);
+    paint.fillText(Number(spec.log ? (10 ** value).toPrecision(2) : value.toPrecision(6)), LEFT - 6, y);
   }
   const stepX = niceStep(to - from, width / 90), ticks = [...chart.spec.ticks];
   if (!ticks.length || ticks.length > width / 40) {
@@ -200,11 +202,11 @@ function paintFrame(paint, chart, spec, { x, right, bottom, low, high }, last, w
   }
   paint.textBaseline = 'top';
   for (const tick of ticks) {
-    const at = Math.round(x(tick)) + 0.5;
+    const at = Math.round(x(tick)) + 0.5, edge = at > right - 8; // of the page, where the number is whole too
     if (at < LEFT || at > right + 1 || (chart.live && tick < 0)) continue;
     stroke(paint, at, TOP, at, bottom);
-    paint.textAlign = at > right - 8 ? 'right' : 'center'; // whole at the edge of the page too
-    if (last) paint.fillText(Number(tick.toPrecision(8)), at > right - 8 ? right + RIGHT : at, bottom + 4);
+    paint.textAlign = edge ? 'right' : 'center';
+    if (last) paint.fillText(Number(tick.toPrecision(8)), edge ? width : at, bottom + 4);
   }
   paint.textAlign = 'center';
   if (last) paint.fillText(chart.spec.x_label, (LEFT + right) / 2, bottom + 20);
@@ -212,12 +214,12 @@ function paintFrame(paint, chart, spec, { x, right, bottom, low, high }, last, w
 
 function stroke(paint, x0, y0, x1, y1) { paint.beginPath(); paint.moveTo(x0, y0); paint.lineTo(x1, y1); paint.stroke(); }
 
-function paintLevels(paint, levels, { y, right }, ink) {
+function paintLevels(paint, levels, { y, right, ink }) {
   paint.textAlign = 'left'; paint.textBaseline = 'bottom';
-  for (const { name, value, both, dash, colour } of levels) {
+  for (const { name, value, dash, colour } of levels) {
     paint.strokeStyle = paint.fillStyle = colourOf(colour);
     paint.setLineDash(dash === 'dot' ? [2, 3] : [7, 4]);
-    for (const each of both ? [value, -value] : [value]) stroke(paint, LEFT, y(each), right, y(each));
+    for (const each of [value, -value]) stroke(paint, LEFT, y(each), right, y(each));
     paint.setLineDash([]);
     paint.strokeStyle = ink('--paper'); paint.lineWidth = 3; paint.globalAlpha = 0.8;
     paint.strokeText(name, LEFT + 4, y(value) - 1);
@@ -226,10 +228,10 @@ function paintLevels(paint, levels, { y, right }, ink) {
   }
 }
 
-function paintCurve(paint, curve, [from, to], area) {
+function paintCurve(paint, curve, area, [from, to]) {
   paint.strokeStyle = colourOf(curve.colour);
   paint.lineWidth = curve.width; paint.lineJoin = 'round';
-  paint.setLineDash(curve.dash === 'dash' ? [6, 4] : curve.dash === 'dot' ? [2, 3] : []);
+  paint.setLineDash(curve.dash === 'dash' ? [6, 4] : []);
   paint.beginPath();
   const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
   const end = rising ? Math.min(x.length, placeOf(x, to) + 2) : x.length;
@@ -248,7 +250,7 @@ function paintCurve(paint, curve, [from, to], area) {
   paint.setLineDash([]);
 }
 
-function paintDots(paint, dots, shown, { x, y, bottom }) {
+function paintDots(paint, dots, { x, y, bottom }) {
   paint.fillStyle = paint.strokeStyle = colourOf(dots.colour);
   dots.x.forEach((value, place) => {
     const across = x(value), down = y(dots.y[place]);

@@ -14,8 +14,8 @@ function zoom(chart, factor, about = (chart.shown[0] + chart.shown[1]) / 2) {
   show(chart, about - (about - from) * factor, about + (to - about) * factor);
 }
 
-function pan(chart, share) {
-  const [from, to] = chart.shown, by = share * (to - from);
+function pan(chart, [from, to], share) {
+  const by = share * (to - from);
   show(chart, from + by, to + by);
 }
 
@@ -33,18 +33,16 @@ function shareAt(chart, event) { // of the width of the drawing area
 
 function listen(chart) {
   const { place } = chart, at = (event) => chart.shown[0] + shareAt(chart, event) * (chart.shown[1] - chart.shown[0]);
+  const onCanvas = (kind, act) => place.addEventListener(kind, (event) => { if (event.target.tagName === 'CANVAS') act(event); });
   let begun = null;
-  place.addEventListener('pointerdown', (event) => {
-    if (event.target.tagName !== 'CANVAS' || event.button > 0) return;
+  onCanvas('pointerdown', (event) => {
+    if (event.button > 0) return;
     event.target.setPointerCapture(event.pointerId);
     begun = { shown: chart.shown, share: shareAt(chart, event), at: at(event), x: event.clientX };
   });
-  place.addEventListener('pointermove', (event) => {
-    if (event.target.tagName !== 'CANVAS') return;
-    if (begun && event.shiftKey) {
-      const [from, to] = begun.shown, by = (begun.share - shareAt(chart, event)) * (to - from);
-      show(chart, from + by, to + by);
-    } else {
+  onCanvas('pointermove', (event) => {
+    if (begun && event.shiftKey) pan(chart, begun.shown, begun.share - shareAt(chart, event));
+    else {
       if (begun) chart.dragged = [begun.at, at(event)].sort((a, b) => a - b);
       read(chart, at(event));
     }
@@ -54,11 +52,11 @@ function listen(chart) {
     chart.dragged = begun = null;
     if (event.type !== 'pointerup') return;
     if (dragged && far) show(chart, ...dragged);
-    else if (!far && event.target.tagName === 'CANVAS') read(chart, at(event));
+    else if (!far) read(chart, at(event));
   };
-  for (const kind of ['pointerup', 'pointercancel']) place.addEventListener(kind, lift);
+  for (const kind of ['pointerup', 'pointercancel']) onCanvas(kind, lift);
   place.addEventListener('pointerleave', (event) => { if (event.pointerType === 'mouse' && !begun) read(chart, null); });
-  place.addEventListener('dblclick', (event) => { if (event.target.tagName === 'CANVAS') show(chart, ...chart.whole); });
+  onCanvas('dblclick', () => show(chart, ...chart.whole));
   place.addEventListener('wheel', (event) => {
     if (!event.ctrlKey && !event.shiftKey) return; // the page scrolls
     event.preventDefault();
@@ -70,7 +68,7 @@ function listen(chart) {
 function press(chart, event) {
   if (event.target !== chart.place || event.ctrlKey || event.metaKey || event.altKey) return;
   const [from, to] = chart.shown, spike = chart.spike === null ? (from + to) / 2 : chart.spike;
-  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : pan(chart, 0.2 * way));
+  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : pan(chart, chart.shown, 0.2 * way));
   const acts = {
     ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => zoom(chart, 0.5), '=': () => zoom(chart, 0.5), '-': () => zoom(chart, 2),
     0: () => show(chart, ...chart.whole), Escape: () => read(chart, null),
