@@ -10,7 +10,7 @@ from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
 from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option, write_figures
 from engine_mount.cli.help import named
 
-EPILOG = """Groups: `calls` (what one sample costs in core and in a replay), `storage` (loading a
+EPILOG = """Groups: `calls` (cost of one sample in core and in a replay), `storage` (loading a
 recording), `fleet` (a recorded second in `fleet replay`), `graph` (latency of the graph in real time,
 beside a chain of empty nodes).
 
@@ -28,14 +28,14 @@ def bench(
     only: Annotated[
         list[str] | None, option('measure this group alone; may be repeated', 'GROUP', named('group'))
     ] = None,
-    rounds: Annotated[int, option('of each run of the graph; the median is told', least=1)] = 5,
+    rounds: Annotated[int, option('of each run of the graph; the median is printed', least=1)] = 5,
     seconds: Annotated[float, option('length of a run in real time', least=1.0)] = 5.0,
     sample_rate: Annotated[float, option('samples per second of the graph and the chain', 'HZ')] = 1000.0,
     priority: Priority = 0,
     domain: Domain = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Measure what matters for speed, each figure beside its alternative in the same run."""
+    """Measure speed, each figure beside its alternative in the same run."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from mount_bringup.graph.domain import chosen_domain
