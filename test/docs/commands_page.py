@@ -15,8 +15,8 @@ PAGE = PAGES / 'commands.md'
 
 HEAD = f"""# Commands
 
-What `engine-mount COMMAND --help` tells. {written_by(__file__)}
-What each command promises by its exit code: [exit codes](exit_codes.md); what else is to know of it:
+The output of `engine-mount COMMAND --help`. {written_by(__file__)}
+The promise of each command by its exit code: [exit codes](exit_codes.md); more about each command:
 [engine_mount.cli](../../src/engine_mount/engine_mount/cli/README.md#commands).
 """
 

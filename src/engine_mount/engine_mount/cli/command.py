@@ -40,9 +40,9 @@ _MOUNT = 'Mount and paper'
 app = typer.Typer(
     cls=Group,
     name='engine-mount',
-    help='Semi-active engine mount with dry friction: drive, record, look at what happened.',
+    help='Semi-active engine mount with dry friction: drive, record, evaluate.',
     epilog="""Begin with `engine-mount drive`, then `engine-mount report` and `engine-mount replay`.
-`engine-mount COMMAND --help` tells options, exit codes and examples.""",
+`engine-mount COMMAND --help` prints options, exit codes and examples.""",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode='markdown',
@@ -73,7 +73,7 @@ def _top(
             '--version',
             is_eager=True,
             callback=_tell_versions,
-            help='Tell what this is, and what it runs on.',
+            help='Print the versions of this project and its libraries.',
         ),
     ] = False,
 ) -> None:

@@ -77,11 +77,11 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-Base = Annotated[Path | None, option('specimen that gives all other values; default: the shipped one')]
+Base = Annotated[Path | None, option('specimen with all other values; default: the shipped one')]
 Name = Annotated[str, option('name of the specimen; default: that of the base')]
 Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE', panel=OUTPUT)]
 
-EXIT_CODES = 'Exit code: 0 when all that was asked for is written, 1 with the reason when not.\n\nExamples:'
+EXIT_CODES = 'Exit code: 0 when all requested files are written, 1 with the reason when not.\n\nExamples:'
 
 
 def progress() -> AbstractContextManager[Callable[[float, str], None]]:

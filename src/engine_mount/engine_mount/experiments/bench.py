@@ -127,7 +127,7 @@ def _family(figures: Values) -> dict[str, Values]:
 def _on_active(figures):
     least = min(each['damping_active_share'] for each in _family(figures).values())
     told = f"""Damping is on for at least {100 * least:.0f} % of the evaluated time at
-        {figures['frequency_hz']:g} Hz and {1e3 * figures['amplitude_m']:g} mm; the paper does not tell its
+        {figures['frequency_hz']:g} Hz and {1e3 * figures['amplitude_m']:g} mm; the paper does not give its
         amplitude."""
     return least == 1.0 or (least > 0.0 and PARTLY), told
 
@@ -191,8 +191,8 @@ def _on_acoustics(figures):
     else:
         source = f'They differ by more than {percent} dead zone alone does not explain the distortion.'
     told = f"""THD {100 * chosen:.2f} % with {damper}, {100 * hydro:.2f} % with the hydromount. Third, fifth
-        and seventh harmonic of the friction force in N, in brackets what the characteristic with its dead
-        zone asks for:
+        and seventh harmonic of the friction force in N, in brackets that of the characteristic with its dead
+        zone:
         {', '.join(f'{here:.2f} ({there:.2f})' for here, there in odd)}. {source}"""
     return chosen < hydro or PARTLY, told
 
@@ -235,8 +235,8 @@ def draw_harmonics(runs: dict[str, Values], damper: str, title: str) -> Any:
 EXPERIMENT = Experiment(
     NAME,
     """The rack moves the mount on a sine, by default 8 Hz and 1 mm. Initialisation and controller run as
-    in the car, once with each damper characteristic, once with 0 A, and once with the original
-    hydromount in the seat. Force and displacement over the last whole periods of each recording give
+    in the car, once with each damper characteristic, once with 0 A, and once with the original hydromount
+    instead. Force and displacement over the last whole periods of each recording give
     loops, loss and harmonics (least squares).""",
     BenchParameters(),
     run,

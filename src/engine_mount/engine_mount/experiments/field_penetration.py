@@ -234,9 +234,9 @@ EXPERIMENT = Experiment(
     """Lines: diffusion into a plate in one dimension with the permeability of the mean current, in the
     periodic state of the switched bridge. Dots: the same from a finite-element computation in two
     dimensions (scikit-fem, mesh of this project): nonlinear steady field of one plate with its air
-    gap, then the alternating field about it with eddy currents. Both are driven with the same mean
-    flux in the middle of the plate: what is checked is the diffusion into the plate, not the flux
-    that passes by it, which at saturation is a large part of what the winding sees.""",
+    gap, then the alternating field about it with eddy currents. Both are driven with the same mean flux in
+    the middle of the plate. The check covers the diffusion into the plate, not the flux beside the plate,
+    which at saturation is a large part of the winding's flux.""",
     PenetrationParameters(),
     run,
 )

@@ -144,7 +144,7 @@ def _told(ranges: list[list[float]]) -> str:
     inductance, current and gap is ambiguous.""",
 )
 def _on_ambiguity(found):
-    told = f"""Over 250 .. 550 um the inductance tells gaps apart at {_told(found['unique_currents_a'])} A,
+    told = f"""Over 250 .. 550 um the inductance distinguishes gaps at {_told(found['unique_currents_a'])} A,
         and not at {_told(found['ambiguous_currents_a'])} A."""
     return found['ambiguous_currents_a'], told
 
@@ -173,8 +173,8 @@ def _on_ramp(found):
     told = f"""The recorded ramp gives {1e6 * at_rest:.1f} um at 0.2 A (true: {1e6 * true_rest:.1f}) and
         {1e6 * found['ramp_gap_at_crossing_m']:.1f} um at 20 mH. There the pads are already compressed;
         carried back to no load the initialisation finds {1e6 * contact:.1f} um (true:
-        {1e6 * true_contact:.1f}). Both gaps were put into the simulated actuator; what is shown is that they
-        are found."""
+        {1e6 * true_contact:.1f}). Both gaps were set in the simulated actuator; the claim is that the
+        initialisation finds them."""
     return abs(at_rest - true_rest) < 4e-6 and abs(contact - true_contact) < 2e-6, told
 
 

@@ -225,7 +225,7 @@ def draw_gap(drives: dict[str, DriveSignals], depth: str, figures: Values) -> An
 
 EXPERIMENT = Experiment(
     NAME,
-    """A car at 119 km/h on a good road meets a gap; the paper does not tell its size, so three depths are
+    """A car at 119 km/h on a good road meets a gap; the paper does not give its size, so three depths are
     driven, each with the friction mount, the same without current, and the original hydromount. Times
     and rms come from the recordings.""",
     GapParameters(),

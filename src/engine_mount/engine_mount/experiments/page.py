@@ -10,10 +10,10 @@ from engine_mount.recordings.screen import Screen, Table
 _HEAD = """# The paper's experiments, repeated
 
 Lorenz, Heimann, Härtel: *A novel engine mount with semi-active dry friction damping*, Shock and Vibration 13
-(2006) 559-571. `make experiments` writes this page and its pictures; nobody edits it. What the paper says
-stands in our words. All measurements are simulated: an agreement says that method and laws do what the paper
-tells, not that its hardware did. *partly* and *no* are results like others; *not comparable* means that the
-paper gives too little, or that what was compared here is something else.
+(2006) 559-571. `make experiments` writes this page and its pictures; do not edit it. The statements of the
+paper stand in our words. All measurements are simulated: an agreement confirms method and laws of the paper,
+not its hardware. *partly* and *no* are results like others. *not comparable* means that the paper gives too
+little, or that this project compared something else.
 """
 
 
@@ -21,7 +21,7 @@ def print_outcome(outcome: Outcome, screen: Screen) -> None:
     """Print the claims of an experiment and the places of what it made."""
     known = outcome.experiment
     rows = [(each.reference, each.paper, each.found, each.holds.value) for each in outcome.claims]
-    heads = ('paper', 'says', 'here', 'holds')
+    heads = ('paper', 'statement', 'here', 'holds')
     screen.table(Table(f'{known.title} ({known.reference})', 'llll', rows, heads, ruled=True))
     made = {'figure': outcome.pictures, 'recording': outcome.recordings, 'page': outcome.pages}
     for kind, places in made.items():

@@ -381,7 +381,7 @@ def draw_front(points: list[Values]) -> Any:
 EXPERIMENT = Experiment(
     NAME,
     """The paper's switched policy and the continuous law on the same roads, racks and engines, beside the
-    hydromount and the mount without current: what each gives, and what it costs.""",
+    hydromount and the mount without current: benefit and cost of each.""",
     PolicyParameters(),
     run,
 )

@@ -37,14 +37,15 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
     ]
     tip_ins = '; '.join(f'{who} {v["peak"]:.2f} and {v["acceleration"]:.2f}' for who, v in tips.items())
     delays = ', '.join(f'{value:.2f} at {delay} ms' for delay, value in limits['gap_after_delay'].items())
-    beaten = f"""## What no policy can beat
+    beaten = f"""## Limits of any policy
 
 An ideal viscous damper with perfect knowledge, always on: largest displacement on the sweep, by its \
 coefficient in N s/m:
 
 {by_name('N s/m', limits['sweep_always_on'])}
 Over a gap of {1e3 * limits['gap_depth_m']:g} mm on a smooth road, {limits['gap_damping']:g} N s/m, \
-switched on perfectly so long after the wheel meets it, over no damping: {delays}. The first extremum keeps \
+switched on perfectly so long after the wheel meets it, as a ratio to no damping: {delays}. The first \
+extremum keeps \
 {limits['gap_first_extremum_always_on']:.2f} of the undamped one even with the damper always on.
 """
     if 'front' in figures:
@@ -56,18 +57,18 @@ switched on perfectly so long after the wheel meets it, over no damping: {delays
 same mount. `{PAPER}`, the paper's, waits until the magnitude has exceeded 0.8 mm for one period and then
 damps by a characteristic of the velocity in the band. `{CONTINUOUS}` opens a viscous damper with the
 amplitude in the band, from 0.12 mm on, without waiting, and takes the force from the unfiltered velocity
-(`mount_control/policy/continuous_viscous.py`). `mount_control.policy` chooses. All of it is simulated;
-vehicle and hydromount are chosen, not measured ([results.md](results.md)).
+(`mount_control/policy/continuous_viscous.py`). `mount_control.policy` selects the policy. All figures are
+simulated; vehicle and hydromount are chosen, not measured ([results.md](results.md)).
 
 All ratios are to the original hydromount (displacement) or to the same mount without current (acceleration):
-below 1 is won.
+a ratio below 1 is better.
 
 ## In short
 
 | | {' | '.join(POLICIES)} |
 |---|---|---|
 {in_short(figures)}
-What is lost:
+Costs:
 
 {lost(figures)}
 ## Sweep
@@ -87,8 +88,8 @@ the mount force, %, by frequency in Hz:
 {by_name('policy', figures['thd'])}
 ## Roads
 
-The law was tuned on random roads with other seeds; the figures of the sweeps were seen while it was \
-chosen, so they are no blind check. A random road of class A and a smooth one (2e-6 m^3). Acceleration of \
+The law was tuned on random roads with other seeds; the figures of the sweeps were known during the tuning, \
+so they are no blind check. A random road of class A and a smooth one (2e-6 m^3). Acceleration of \
 the chassis from 20 to 200 Hz; largest displacement:
 
 | road | | acceleration | engine idling | displacement | J/km | coil, W |
@@ -140,7 +141,7 @@ times ({100.0 * np.mean(shaken > 1.05):.0f} % of the cases above 1.05), and the 
 
 
 def thorough(figures: Values, beaten: str, picture: str) -> str:
-    """Return the parts from other engines on; `beaten` is what no policy can beat."""
+    """Return the parts from other engines on; `beaten` holds the limits of any policy."""
     idling = []
     for roughness, each in figures['idling'].items():
         for who, cases in each.items():
@@ -182,39 +183,40 @@ policy undisturbed:
 ## Idling engine
 
 Acceleration from 20 to 200 Hz over that without current, and rms displacement from 3 to 14 Hz over the \
-hydromount, on roads of two roughnesses (1e-6 m^3). The worst and the mean of all idle frequencies and forces:
+hydromount, on roads of two roughnesses (1e-6 m^3). The table gives the worst and the mean of all idle \
+frequencies and forces:
 
 | roughness | | acceleration: worst, at | mean | share above 1.05 | displacement: mean | worst |
 |---|---|---|---|---|---|---|
 {table_rows(idling)}
 The price of quiet: where a strong idle line meets a rough road, the damper stays nearly closed and the \
-engine moves more than on the hydromount, which passes the line on instead. `idle_weight` chooses between \
-both.
+engine moves more than on the hydromount, which transmits the line instead. `idle_weight` weighs one \
+against the other.
 
 {beaten}
-## What each part is for
+## Effect of each part
 
 The continuous law, one part changed at a time:
 
 {by_name('changed', figures['ablation'])}
 ## Wear against effect
 
-{picture}Points that none beats in all of ratio on a light road, both accelerations and wear (random road); \
-choose one by its three parameters:
+{picture}No other point is better than these in all of ratio on a light road, both accelerations and wear \
+(random road). Choose one by its three parameters:
 
 {table(heads, front)}
 The default was chosen so that engines from 6 to 11 Hz stay at or below 0.8 of the hydromount with worn \
 pads too: see the table of engines.
 
-## What was not done, and why
+## Omissions and their reasons
 
 - **The engine's frequency is not estimated.** While the road shakes the wheel, the phasor in the band \
-turns as the road does, and free decays the damper ends. The law was made insensitive instead: a band of \
+turns with the road, and the damper ends free decays. The law was made insensitive instead: a band of \
 quality 0.5, and no measure that grows beside the centre of the band. The table of engines was run with 8 Hz \
 throughout.
 - **The friction coefficient is not adapted.** The wanted force is nearly proportional to the velocity, so \
-least squares over the ringing behind a gap cannot part it from the elastomer's own loss, and the \
-acceleration of the chassis, which no sensor tells, goes into both. Another sensor, of chassis acceleration \
+least squares over the ringing behind a gap cannot separate it from the elastomer's own loss. The \
+acceleration of the chassis, which no sensor measures, enters both. Another sensor, of chassis acceleration \
 or of mount force, would be needed.
 """
 

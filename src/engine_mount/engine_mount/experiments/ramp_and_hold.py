@@ -174,9 +174,9 @@ def _on_formulas(found):
 @claim('Eq (11) as printed', paper='The same three formulas, taken literally.')
 def _on_print(found):
     printed = found['errors_as_printed']
-    told = f"""With k as first over last force and c_xi as force over the wanted displacement, which makes
-        the first formula right but for the ramp: {_told(printed)}. The second is right only with c_xi over
-        the measured displacement, where the first is wrong; the third forgets p: with the right c_R it
+    told = f"""With k as first over last force and c_xi as force over the wanted displacement, the first
+    formula is right but for the ramp: {_told(printed)}. The second is right only with c_xi over
+        the measured displacement, where the first is wrong; the third omits p: with the right c_R it
         gives d_R {100 * found['damping_error_as_printed']:+.1f} %. No reading makes all three right."""
     return _worst(printed) <= 0.05, told
 
@@ -235,7 +235,7 @@ EXPERIMENT = Experiment(
     NAME,
     """The motor of the rack, a spring p in series with the pads, pulls them by a short ramp and holds.
     Nothing slides; the parallel pair of spring and damper relaxes. The joint stiffness comes from the
-    last second, p from the force over what the motor gives way, T and the amplitude from an
+    last second, p from the force over the yield of the motor, T and the amplitude from an
     exponential fitted to the displacement. Normal force, p and ramp are chosen: the paper gives none
     of them.""",
     RampParameters(),

@@ -163,7 +163,7 @@ def _on_isolation(figures):
     )
     told = f"""Away from the moments of damping, rms over that of the hydromount: force on the chassis
         {_by_band(force)}; displacement {_by_band(displacement)}. Holds if force and displacement are lower
-        from 5 Hz on; the chassis moves as recorded whatever the force."""
+        from 5 Hz on; the chassis moves as recorded with any force."""
     return holds_if_lower([*force[1:], *displacement[1:]]), told
 
 
@@ -187,10 +187,10 @@ def page_of(figures: Values, rate: float) -> str:
     peaks = ', '.join(f'{name} {1e3 * each["displacement_peak_m"]:.2f} mm' for name, each in runs.items())
     return f"""# A recorded drive: friction mount, hydromount, elastomer alone
 
-`engine-mount experiment recorded_drive` writes this page from its numbers; nobody edits it. `make
-experiments` writes it anew where the recording lies beside this repository, in
-`../shared/data/motorway_i280`; elsewhere it stays as it was last written. The recording is not part of this
-project. Any other vertical acceleration (CSV, NPY, MCAP) can take its place:
+`engine-mount experiment recorded_drive` writes this page from its numbers; do not edit it. `make
+experiments` renews the page if the recording lies beside this repository, in `../shared/data/motorway_i280`;
+otherwise the page stays unchanged. The recording is not part of this project. Any other vertical acceleration
+(CSV, NPY, MCAP) can take its place:
 
 ```
 engine-mount experiment recorded_drive --set recorded_drive.file=drive.csv --set recorded_drive.column=az \\
@@ -229,23 +229,23 @@ Damping went on {figures['times_on']} times and was on for {share:.1f} % of the 
 ## Limits of this comparison
 
 - **The sensor is not at the mount.** The recording of the I-280 is that of a device behind the windscreen.
-  What it feels there, after body, holder and its own noise, is taken as the motion of the chassis at the
-  engine mount.
-- **It was measured under another engine mount.** What that car's own engine and mounts did to the body is in
-  the recording already, and is no excitation by the road.
-- **Its bandwidth is small.** It has {rate:.0f} samples per second: nothing above {rate / 2.0:.0f} Hz is \
-known, and what lay above may
-  be folded below. Of the acoustics, up to 400 Hz, it tells nothing; no engine vibration is added.
-- **No feedback from force to chassis.** The chassis moves as recorded, whatever the mount does. So its
-  acceleration is the same with all mounts, and the force on it is compared instead. A mount that pushes more
-  would in a car also move the chassis, and be moved by it.
+  Its signal there, after body, holder and its own noise, is taken as the motion of the chassis at the engine
+  mount.
+- **The car had other engine mounts.** The effect of that car's own engine and mounts on the body is in the
+  recording already, and is no excitation by the road.
+- **The bandwidth is small.** The sensor has {rate:.0f} samples per second: nothing above {rate / 2.0:.0f} \
+Hz is known, and higher frequencies may
+  be folded below. It contains nothing about the acoustics, up to 400 Hz; no engine vibration is added.
+- **No feedback from force to chassis.** The chassis moves as recorded with every mount. So its acceleration
+  is the same with all mounts, and the table compares the force on it instead. In a car, a mount that pushes
+  more would also move the chassis, and the chassis would move the mount.
 - **The hydromount's parameters are chosen**, as are the elastomer's and the engine's mass: magnitudes as in
-  the literature, not those of this car nor those of the authors. What depends on them:
+  the literature, not those of this car nor those of the authors. Their effect:
   [results.md](results.md).
 - **Friction acts only after the displacement left {1e3 * figures['switch_on_level_m']:g} mm for one \
 period.** Such events are few in one drive:
-  a figure over the whole of it mostly compares a soft spring with a hydromount, and figures of the events
-  stand on a handful of them.
+  a figure over the whole drive mostly compares a soft spring with a hydromount, and figures of the events
+  rest on a handful of them.
 """
 
 

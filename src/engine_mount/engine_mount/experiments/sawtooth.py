@@ -251,9 +251,9 @@ def _on_models(figures):
         {shares['force_noise_share']}): simplified {shares['simplified_error_macroslip']} in macroslip and
         {shares['simplified_error_microslip']} in microslip, full {shares['full_error_macroslip']} and
         {shares['full_error_microslip']}. Below {1e3 * FADED_BELOW:g} mm/s the simplified model is off by
-        {shares['simplified_error_slow_macroslip']} in macroslip too: there it fades friction out, as the
-        paper asks for. The rack is the full model, so its own agreement proves nothing about pads; that of
-        the simplified model shows what leaving out c_Re costs."""
+        {shares['simplified_error_slow_macroslip']} in macroslip too: there it fades friction out, as in the
+        paper. The rack is the full model, so its own agreement proves nothing about pads; that of the
+        simplified model shows the cost of leaving out c_Re."""
     return NOT_COMPARABLE if macro is None else (macro < 0.03 and micro > 5.0 * macro) or PARTLY, told
 
 

@@ -1,4 +1,4 @@
-"""What the comparison with the hydromount depends on: road level, decoupler, chamber, idling engine."""
+"""Influences on the comparison with the hydromount: road level, decoupler, chamber, idling engine."""
 
 from itertools import product
 from typing import Annotated, Any, NamedTuple
@@ -192,8 +192,8 @@ def displacement(maps):
         hydromount in {_counted(maps.peak)} combinations (ratio {_range(maps.peak)})"""
     ]
     for chosen, text in (
-        (always, 'it wins whatever the rest'),
-        (never, 'it loses whatever the rest'),
+        (always, 'it always wins'),
+        (never, 'it always loses'),
         (
             [level for level in levels if level not in (*always, *never)],
             'it depends on the rest, or they are even',
@@ -279,10 +279,10 @@ def page_of(maps: Maps, own: SensitivityParameters, runs: int) -> str:
     return f"""# Friction mount or hydromount: what the answer depends on
 
 The paper found its friction mount better than the original hydromount. Its text gives neither the road level
-nor whether the engine ran during the sweep, and nothing about the hydromount. What is not given had to be
-chosen for the simulation, and the choice decides part of the comparison. So no single scenario stands here as
-evidence: this page shows all combinations. `engine-mount experiment sensitivity` writes it from the numbers;
-nobody edits it.
+nor whether the engine ran during the sweep, and nothing about the hydromount. This project chose the
+missing values for the simulation, and the choice decides part of the comparison. So no single scenario serves
+as evidence: this page shows all combinations. `engine-mount experiment sensitivity` writes the page from the
+numbers; do not edit it.
 
 | varied | values |
 |---|---|
@@ -311,8 +311,8 @@ the hydromount.
 
 ![Chassis acceleration, friction mount over hydromount](figures/sensitivity_acceleration.png)
 
-Over all road levels, decouplers and chambers: in how many the friction mount is lower, and the range of \
-the ratio.
+Over all road levels, decouplers and chambers: the number of cases in which the friction mount is lower, and \
+the range of the ratio.
 
 {table(('band', *forces), shares)}
 ## Harmonics on the rack, 8 Hz and 1 mm
@@ -320,8 +320,8 @@ the ratio.
 Harmonics in which the friction mount is lower.
 
 {table(('R_d (Pa s/m^3)', *(f'asymmetry {value:g}' for value in axes.asymmetries)), lower_ones)}
-The asymmetry was put into the model of the hydromount so that there are even harmonics; an advantage in \
-them is therefore no finding.
+The model of the hydromount contains the asymmetry so that there are even harmonics; an advantage in them \
+is therefore no finding.
 
 ## Limits
 
@@ -332,8 +332,8 @@ them is therefore no finding.
   Any of them can be repeated with a recording, for instance
   `engine-mount drive --core --scenario sweep --mount hydro --set mount_sim.sweep.velocity_amplitude=0.06
   --set mount_sim.hydromount.decoupler_resistance=2e7`.
-- A sweep passes each frequency once. What a mount does on a real road in a mixture of all of them, this page
-  does not tell; a minute of one is in [recorded_drive.md](recorded_drive.md).
+- A sweep passes each frequency once. This page does not show a real road with a mixture of all frequencies;
+  [recorded_drive.md](recorded_drive.md) shows a minute of one.
 """
 
 

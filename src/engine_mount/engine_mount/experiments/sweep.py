@@ -201,7 +201,7 @@ EXPERIMENT = Experiment(
     """The road under the wheel is a sine whose frequency rises by 1 Hz per second at a constant amplitude
     of its velocity (chosen). The same sweep is driven with the friction mount, the original
     hydromount, and the friction mount without current and with damping always on; displacement and
-    chassis acceleration come from the recordings. Which of the two mounts is better depends on what the
+    chassis acceleration come from the recordings. The better of the two mounts depends on values that the
     paper does not give: docs/explanation/results.md.""",
     SweepParameters(),
     run,

@@ -22,7 +22,7 @@ def accept(
         recording_argument(instead='run, recording, or replay of the reference: its folder, a file or a URI'),
     ],
     reference: Annotated[str, option('name of the reference', 'NAME')],
-    reason: Annotated[str, option('why its setpoints may change', 'TEXT')],
+    reason: Annotated[str, option('reason for the change of its setpoints', 'TEXT')],
     folder: Annotated[Path, option('folder of the references')] = Path('bags/reference'),
 ) -> None:
     """Make a run the reference that `make test` replays; the reason is kept with it."""

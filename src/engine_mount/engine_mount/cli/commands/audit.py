@@ -16,8 +16,8 @@ Examples:
 
 `engine-mount audit s3://bucket/drives/first` - fetched first; sftp, gs, http(s) and file too
 
-A topic with a rate is judged by its stamps, every topic by what the recorder, the file or its
-metadata counted. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
+A topic with a rate is judged by its stamps, every topic by the counts of the recorder, the file or its
+metadata. Expected = present - duplicated + lost. Jitter is the rms deviation of the steps between
 neighbouring stamps. Samples lost, samples unanswered and faults are the figures of `drive` and `report`.
 The JSON holds them, and below `topics` for each topic `expected`, `present`, `lost`, `duplicated`,
 `longest_gap_s` and more; unknown is null.
@@ -25,7 +25,7 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 
 
 def audit(recording: RecordingPlace, json_file: JsonFile = None) -> None:
-    """Tell whether anything was lost in a recording, or went wrong in the drive; exit code 1 if so."""
+    """Check a recording for losses, and its drive for faults; exit code 1 if there are any."""
     from engine_mount import audit as audit_recording
     from engine_mount.cli.screen import TerminalScreen
 

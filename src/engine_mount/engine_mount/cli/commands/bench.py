@@ -35,7 +35,7 @@ def bench(
     domain: Domain = None,
     json_file: JsonFile = None,
 ) -> None:
-    """Measure what matters for speed, each figure beside its alternative in the same run."""
+    """Measure speed, each figure beside its alternative in the same run."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from mount_bringup.graph.domain import chosen_domain

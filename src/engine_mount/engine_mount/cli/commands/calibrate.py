@@ -59,8 +59,8 @@ _INDUCTANCE_EPILOG = (
 `engine-mount calibrate inductance a.csv b.csv ... --gap a.csv=300 --coil-temperature b.csv=80`
 
 Columns are `current_a` and `inductance_mh`, or `current_a`, `current_rate_a_per_s` and
-`flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` where no option and no file name (`_349um`, `_+80degC`)
-tells them.
+`flux_rate_t_per_s`; `gap_um` and `coil_temperature_c` if no option and no file name (`_349um`, `_+80degC`)
+gives them.
 """
 )
 _RACK_EPILOG = (
@@ -77,7 +77,7 @@ Files = Annotated[
 ]
 Columns = Annotated[
     list[str] | None,
-    option('which column is what, and its unit', 'NAME=HEADER[:UNIT]', None, '--column'),
+    option('column of a quantity, and its unit', 'NAME=HEADER[:UNIT]', None, '--column'),
 ]
 Gaps = Annotated[list[str] | None, option('air gap of a file, um; may be repeated', 'FILE=UM', None, '--gap')]
 
@@ -99,8 +99,8 @@ def actuator(
 ) -> None:
     """Fit the force law, Eqs (3) and (4), to measured points of gap, current and force.
 
-    Refused are outliers, too few gaps or currents, and a law that is not positive, rising with the current
-    and falling with the gap within the measured range. Then no file is written.
+    Outliers, too few gaps or currents, and a law that is not positive, rising with the current and falling
+    with the gap within the measured range are refused. Then no file is written.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
@@ -123,7 +123,7 @@ def inductance(
     gaps: Gaps = None,
     temperatures: Annotated[
         list[str] | None,
-        option('of a file, or of all that do not tell theirs', '[FILE=]DEGC', None, '--coil-temperature'),
+        option('of a file, or of all files without one', '[FILE=]DEGC', None, '--coil-temperature'),
     ] = None,
     rest_current: Annotated[float | None, option('A; default: that of the base', least=1e-3)] = None,
     crossing_inductance: Annotated[float | None, option('mH; default: that of the base', least=1e-3)] = None,
@@ -153,8 +153,8 @@ def inductance(
 ) -> None:
     """Fit the gap curves L_0.2 and i_20 (Fig. 4) to coil ripple recorded at known gaps.
 
-    The temperature with most recordings is that of the curves, recordings at a second one measure the
-    compensation; those of one temperature alone are refused.
+    The temperature with most recordings is that of the curves. Recordings at a second temperature measure
+    the compensation; recordings at only one temperature are refused.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate

@@ -39,7 +39,7 @@ def check(
     json_file: JsonFile = None,
     out: NewFolder = None,
 ) -> None:
-    """Drive the manoeuvre suite and tell which limits hold, the worst first."""
+    """Drive the manoeuvre suite and print its limits, the worst first."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.check import report
     from engine_mount.experiments.check.run import run_trials, trials_of

@@ -39,13 +39,13 @@ def compare(
             '--tolerance',
         ),
     ] = None,
-    common: Annotated[bool, flag('--common', 'compare only the time that both cover')] = False,
+    common: Annotated[bool, flag('--common', 'compare only the common time')] = False,
     json_file: JsonFile = None,
 ) -> None:
-    """Tell in words how recording B differs from recording A.
+    """Print the differences between recordings A and B in sentences.
 
-    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, as where A or B is
-    no recording.
+    Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, for example
+    because A or B is no recording.
     """
     try:
         equal = _compare(a, b, tolerances or [], common, json_file)

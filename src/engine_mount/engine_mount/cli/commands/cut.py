@@ -10,7 +10,7 @@ from engine_mount.cli.fetching import beside, local
 
 _TIME = 'from the first displacement sample, such as 12s'
 
-EPILOG = """Exit code: 0 when the piece is written and nothing of it was unreadable, 1 when something was.
+EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1 when a part was not.
 
 Examples:
 
@@ -29,14 +29,14 @@ def cut(
     event: Annotated[
         str, option('around an event: its number, its kind, or kind:number, as in switch-on:2')
     ] = '',
-    before: Annotated[str, option('with --event: how much before it', 'TIME')] = '5s',
-    after: Annotated[str, option('with --event: how much after it', 'TIME')] = '10s',
+    before: Annotated[str, option('with --event: time before it', 'TIME')] = '5s',
+    after: Annotated[str, option('with --event: time after it', 'TIME')] = '10s',
     out: Annotated[
         Path | None,
         option('folder to create; default: beside the recording, of a URI here, named by the times'),
     ] = None,
 ) -> None:
-    """Cut a piece out of a recording; session and other latched topics come with it.
+    """Cut a piece out of a recording, with its session and other latched topics.
 
     The times of the messages stay as they were, so the first message may be a session from long before.
     """

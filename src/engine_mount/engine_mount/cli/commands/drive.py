@@ -47,9 +47,9 @@ Examples:
 
 `engine-mount drive` - a gap in the motorway, in real time
 
-`engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as it goes
+`engine-mount drive --scenario bench --lockstep --duration 10` - 8 Hz, 1 mm, as fast as possible
 
-`engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount in the seat
+`engine-mount drive --scenario sweep --mount hydro --core` - 1 to 50 Hz, the original hydromount instead
 
 `engine-mount drive --file drive.csv --column az:g --scale -1` - your own recording
 
@@ -105,14 +105,14 @@ def drive(
     distance: Distance = '',
     contact_length: Annotated[
         float | None,
-        option('road: on so much of it the tyre stands; default: 0.1', 'M', least=0.0, most=0.5),
+        option('road: contact length of the tyre; default: 0.1', 'M', least=0.0, most=0.5),
     ] = None,
     repeat: Annotated[bool, flag('--repeat', 'road: drive it forth and back until the end')] = False,
     fault: Annotated[
         list[str] | None,
         option(
-            'a fault from t s after the start of the simulator on, for so many s or for good; may be '
-            'repeated; list: what there is',
+            'a fault from t s after the start of the simulator on, for so many s or permanently; may '
+            'be repeated; list: all names',
             'NAME@t[:duration]',
             named('fault'),
         ),
@@ -132,7 +132,7 @@ def drive(
     ] = None,
     sample_rate: Annotated[
         float | None,
-        option('how often the electronics measure, 500 .. 2000 Hz; default: 1000', 'HZ', panel=GRAPH),
+        option('sample rate of the electronics, 500 .. 2000 Hz; default: 1000', 'HZ', panel=GRAPH),
     ] = None,
     seed: Annotated[int | None, option('seed of noise and road')] = None,
     settings: Settings = None,
@@ -159,7 +159,7 @@ def drive(
     domain: Domain = None,
     namespace: Namespace = '',
 ) -> None:
-    """Drive the simulated car through the whole graph, record it and print what happened."""
+    """Drive the simulated car through the whole graph, record it and print the results."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive

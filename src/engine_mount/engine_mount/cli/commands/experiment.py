@@ -15,11 +15,11 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.help import named, setting
 
-EPILOG = """Exit code: 0 when it ran, whatever came out; 1 when the order was refused.
+EPILOG = """Exit code: 0 when it ran, with any result; 1 when the order was refused.
 
 Examples:
 
-`engine-mount experiment --list` - which there are
+`engine-mount experiment --list` - all names
 
 `engine-mount experiment sawtooth --json sawtooth.json` - one of them
 
@@ -49,9 +49,9 @@ def experiment(
     ] = None,
     page: Page = None,
 ) -> None:
-    """Repeat experiments of the paper, each figure beside what the paper says.
+    """Repeat experiments of the paper, each figure beside the statement of the paper.
 
-    A statement that does not come out is a result, not an error: it is told, and the exit code is 0.
+    A statement that does not hold is a result, not an error: it is printed, and the exit code is 0.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.registry import experiments_named, known_settings, listed, orders

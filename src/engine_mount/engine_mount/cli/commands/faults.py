@@ -17,13 +17,13 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.help import named
 
-EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with what was wrong.
+EPILOG = """Exit code: 0 when every fault ended as required; 1 when one did not, with the failed requirement.
 
 The graphs run in real time, and a machine with other work makes them late: repeat a fault with `--only`.
 
 Examples:
 
-`engine-mount faults --list` - which there are, and what is required
+`engine-mount faults --list` - all faults with their requirements
 
 `engine-mount faults --only coil_open,kill_driver --json faults.json` - two of them
 
@@ -42,7 +42,7 @@ def faults(
     priority: Priority = 10,
     domain: Domain = None,
 ) -> None:
-    """Bring every fault into the real graph and tell what the graph does about it."""
+    """Inject every fault into the real graph and print the reaction of the graph."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.faults.case import MATRIX
     from engine_mount.faults.graph import Place

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
     from engine_mount.cli.screen import TerminalScreen
 
-app = group('fleet', 'Many recordings: catalogue, what if, questions.')
+app = group('fleet', 'Many recordings: catalogue, what if, queries.')
 
-_INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also where recordings are damaged, which
-their rows tell; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
+_INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also when recordings are damaged, which
+their rows show; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
 
 Examples:
 
@@ -41,11 +41,11 @@ Examples:
 `engine-mount fleet index drives --out catalogue --scheduler tcp://10.0.0.5:8786` - read by a Dask cluster,
 whose workers must reach the same places
 
-What did not change is not read again, what is gone leaves the catalogue. After Ctrl-C, or whatever ended it,
-the same command goes on where it stopped. Foreign files are imported first: `engine-mount import`.
+Unchanged recordings are not read again, missing ones leave the catalogue. After Ctrl-C or any other end, the
+same command resumes where it stopped. Import foreign files first: `engine-mount import`.
 """
-_REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with the reason why
-not; 1 when one could not be fetched, or the order was refused.
+_REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with a reason; 1
+when one could not be fetched, or the order was refused.
 
 Examples:
 
@@ -57,8 +57,8 @@ Examples:
 
 `engine-mount fleet replay drives --set highest_current=2.0 --closed-loop --out moved` - and the motion?
 
-Recordings are told as replayed, with another policy (which does not have a changed parameter), or failed. An
-interrupted run goes on with the same command. The table is result.parquet in the folder of the result;
+The outcome of a recording is replayed, another policy (which does not have a changed parameter), or failed.
+The same command resumes an interrupted run. The table is result.parquet in the folder of the result;
 setpoints are compared for the recorded displacement, with --closed-loop the displacement is simulated anew.
 """
 
@@ -74,7 +74,7 @@ def index(
     workers: Workers = 0,
     json_file: JsonFile = None,
 ) -> None:
-    """Write what each recording is and holds into a catalogue: a row for it, and one for each event."""
+    """Write the content of each recording into a catalogue: a row for it, and one for each event."""
     from time import monotonic
 
     from engine_mount.cli.screen import TerminalScreen
@@ -164,7 +164,7 @@ def _note_question(screen: 'TerminalScreen', what: str, folder: Path, rows: str)
     screen.note(f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')
 
 
-_QUERY_EPILOG = """Exit code: 0 when the question is answered, 1 with the reason when not.
+_QUERY_EPILOG = """Exit code: 0 when the query has a result, 1 with the reason when not.
 
 Examples:
 
@@ -175,10 +175,10 @@ Examples:
 `engine-mount fleet query result "select recording from result where switchings_vanished > 0" --json`
 
 Tables are `recordings` and `events` of a catalogue, `result` of a replay; their columns stand in
-docs/reference/fleet_columns.md, and `describe result` lists them. A question is one SELECT: it writes
-nothing, and reads these tables and no other file.
+docs/reference/fleet_columns.md, and `describe result` lists them. A query is one SELECT: it writes nothing,
+and reads these tables and no other file.
 """
-_WORST_EPILOG = """Exit code: 0 when the column is there, 1 with the reason when not.
+_WORST_EPILOG = """Exit code: 0 when the column exists, 1 with the reason when not.
 
 Examples:
 
@@ -188,8 +188,8 @@ Examples:
 
 `engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
-_REPORT_EPILOG = """Exit code: 0 when the page is written, also where a recording could not be read again for
-its picture, which the page says; 1 when there is no result, or the page cannot be written.
+_REPORT_EPILOG = """Exit code: 0 when the page is written, also when a recording could not be read again for
+its picture, which the page reports; 1 when there is no result, or the page cannot be written.
 
 Examples:
 
@@ -208,7 +208,7 @@ Examples:
 
 `engine-mount fleet example --out long --recordings 8 --seconds 600` - longer ones
 
-Ten drives in twenty variations (parameters, mounts, pieces); six are damaged, each in its own way. The same
+Ten drives in twenty variations (parameters, mounts, pieces); five are damaged, each in its own way. The same
 order makes the same bytes each time.
 """
 
@@ -219,11 +219,11 @@ _NUMBERS = ('int', 'uint', 'float', 'double', 'decimal')
 def query(
     folder: Annotated[Path, argument('catalogue or result', 'FOLDER')],
     sql: Annotated[str, argument('one SELECT', 'SQL')],
-    csv: Annotated[bool, flag('--csv', 'print the answer as CSV')] = False,
-    as_json: Annotated[bool, flag('--json', 'print the answer as JSON: a list of rows')] = False,
-    time_limit: Annotated[float, option('a question that takes longer is refused', 'S', least=0.1)] = 60.0,
+    csv: Annotated[bool, flag('--csv', 'print the result as CSV')] = False,
+    as_json: Annotated[bool, flag('--json', 'print the result as JSON: a list of rows')] = False,
+    time_limit: Annotated[float, option('a query that takes longer is refused', 'S', least=0.1)] = 60.0,
 ) -> None:
-    """Ask a catalogue or a result a question in SQL."""
+    """Query a catalogue or a result in SQL."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import query
 
@@ -262,12 +262,10 @@ def worst(
 def report(
     result: Annotated[Path, argument('folder of fleet replay', 'RESULT')],
     out: Annotated[Path | None, option('the page; default: report.html in RESULT', 'FILE')] = None,
-    by: Annotated[
-        str, option('by which the worst are chosen; default: the largest difference', 'COLUMN')
-    ] = '',
+    by: Annotated[str, option('column that ranks the worst; default: the largest difference', 'COLUMN')] = '',
     count: Annotated[int, option('recordings with a picture of their own', least=0)] = 10,
 ) -> None:
-    """Write one page: how figures are spread before and after the change, the worst, what failed and why.
+    """Write one page: figures before and after the change, the worst recordings, failures with reasons.
 
     The recordings with pictures are read once more. The page needs no network.
     """
@@ -286,13 +284,13 @@ def report(
 @app.command(cls=Command, epilog=_EXAMPLE_EPILOG)
 def example(
     out: Annotated[Path, option('folder to create', 'FOLDER')],
-    recordings: Annotated[int, option('how many of the fleet, spread over it')] = 200,
+    recordings: Annotated[int, option('number of recordings, spread over the fleet')] = 200,
     seconds: Annotated[
         float, option('length of the excitation of each drive, a sweep at most its own', 'S')
     ] = 4.0,
     workers: Workers = 0,
 ) -> None:
-    """Make recordings of short simulated drives, a few of them damaged, to try a fleet on."""
+    """Make recordings of short simulated drives, a few of them damaged, as examples of a fleet."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.example import make_example
 

@@ -28,13 +28,13 @@ EPILOG = (
 `engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
 --name left --out left.yaml` - into the specimen file that init and control load
 
-`engine-mount identify friction --file a.json b.json c.json` - trained on each, tried on each other one
+`engine-mount identify friction --file a.json b.json c.json` - trained on each, predicting each other one
 
 `engine-mount identify friction --train rig.mat --column friction_force=cell:lbf --step ladder` - any format
 
 `engine-mount identify friction --train rig.blf --dbc rig.dbc --step ladder` - or of a CAN log
 
-`engine-mount identify friction --train a.mf4 --held-out b.mf4 --map-file rig_2.yaml` - what a team agreed on
+`engine-mount identify friction --train a.mf4 --held-out b.mf4 --map-file rig_2.yaml` - the mapping of a team
 """
 )
 
@@ -50,7 +50,7 @@ def friction(
         list[str] | None, option('recordings to fit: files of any format, recordings, URIs', 'FILE...')
     ] = None,
     held_out: Annotated[
-        list[str] | None, option('recordings that no fit sees, to judge by', 'FILE...')
+        list[str] | None, option('recordings that no fit uses, for judgement', 'FILE...')
     ] = None,
     file: Annotated[list[str] | None, option('train on each, predict each other one', 'FILE...')] = None,
     step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
@@ -84,7 +84,7 @@ def friction(
     out: Out = None,
     figure: Figure = None,
 ) -> None:
-    """Identify the friction contact, and which law is worth its parameters.
+    """Identify the friction contact, and compare friction laws.
 
     Ramp-and-hold recordings give its springs and damper, sawtooths the coefficient of friction; every law of
     the ladder is fitted to the same strokes. Judge by the held-out error: rms error over rms force.

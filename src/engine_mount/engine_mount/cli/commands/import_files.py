@@ -21,19 +21,19 @@ from engine_mount.cli.fetching import local
 
 EPILOG = """Exit code: 0 when the recording is written, 1 when the file was refused, with the reason.
 
-A column that is named without a unit must tell it in its header. Quantities are displacement,
+A column that is named without a unit needs one in its header. Quantities are displacement,
 engine_displacement, chassis_displacement, acceleration, force, current and others; a wrong one lists them.
 
 Examples:
 
 `engine-mount import drive.mf4 --column acceleration=az:g --out bags/drive`
 
-`engine-mount import rack.csv --map-file rack_2.yaml --out bags/rack` - what a team agreed on
+`engine-mount import rack.csv --map-file rack_2.yaml --out bags/rack` - the mapping of a team
 
 `engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
-Of several files each is imported; `rosbags-convert --src A B --dst C --dst-storage mcap` joins what
-they became, and `engine-mount cut` takes a part.
+Import several files one by one; `rosbags-convert --src A B --dst C --dst-storage mcap` joins their
+recordings, and `engine-mount cut` takes a part.
 """
 
 
@@ -52,10 +52,10 @@ def import_file(
     delimiter: Delimiter = '',
     json_file: JsonFile = None,
 ) -> None:
-    """Make a recording of a foreign file, in SI units, with a session that tells its origin.
+    """Make a recording of a foreign file, in SI units, with its origin in the session.
 
-    The displacement and the acceleration of the chassis are brought to 1 kHz; other quantities stay as they
-    were sampled. A gap of more than 0.125 s parts the recording.
+    Displacement and acceleration of the chassis are resampled at 1 kHz; other quantities keep their samples.
+    A gap of more than 0.125 s splits the recording.
     """
     from engine_mount import import_file as run_import
     from engine_mount.cli.screen import TerminalScreen

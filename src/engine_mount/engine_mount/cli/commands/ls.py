@@ -14,8 +14,8 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local, named
 
-EPILOG = """Exit code: 0, also where a recording is damaged, which its line tells; 1 when a folder is
-not there.
+EPILOG = """Exit code: 0, also when a recording is damaged, which its line shows; 1 when a folder does not
+exist.
 
 Examples:
 
@@ -23,11 +23,11 @@ Examples:
 
 `engine-mount ls bags /data/drives --json recordings.json` - of several folders
 
-The verdict is that of the run's summary: what `drive` printed. A recording without one is `whole` when
-nothing of its files is missing; `engine-mount audit` tells more.
+The verdict is that of the run's summary, as `drive` printed it. A recording without a summary is `whole`
+when nothing of its files is missing; `engine-mount audit` checks further.
 """
 
-INFO_EPILOG = """Exit code: 0 when the recording could be read, whatever it holds; 1 when not.
+INFO_EPILOG = """Exit code: 0 when the recording could be read, with any content; 1 when not.
 
 Examples:
 
@@ -37,8 +37,8 @@ Examples:
 
 `engine-mount info MEASURED.mf4` - of a foreign file: its columns with units, rates and ranges
 
-Parameters that a run sets by itself (bus, folder, lock-step) are left out. Whether a loss is an error is told
-by the exit code of `engine-mount audit`.
+Parameters that a run sets by itself (bus, folder, lock-step) are left out. The exit code of `engine-mount
+audit` shows whether a loss is an error.
 """
 
 
@@ -49,7 +49,7 @@ def ls(
     ] = None,
     json_file: JsonFile = None,
 ) -> None:
-    """List recordings: when, how long, what was driven, and whether anything was lost or went wrong."""
+    """List recordings with date, length, scenario, losses and faults."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.listing import list_recordings
     from engine_mount.signals.sources.uris import is_local, local_path
@@ -83,7 +83,7 @@ def info(
     delimiter: Delimiter = '',
     json_file: JsonFile = None,
 ) -> None:
-    """Tell what a recording is and holds: session, versions, parameters, topics, gap, losses.
+    """Print the content of a recording: session, versions, parameters, topics, gap, losses.
 
     Of a foreign file, its columns.
     """

@@ -91,7 +91,7 @@ JsonFile = Annotated[
 ]
 Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE', panel=OUTPUT)]
 Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE', panel=OUTPUT)]
-Listing = Annotated[bool, flag('--list', 'tell which there are')]
+Listing = Annotated[bool, flag('--list', 'list all names')]
 Split = Annotated[str, option('largest file, such as 500MB; default: one file', 'SIZE', panel=OUTPUT)]
 Settings = Annotated[
     list[str] | None,
@@ -125,13 +125,13 @@ TimeColumn = Annotated[
 Rate = Annotated[float | None, option('foreign file without times: samples per second', 'HZ')]
 MapFile = Annotated[
     Path | None,
-    option('foreign file: YAML file that says columns, units and times of a measuring system', 'FILE'),
+    option('foreign file: YAML file with columns, units and times of a measuring system', 'FILE'),
 ]
 Dbc = Annotated[Path | None, option('foreign file: database that decodes raw CAN frames', 'FILE')]
 Decimal = Annotated[str, option('foreign file: decimal sign of a table that can be read in two ways', 'SIGN')]
 Delimiter = Annotated[
     str,
-    option('foreign file: what separates the cells of such a table, as ";", tab or blank', 'SIGN'),
+    option('foreign file: delimiter of the cells of such a table, as ";", tab or blank', 'SIGN'),
 ]
 Scale = Annotated[
     float | None,

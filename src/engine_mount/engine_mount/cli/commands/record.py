@@ -27,7 +27,7 @@ Examples:
 
 `engine-mount record displacement control_trace --split 500MB --out bags/long`
 
-In a terminal a line tells messages per second, size, lost messages and marks. The topic `event`, which
+In a terminal a line shows messages per second, size, lost messages and marks. The topic `event`, which
 holds the marks, is always recorded. Times are those of the wall clock.
 """
 
@@ -42,7 +42,7 @@ def record(
     on_full: Annotated[
         str,
         option(
-            'full disk: stop, or continue without recording until the end is asked for',
+            'full disk: stop, or continue without recording until the end is requested',
             'WORD',
             named('on_full'),
         ),

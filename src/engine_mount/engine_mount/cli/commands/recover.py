@@ -20,8 +20,8 @@ Examples:
 
 `engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
 
-All chunks whose checksum holds are kept, with topics, times, session, metadata and what the
-recorder says of its own losses. A last chunk that was cut off is lost. The original is not touched.
+All chunks whose checksum holds are kept, with topics, times, session, metadata and the recorder's report of
+its own losses. A last chunk that was cut off is lost. The original is not touched.
 """
 
 
@@ -32,7 +32,7 @@ def recover(
         option('folder of the new recording; default: beside it, of a URI here, `..._recovered`'),
     ] = None,
 ) -> None:
-    """Make a sound recording of what a crash or a bad disk left; say how much is kept and lost."""
+    """Make a sound recording after a crash or from a bad disk; print kept and lost data."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.edit import recover as recovered
     from engine_mount.recordings.recording import recording_place

@@ -18,18 +18,18 @@ from engine_mount.cli.commands.options import (
 from engine_mount.cli.fetching import local
 from engine_mount.cli.help import named
 
-EPILOG = """Exit code: 0 when the setpoints are those recorded, or something was changed on purpose; 1 when
-they are not, or the order was refused.
+EPILOG = """Exit code: 0 when the setpoints equal the recorded ones, or a change was requested; 1 when they
+differ, or the order was refused.
 
 Examples:
 
-`engine-mount replay bags/first/recording` - equal to what was recorded?
+`engine-mount replay bags/first/recording` - equal to the recorded setpoints?
 
 `engine-mount replay RECORDING --lockstep` - the same through the real node over topics
 
 `engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
 
-A displacement that another system recorded becomes a recording first: `engine-mount import`.
+Import a displacement of another system first: `engine-mount import`.
 """
 
 
@@ -43,12 +43,12 @@ def replay(
     table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[str, option('which of several mounts, such as left', 'NAME', named('place'))] = '',
+    mount: Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))] = '',
     domain: Domain = None,
 ) -> None:
-    """Replay a recorded displacement through the same controller and tell whether its answers are the same.
+    """Replay a recorded displacement through the same controller and compare the answers with the recording.
 
-    Equal is to the last bit; parameters and tables can be other than recorded.
+    Answers are compared to the last bit; parameters and tables can differ from the recorded ones.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.inputs.input import DEFAULT_TABLE

@@ -14,7 +14,7 @@ Examples:
 
 `engine-mount report bags/first` - beside the recording, in its run folder
 
-`engine-mount report bags/first --compare bags/second --out difference.html` - and what is different
+`engine-mount report bags/first --compare bags/second --out difference.html` - with the differences
 
 `engine-mount report drive_1 drive_2 drive_3 --out three.html --png pictures` - in the same charts
 """
@@ -24,7 +24,7 @@ def report(
     recordings: RecordingPlaces,
     other: Annotated[
         str | None,
-        option('draw this one too and tell how it differs from the first', 'OTHER', offered, '--compare'),
+        option('draw this recording too, with its differences from the first', 'OTHER', offered, '--compare'),
     ] = None,
     out: Annotated[
         Path | None, option('the page; default: report.html in or beside the run, of a URI here', 'FILE')
@@ -36,7 +36,7 @@ def report(
 ) -> None:
     """Write one HTML page that works without network, and its charts as PNG.
 
-    Several recordings share the charts. What a recording lacks stands in the page in words.
+    Several recordings share the charts. The page names the missing parts of a recording.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.report import default_page, default_pictures

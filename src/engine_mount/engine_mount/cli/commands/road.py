@@ -48,9 +48,9 @@ def show(
     speed: SpeedText = '',
     figure: Figure = None,
 ) -> None:
-    """Tell what a measured road is: length, class and waviness by ISO 8608.
+    """Print length, class and waviness (ISO 8608) of a measured road.
 
-    With `--speed` also which frequencies it holds at that speed.
+    With `--speed` also its frequencies at that speed.
     """
     from engine_mount import road
     from engine_mount.cli.screen import TerminalScreen
@@ -80,8 +80,8 @@ def invert(
 ) -> None:
     """Make the road that gives the vehicle's chassis a recorded acceleration, from 0.9 to 50 Hz.
 
-    So a recorded drive can be driven again, with feedback, by other policies and mounts. What one
-    acceleration cannot tell is said here and in the file.
+    So other policies and mounts can repeat a recorded drive, with feedback. The command and the file list
+    the limits of one acceleration.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping, with_options

@@ -15,7 +15,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local
 
-EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to look at or a port is taken, with the reason.
+EPILOG = """Exit code: 0 after Ctrl-C; 1 when there is nothing to show or a port is taken, with the reason.
 
 Examples:
 
@@ -23,13 +23,13 @@ Examples:
 
 `engine-mount view bags/first --rate 0.2` - a recording, five times slower
 
-`engine-mount view --host 0.0.0.0` - from a phone in the same network: with the token that is printed
+`engine-mount view --host 0.0.0.0` - from a phone in the same network, with the printed token
 
-The page shows beside the mount that is driven what the hydromount and the mount without damping would do
-on the same acceleration of the chassis. It needs nothing from the internet.
+Beside the driven mount, the page shows the motion of the hydromount and of the mount without damping on the
+same acceleration of the chassis. The page needs no internet.
 """
 
-STATUS_EPILOG = """Exit code: 0; 1 with `--once` when no node of the graph tells anything within 3 s.
+STATUS_EPILOG = """Exit code: 0; 1 with `--once` when no node of the graph reports within 3 s.
 
 Examples:
 
@@ -50,8 +50,8 @@ def view(
         ),
     ] = None,
     rate: Annotated[float, option('recording: speed against the clock')] = 1.0,
-    begin: Annotated[float, option('recording: where to begin', 'S', None, '--from')] = 0.0,
-    host: Annotated[str, option('address to listen at; other than this machine: by a token')] = '127.0.0.1',
+    begin: Annotated[float, option('recording: start time', 'S', None, '--from')] = 0.0,
+    host: Annotated[str, option('address of the server; beyond this machine: with a token')] = '127.0.0.1',
     port: Annotated[int, option('of the page')] = 8137,
     foxglove_port: Annotated[int, option('of the Foxglove server, 0: none')] = 8765,
     beside: Annotated[bool, typer.Option('--beside/--no-beside', help='simulate other mounts beside')] = True,

@@ -28,7 +28,7 @@ NAMES = {
     'bench': ('Friction mount and hydromount on a test rack', 'Fig. 13'),
     'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
     'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
-    'sensitivity': ('What the comparison with the hydromount depends on', 'Figs. 13, 14'),
+    'sensitivity': ('Influences on the comparison with the hydromount', 'Figs. 13, 14'),
     'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 6, 7'),
     'recorded_drive': ('A recorded drive', 'Sec. 7'),
 }
@@ -191,12 +191,12 @@ class Outcome(NamedTuple):
             return self.pages[0].read_text(encoding='utf-8')
         pictures = ''.join(f'![{known.title}](figures/{each.name})\n\n' for each in self.pictures)
         rows = [(each.reference, each.paper, each.found, each.holds.value) for each in self.claims]
-        pages = ''.join(f'\nAll of it: [{each.name}]({each.name})\n' for each in self.pages)
+        pages = ''.join(f'\nThe whole page: [{each.name}]({each.name})\n' for each in self.pages)
         return f"""## {known.name}
 
 **{known.title}**, {known.reference}. {in_one_line(known.summary)}
 
-{pictures}{table(('paper', 'says', 'here', 'holds'), rows)}{pages}
+{pictures}{table(('paper', 'statement', 'here', 'holds'), rows)}{pages}
 `engine-mount experiment {known.name}`
 """
 
