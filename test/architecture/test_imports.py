@@ -89,9 +89,8 @@ def test_no_node_loads_what_only_files_of_others_need():
 
 
 def test_the_front_door_of_foreign_files_loads_the_reader_of_recordings_only_for_one():
-    tell = 'import sys, engine_mount.signals.formats.reading; print(*sys.modules)'
-    loaded = subprocess.run([sys.executable, '-c', tell], capture_output=True, text=True, check=True).stdout
-    assert not {'engine_mount.recordings', 'pydantic', 'rosbags', 'yaml'} & set(loaded.split())
+    loaded = modules_after('import engine_mount.signals.formats.reading')
+    assert not {'engine_mount.recordings', 'pydantic', 'rosbags', 'yaml'} & loaded
 
 
 def test_python_can_is_loaded_in_one_place():
