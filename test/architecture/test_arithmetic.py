@@ -14,7 +14,7 @@ import pytest
 
 ROOTS = (
     'mount_driver.node', 'mount_init.node', 'mount_control.node', 'mount_sim.node',
-    'engine_mount.drives.loop.recording', 'engine_mount.drives.replay', 'engine_mount.drives.lockstep',
+    'engine_mount.drives.loop.recording', 'engine_mount.drives.replay',
 )  # fmt: skip
 JUDGES = {'engine_mount.drives.agreement', 'engine_mount.reports.drive.evaluation'}
 """Modules that judge answers when they are there; what they alone need makes no number of a run."""

@@ -99,7 +99,7 @@ def test_a_reference_is_met_by_its_replay_and_not_by_another(run, tmp_path):
     reference, replayed = tmp_path / 'references' / 'bench', tmp_path / 'replay'
     words = ('--reference', 'bench', '--folder', reference.parent, '--reason', 'the first')
     command('accept', run(), *words)
-    command('replay', reference, '--core', '--out', replayed)
+    command('replay', reference, '--out', replayed)
     assert differences_from_reference(reference, replayed / 'recording') == []
     told = differences_from_reference(reference, run(*EARLIER) / 'recording')
     assert told[0].startswith('switched on 8 ms earlier in B')

@@ -5,7 +5,7 @@ import pytest
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreChain, MountRun
-from engine_mount.drives.replay import LOCKSTEP, change_notes, replay
+from engine_mount.drives.replay import replay
 from engine_mount.settings.chosen import chosen_control
 from mount_control.controller import ControlLaw
 from mount_recorder.session import session_text
@@ -66,8 +66,6 @@ def test_the_replay_changes_them_at_the_same_samples_to_the_bit(changed_drive):
     assert len(notes) == 3
     assert f'mount_control was told damper = viscous_3500 at {told[0][0] / 1e9:.3f} s' in notes[0]
     assert all(note.endswith('the replay does the same') for note in notes)
-    notes = change_notes(outcome.given, LOCKSTEP)
-    assert all(note.endswith('does not: use core') for note in notes)
 
 
 def test_what_the_replay_is_asked_for_stays_as_asked(changed_drive):

@@ -54,10 +54,9 @@ def test_a_recording_names_the_policy_and_what_it_traced(drives):
     assert 'policy: viscous_example' in recording.latched('session').data
 
 
-@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
 @pytest.mark.parametrize('policy', ['switched_viscous', 'continuous_viscous', 'viscous_example'])
-def test_each_is_replayed_to_the_bit(drives, policy, lockstep):
-    outcome = replay(drives[policy], lockstep=lockstep)
+def test_each_is_replayed_to_the_bit(drives, policy):
+    outcome = replay(drives[policy])
     assert outcome.agreement.equal, outcome.agreement
 
 

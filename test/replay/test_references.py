@@ -13,14 +13,13 @@ from engine_mount.recordings.session import (
 from mount_recorder.versions import versions
 
 
-@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
 @pytest.mark.parametrize('reference', REFERENCES, ids=lambda folder: folder.name)
-def test_the_accepted_setpoints_are_met_to_the_bit(reference, lockstep, domain, tmp_path):
-    outcome = replay(reference, lockstep=lockstep, out=tmp_path / 'replay', domain=domain)
+def test_the_accepted_setpoints_are_met_to_the_bit(reference, tmp_path):
+    outcome = replay(reference, out=tmp_path / 'replay')
     told = differences_from_reference(reference, outcome.recording)
     assert not told, '\n'.join(
         [
-            f'{reference.name}, {outcome.mode}:',
+            f'{reference.name}:',
             *told,
             versions_sentence(version_differences(outcome.given.session, versions()), versions()),
             f'if this is meant: engine-mount accept REPLAY --reference {reference.name} --reason "..."',

@@ -30,9 +30,8 @@ def warm_drive(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize('lockstep', [False, True], ids=['core', 'lock-step'])
-def test_a_replayed_initialisation_finds_its_gaps_to_the_bit(warm_drive, lockstep, domain, tmp_path):
-    outcome = replay(warm_drive, lockstep=lockstep, out=tmp_path / 'replay', domain=domain)
+def test_a_replayed_initialisation_finds_its_gaps_to_the_bit(warm_drive, tmp_path):
+    outcome = replay(warm_drive, out=tmp_path / 'replay')
     assert outcome.held
     (ramp,) = outcome.replayed.ramps
     (recorded,) = measured_gaps(engine_mount.open(warm_drive))

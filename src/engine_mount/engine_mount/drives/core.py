@@ -1,7 +1,7 @@
 """Replay without middleware: recorded samples through the same cores as in the nodes, as function calls."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from engine_mount.drives.inputs.consumed_samples import (
     Column,
-    ControlRun,
     MeasuredGap,
     Ramp,
     ReplayError,
@@ -27,8 +26,6 @@ from mount_ros.messages.event import ParametersChanged
 from mount_ros.messages.force_table import ForceTable
 
 OFF = 0.0  # A
-
-Progress = Callable[[float], None]
 
 
 @dataclass
@@ -78,12 +75,11 @@ class Replayed:
         return [part for part in self.parts if isinstance(part, RampAnswers)]
 
 
-def replay_parts(
-    given: ReplayInput,
-    parameters: Parameters,
-    play_run: Callable[[ControlRun, MeasuredGap], ControlAnswers],
-) -> Replayed:
-    """Replay all parts; a run begins with the gap that the replayed initialisation before it has measured."""
+def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
+    """Replay all parts with these parameters of the nodes; raises a `ValueError` where one is refused.
+
+    A run begins with the gap that the replayed initialisation before it has measured.
+    """
     replayed = Replayed()
     measured: MeasuredGap | None = None
     for part in given.parts:
@@ -94,20 +90,11 @@ def replay_parts(
             continue
         gap = measured if measured is not None and measured.stamp == part.gap.stamp else part.gap
         begin = time.perf_counter()
-        replayed.parts.append(play_run(part, gap))
+        replay = ControlReplay(int(part.stamps[0]), gap, parameters, given.changes)
+        replayed.parts.append(replay.answer(part.stamps, part.displacement))
         replayed.control_time += time.perf_counter() - begin
         replayed.gaps.append(gap)
     return replayed
-
-
-def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
-    """Replay all parts with these parameters of the nodes; raises a `ValueError` where one is refused."""
-
-    def play_run(run: ControlRun, gap: MeasuredGap) -> ControlAnswers:
-        replay = ControlReplay(int(run.stamps[0]), gap, parameters, given.changes)
-        return replay.answer(run.stamps, run.displacement)
-
-    return replay_parts(given, parameters, play_run)
 
 
 def run_ramp(ramp: Ramp, parameters: Parameters) -> RampAnswers:

@@ -21,7 +21,7 @@ from engine_mount.drives.agreement import (
     switching_changes,
     switching_text,
 )
-from engine_mount.drives.core import Progress, Replayed, replay_in_core
+from engine_mount.drives.core import Replayed, replay_in_core
 from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import DEFAULT_TABLE, ReplayInput, chosen_gap, replay_input, without
 from engine_mount.drives.output import write_replay
@@ -45,7 +45,6 @@ from engine_mount.settings.chosen import (
 from engine_mount.settings.options import owned
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.channels import SCENARIO
-from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_control.controller import load_compiled_law
 from mount_init.parameters import InitParameters
@@ -55,7 +54,7 @@ from mount_models.quantity import ParameterError, with_flattened
 from mount_recorder.session import time_text
 from mount_recorder.versions import versions
 
-CORE, LOCKSTEP = 'core', 'lock-step'
+CORE = 'core'
 REPLAYED_NODES = ('mount_control', 'mount_init')
 
 
@@ -67,7 +66,6 @@ class Replay:
     the nodes; `folder` is where it was written.
     """
 
-    mode: str
     changes: Parameters
     table: str
     given: ReplayInput
@@ -100,7 +98,7 @@ class Replay:
         return {
             'source': given.source,
             'recording': str(self.recording) if self.folder else None,
-            'mode': self.mode,
+            'mode': CORE,
             'changed': {node: dict(values) for node, values in self.changes.items()},
             'samples': self.samples,
             'duration_s': duration,
@@ -182,22 +180,18 @@ def replay(
     recording: str | os.PathLike[str],
     changes: Mapping[str, Any] | None = None,
     *,
-    lockstep: bool = False,
     table: str = '',
     mount: str = '',
     out: str | os.PathLike[str] | None = None,
-    domain: int | None = None,
-    progress: Progress = lambda share: None,
 ) -> Replay:
     """Replay a recording or run and compare its answers with those recorded, to the bit.
 
     `changes` are parameters other than recorded, {`name` or `node.name`: value} or {node: {name: value}}, a
     name alone one of mount_control. `table` is `default` or a recording whose force table is used,
     `mount` which of several is replayed. With a folder `out` the replay is written as a recording that can be
-    replayed again. In lock-step the real nodes answer over topics of `domain`. Raises a `ValueError` with the
-    reason.
+    replayed again. Raises a `ValueError` with the reason.
     """
-    changed, mode = parsed_changes(changes or {}), LOCKSTEP if lockstep else CORE
+    changed = parsed_changes(changes or {})
     given = _recorded_input(open_mount(Path(recording), mount), table)
     refuse_other_rate(given.parameters, changed)
     if 'mount_init' in changed and len(given.controls) == len(given.parts):
@@ -205,17 +199,12 @@ def replay(
     parameters = with_changes(given.parameters, changed)
     check_parameters(parameters)
     given.changes = without(given.changes, changed.get('mount_control', {}))
-    given.notes += change_notes(given, mode)
-    if lockstep:
-        from engine_mount.drives.lockstep import replay_in_lockstep  # loads the middleware
-
-        replayed = replay_in_lockstep(given, parameters, chosen_domain(domain), progress)
-    else:
-        load_compiled_law(chosen_control(parameters))  # once in a process, not to be counted
-        chosen_specimen(parameters)
-        replayed = replay_in_core(given, parameters)
+    given.notes += change_notes(given)
+    load_compiled_law(chosen_control(parameters))  # once in a process, not to be counted
+    chosen_specimen(parameters)
+    replayed = replay_in_core(given, parameters)
     found = agreement(given, replayed)
-    result = Replay(mode, changed, table, given, parameters, replayed, found)
+    result = Replay(changed, table, given, parameters, replayed, found)
     if out is not None:
         result.folder = make_run_folder(Path(out), '')
         result.folder.logs.rmdir()
@@ -283,11 +272,11 @@ def with_changes(recorded: Parameters, changes: Parameters) -> dict[str, dict[st
     return {node: {**values, **changes.get(node, {})} for node, values in parameters.items()}
 
 
-def change_notes(given: ReplayInput, mode: str) -> list[str]:
+def change_notes(given: ReplayInput) -> list[str]:
     """Return a sentence for each change of parameters while the recording ran."""
-    done = 'the replay does the same' if mode == CORE else 'a replay in lock-step does not: use core'
     return [
-        f'{change.node} was told {name} = {value} at {(change.time - given.zero) / 1e9:.3f} s; {done}'
+        f'{change.node} was told {name} = {value} at {(change.time - given.zero) / 1e9:.3f} s; '
+        'the replay does the same'
         for change in given.changes
         for name, value in change.values.items()
     ]
@@ -316,7 +305,7 @@ def _session(done: Replay) -> dict[str, Any]:
         'parameters': {**session_parameters(given.session), **own},
         'replay': {
             'of': given.source,
-            'mode': done.mode,
+            'mode': CORE,
             'made': time_text(),
             'changed': {node: dict(values) for node, values in done.changes.items()},
             'table': done.table and Path(done.table).name,

@@ -56,7 +56,6 @@ def test_what_is_not_there_is_named_as_it_was_given(name, tmp_path, monkeypatch)
         ('drive --core --road a --file b', 'leave out --file'),
         ('drive --core --road a', '--road needs a speed'),
         ('drive --core --road a --speed 20 --column b --column c', '--column is given once for a road'),
-        ('replay a --core --lockstep', 'choose --core or --lockstep, not both'),
         ('fleet replay a --out b', 'say what is to be other than recorded: --set NAME=VALUE'),
         ('fleet query a b --csv --json', 'choose --csv or --json, not both'),
         ('cut a', 'give --from and --to (or one of them), or --event'),

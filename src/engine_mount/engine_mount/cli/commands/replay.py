@@ -5,13 +5,11 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import (
-    Domain,
     JsonFile,
     NewFolder,
     RecordingPlace,
     Settings,
     changes_of,
-    flag,
     option,
     write_figures,
 )
@@ -25,8 +23,6 @@ Examples:
 
 `engine-mount replay bags/first/recording` - equal to the recorded setpoints?
 
-`engine-mount replay RECORDING --lockstep` - the same through the real node over topics
-
 `engine-mount replay RECORDING --set switch_on_level=0.0006 --set damper=viscous_3000` - what if?
 
 Import a displacement of another system first: `engine-mount import`.
@@ -35,16 +31,11 @@ Import a displacement of another system first: `engine-mount import`.
 
 def replay(
     recording: RecordingPlace,
-    core: Annotated[bool, flag('--core', 'through the controller as function calls; the default')] = False,
-    lockstep: Annotated[
-        bool, flag('--lockstep', 'control through its real node over topics, sample by sample')
-    ] = False,
     settings: Settings = None,
     table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
     mount: Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))] = '',
-    domain: Domain = None,
 ) -> None:
     """Replay a recorded displacement through the same controller and compare the answers with the recording.
 
@@ -56,20 +47,14 @@ def replay(
     from engine_mount.recordings.screen import Table
     from engine_mount.settings.run_folder import new_place
 
-    if core and lockstep:
-        raise typer.BadParameter('choose --core or --lockstep, not both')
     screen, changes = TerminalScreen(), changes_of(settings)
-    mode = 'lock-step' if lockstep else 'core'
     place = local(recording, screen)
     if table not in ('', DEFAULT_TABLE):
         table = str(local(table, screen))
-    with screen.bar(f'replaying ({mode})', transient=True) as show:
-        replayed = run_replay(
-            place, changes, lockstep=lockstep, table=table, mount=mount,
-            out=out or new_place(f'replay_{mode}'), domain=domain, progress=show,
-        )  # fmt: skip
+    with screen.console.status('replaying'):
+        replayed = run_replay(place, changes, table=table, mount=mount, out=out or new_place('replay'))
     figures = replayed.figures
-    screen.table(Table(f'replay of {figures["source"]}, {mode}', 'll', replayed.rows()))
+    screen.table(Table(f'replay of {figures["source"]}', 'll', replayed.rows()))
     for sentence in figures['notes']:
         screen.note(sentence)
     assert replayed.folder is not None
