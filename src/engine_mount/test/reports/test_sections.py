@@ -122,7 +122,6 @@ def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy_and_their_d
     above, below = motion.traces([a, b]).chart.panels
     assert [curve.y[0] for curve in above.curves] == pytest.approx([0.0, 1.0])
     assert [level.value for level in above.levels] == pytest.approx([0.8, 0.35])
-    assert all(level.both for level in above.levels)
     (curve,) = below.curves
     assert curve.y[:-1] == pytest.approx(1.0)
     assert np.isnan(curve.y[-1])  # behind the end of A
