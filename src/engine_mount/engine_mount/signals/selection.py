@@ -61,9 +61,7 @@ def select(
     the number of the row takes the place of the time. Raises `SignalError` with file, column, value, guess
     and remedy, or `SourceError`.
     """
-    mapping = choices
-    if not isinstance(mapping, Mapping):
-        mapping = with_options(Mapping(), [f'{name}={text}' for name, text in mapping.items()], known=known)
+    mapping = _mapping(choices, known)
     if not mapping.choices:
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
@@ -112,7 +110,7 @@ def select(
 
 def select_rows(
     source: str | Path | Measured,
-    mapping: Mapping,
+    choices: Mapping | Keys[str, str],
     known: Quantities,
     needed: Collection[str],
     *,
@@ -125,7 +123,7 @@ def select_rows(
     own are brought to those of the first by straight lines, as long as all of them last. Raises
     `SignalError` or `SourceError`.
     """
-    mapping = mapping.of(known)
+    mapping = _mapping(choices, known).of(known)
     there = source.headings if isinstance(source, Measured) else headings(source, mapping.stated)
     chosen = {name: mapping.columns.get(name) or _by_title(there, one) for name, one in known.items()}
     mapping = mapping.only({name: one for name, one in chosen.items() if one})
@@ -144,6 +142,12 @@ def select_rows(
     rows = {'time': first.times} if timed else {}
     rows |= {name: _at_times_of(first, signal, inside) for name, signal in signals.items()}
     return {name: values[inside] for name, values in rows.items()}
+
+
+def _mapping(choices: Mapping | Keys[str, str], known: Quantities) -> Mapping:
+    if isinstance(choices, Mapping):
+        return choices
+    return with_options(Mapping(), [f'{name}={text}' for name, text in choices.items()], known=known)
 
 
 def _read(source: str | Path, mapping: Mapping, *, timed: bool) -> Measured:

@@ -8,7 +8,7 @@ from command_line import command
 
 from engine_mount.identification.fitting import IdentificationError
 from engine_mount.identification.rack import FileValues, read_force, read_ripple
-from engine_mount.signals.mapping import ColumnChoice, Mapping
+from engine_mount.signals.mapping import Mapping
 from engine_mount.signals.signal import SignalError
 from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate
@@ -97,7 +97,7 @@ def test_a_recording_without_what_is_needed_is_refused(tmp_path):
         read_ripple([bag], Mapping(), NOTHING, AREA)
     given = FileValues({bag: 349e-6}, {})
     with pytest.raises(SignalError, match=r"has no column 'sim/mount_force.wrench.force.z'"):
-        read_force([bag], Mapping({'force': ColumnChoice('sim/mount_force.wrench.force.z')}), given)
+        read_force([bag], {'force': 'sim/mount_force.wrench.force.z'}, given)
 
 
 @pytest.mark.parametrize(
