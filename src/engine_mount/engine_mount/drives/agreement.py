@@ -24,8 +24,6 @@ from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, Topic
 # band-pass forgets by e^-25 in 1 s, the friction deflection slowly; measured after 3 s: within 0.06 uA.
 SETTLING = 3.0  # s, chosen
 SETTLED = 1e-6  # A, chosen
-SHOWN = 8
-"""Switchings that a summary names one by one."""
 _ACTIVE = 'damping_active'
 _NAMES = ('the recording', 'the replay')
 
@@ -135,16 +133,6 @@ def switching_changes(recorded: Switching, replayed: Switching, sample_time: flo
     a, b = ((np.array(times.on), np.array(times.off)) for times in (recorded, replayed))
     changes = paired_switchings(a, b, sample_time)
     return [change.sentence(*_NAMES) for change in changes if change.alone or change.moved]
-
-
-def switching_text(times: Switching) -> str:
-    """Return when damping was switched, in words."""
-    if not times.on:
-        return 'never on'
-    pairs = [(on, next((off for off in times.off if off > on), None)) for on in times.on]
-    shown = [f'{on:.3f} s to {f"{off:.3f} s" if off is not None else "the end"}' for on, off in pairs]
-    more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
-    return 'on from ' + ', '.join(shown[:SHOWN]) + more
 
 
 def moment_figures(moment: Moment | None) -> dict[str, float | None] | None:

@@ -1,4 +1,4 @@
-"""A recorded displacement once more through the same controller, in core or through the real nodes."""
+"""A recorded displacement once more through the same controller, as function calls."""
 
 import math
 import os
@@ -12,19 +12,18 @@ import numpy as np
 from engine_mount.drives.agreement import (
     SETTLED,
     SETTLING,
-    SHOWN,
     Agreement,
     agreement,
     moment_figures,
     recorded_switching,
     replayed_switching,
     switching_changes,
-    switching_text,
 )
 from engine_mount.drives.core import Replayed, replay_in_core
 from engine_mount.drives.inputs.consumed_samples import ReplayError
 from engine_mount.drives.inputs.input import DEFAULT_TABLE, ReplayInput, chosen_gap, replay_input, without
 from engine_mount.drives.output import write_replay
+from engine_mount.recordings.difference import SHOWN
 from engine_mount.recordings.recording import Recording, open_mount
 from engine_mount.recordings.session import (
     SessionError,
@@ -137,7 +136,7 @@ class Replay:
             ('settings', self._settings()),
             *_named('setpoints', self._verdict()),
             ('versions', versions_sentence(figures['recorded_with'], versions())),
-            ('damping switched', switching_text(replayed_switching(self.given, self.replayed))),
+            ('damping switched', replayed_switching(self.given, self.replayed).sentence()),
         ]
         if figures['recorded_switch_on_s'] is not None:
             changes = figures['switching_changes']

@@ -68,15 +68,12 @@ def compare_motion(recorded: Recorded, changes: Parameters) -> Compared:
     stamps = drives[0].column('stamp')
     time = (stamps - zero) / 1e9
     first, other = (drive.column('displacement') for drive in drives)
-    moved = difference(time, other, first)
     row = {
         'activations': 1,
         **compared_answers(time, zero, [drive.answers for drive in drives], 1.0 / sim.sample_rate),
         **drives[0].motion(),
         **drives[1].motion('_changed'),
-        'displacement_difference_rms_m': moved.rms,
-        'displacement_difference_largest_m': moved.largest,
-        'displacement_difference_largest_at_s': moved.largest_at,
+        **difference('displacement_difference', 'm', time, other, first),
     }
     setpoints = drives[0].answers.setpoints, drives[1].answers.setpoints
     acceleration = drives[0].column('chassis_acceleration')

@@ -142,7 +142,7 @@ def compare_setpoints(recorded: Recorded, changes: Parameters) -> Compared:
     row = {'activations': len(runs), **compared_answers(time, zero, figures, 1.0 / control.sample_rate)}
     if answers is not None:
         kept = [_settled(run.stamps, answers, run.from_its_beginning) for run in runs]
-        row |= _agreement(time, before, np.concatenate(kept), all(run.from_its_beginning for run in runs))
+        row |= _agreement(before, np.concatenate(kept), all(run.from_its_beginning for run in runs))
     return Compared(row, Signals((stamps - zero) * 1e-9, displacement, (before, after)))
 
 
@@ -176,16 +176,16 @@ def _settled(stamps: Times, answers: RecordedAnswers, from_its_beginning: bool) 
     return np.where(stamps - stamps[0] >= round(SETTLING * 1e9), recorded, math.nan)
 
 
-def _agreement(time: Column, replayed: Column, recorded: Column, is_whole: bool) -> dict[str, Any]:
+def _agreement(replayed: Column, recorded: Column, is_whole: bool) -> dict[str, Any]:
     """Return whether the replay without the change is what was recorded, nothing where nothing was.
 
     `is_whole`: the beginnings of all runs are in the recording.
     """
-    found = difference(time, replayed, recorded)
-    if not found.compared:
+    distances = np.abs(replayed - recorded)
+    if np.isnan(distances).all():
         return {}
-    is_same = not found.differing or (not is_whole and abs(found.largest) <= SETTLED)
-    return {'as_recorded': is_same, 'as_recorded_largest_a': abs(found.largest)}
+    largest = float(np.nanmax(distances))
+    return {'as_recorded': largest <= (0.0 if is_whole else SETTLED), 'as_recorded_largest_a': largest}
 
 
 class AnswerFigures:
@@ -252,34 +252,22 @@ class AnswerFigures:
         return np.concatenate(self._columns[name])
 
 
-class Difference(NamedTuple):
-    """How values differ from others: counts, rms, the largest with its sign, and times in s; else NaN."""
+def difference(what: str, unit: str, time: Column, values: Column, others: Column) -> dict[str, float]:
+    """Return how `values` differ from `others`, both (n,) over `time` (s), as columns of `what` in `unit`.
 
-    compared: int
-    differing: int
-    rms: float
-    largest: float
-    largest_at: float
-    first_at: float
-
-
-def difference(time: Column, values: Column, others: Column) -> Difference:
-    """Return how `values` differ from `others`, both (n,) over `time` (s); NaN is compared with nothing."""
+    NaN is compared with nothing; the largest difference has its sign.
+    """
     differences = values - others
     known = ~np.isnan(differences)
     time, differences = time[known], differences[known]
-    compared, places = differences.size, np.flatnonzero(differences)
-    if not compared:
-        return Difference(0, 0, *[math.nan] * 4)
-    largest = int(np.argmax(np.abs(differences)))
-    return Difference(
-        compared,
-        places.size,
-        math.sqrt(ordered_sum(differences * differences) / compared),
-        float(differences[largest]),
-        float(time[largest]) if places.size else math.nan,
-        float(time[places[0]]) if places.size else math.nan,
-    )
+    count, largest = differences.size, int(np.argmax(np.abs(differences))) if known.any() else 0
+    return {
+        f'{what}_rms_{unit}': math.sqrt(ordered_sum(differences * differences) / count)
+        if count
+        else math.nan,
+        f'{what}_largest_{unit}': float(differences[largest]) if count else math.nan,
+        f'{what}_largest_at_s': float(time[largest]) if differences.any() else math.nan,
+    }
 
 
 def compared_answers(
@@ -290,18 +278,16 @@ def compared_answers(
     `time` (s) of their samples counts from the stamp `zero` (ns), `sample_time` in s.
     """
     before, after = answers
-    setpoints = difference(time, after.setpoints, before.setpoints)
+    differing = np.flatnonzero(np.nan_to_num(after.setpoints - before.setpoints))
     on_and_off = [each.switching(zero) for each in answers]
     changes = paired_switchings(*on_and_off, sample_time)
     moved = [change.moved for change in changes if change.moved]
     return {
         'duration_s': time.size * sample_time,
         'samples': time.size,
-        'setpoints_differing': setpoints.differing,
-        'setpoint_difference_rms_a': setpoints.rms,
-        'setpoint_difference_largest_a': setpoints.largest,
-        'setpoint_difference_largest_at_s': setpoints.largest_at,
-        'setpoint_difference_first_at_s': setpoints.first_at,
+        'setpoints_differing': differing.size,
+        **difference('setpoint_difference', 'a', time, after.setpoints, before.setpoints),
+        'setpoint_difference_first_at_s': float(time[differing[0]]) if differing.size else math.nan,
         **before.row(sample_time),
         **after.row(sample_time, '_changed'),
         'switched_on': len(on_and_off[0][0]),

@@ -265,9 +265,9 @@ def few(names: Sequence[str], separator: str) -> str:
     return separator.join(names[:SHOWN]) + more
 
 
-def known(value: float) -> float | None:
+def known(value: float | None) -> float | None:
     """Return a number as JSON knows it: unknown is null."""
-    return value if math.isfinite(value) else None
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 # Numbers with units as people read them: 0.031 A, 12.5 µm, 3.2 ms.

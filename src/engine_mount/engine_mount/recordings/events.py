@@ -1,12 +1,13 @@
 """What happened in a recording: marks, the switching of damping, and what the nodes said of themselves."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.difference import quantity_text, time_text
+from engine_mount.recordings.difference import SHOWN, quantity_text, time_text
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import Series, SeriesError
@@ -129,8 +130,17 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
 class Switching:
     """When damping went on and off, s."""
 
-    on: tuple[float, ...]
-    off: tuple[float, ...]
+    on: Sequence[float]
+    off: Sequence[float]
+
+    def sentence(self, digits: int = 3) -> str:
+        """Return the first `SHOWN` stretches in words, times with so many digits behind the point."""
+        if not self.on:
+            return 'never on'
+        ends = (next((f'{off:.{digits}f} s' for off in self.off if off > on), 'the end') for on in self.on)
+        shown = [f'{on:.{digits}f} s to {end}' for on, end in zip(self.on, ends, strict=True)]
+        more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
+        return f'on from {", ".join(shown[:SHOWN])}{more}'
 
 
 @dataclass(frozen=True)

@@ -1,97 +1,56 @@
-"""A Foxglove WebSocket server: Foxglove or Lichtblick show the topics, with nothing of ROS on their side.
+"""The topics for Foxglove or Lichtblick by Foxglove's own library, with nothing of ROS on their side.
 
-The protocol is that of github.com/foxglove/ws-protocol, as far as a viewer of topics uses it. Messages pass
-as they are, CDR with their `ros2msg` definition.
+Messages pass as they are, CDR with their `ros2msg` definition. The library has no tokens and checks no
+origin, so the server listens on loopback alone and takes no message.
 """
 
-import json
-import struct
 from collections.abc import Mapping
-from typing import Any
 
-from aiohttp import web
+from foxglove import Channel, Context, Schema, start_server
+from foxglove.websocket import Capability
 
-from engine_mount.view.feed import Message
-from engine_mount.view.server import LocalServer, Viewer
+from engine_mount.view.feed import FeedError, Message
+from engine_mount.view.web import LOOPBACK
 from mount_recorder.schemas import schema_text
 from mount_ros.topics import Topic
 
-_MESSAGE = struct.Struct('<BIQ')  # opcode, subscription, ns
-_TIME = struct.Struct('<BQ')  # opcode, ns
-_MESSAGE_OPCODE, _TIME_OPCODE = 1, 2
+_BACKLOG = 8192  # messages of a viewer, chosen: about a second of all topics
 _TIME_STEP = 50_000_000  # ns, chosen: how often viewers receive the time
 
 
-class FoxgloveServer(LocalServer):
-    """Serves the topics of a feed from `start` to `stop`."""
+class FoxgloveServer:
+    """Serves the topics of a feed until `stop`."""
 
-    name = 'Foxglove server'
-    remedy = 'choose another --foxglove-port, or 0 for none'
-    backlog = 8192  # messages, chosen: about a second of all topics
-    protocols = ('foxglove.sdk.v1', 'foxglove.websocket.v1')
-    origins = ('https://app.foxglove.dev', 'file://')
-    """Pages that may connect on loopback: Foxglove in the browser, the programs Foxglove and Lichtblick."""
-
-    def __init__(self, topics: Mapping[str, Topic], host: str, port: int):
-        super().__init__(host, port)
-        self._topics = topics
-        self._numbers = {topic: number for number, topic in enumerate(topics.values(), 1)}
-        self._last_time = 0
-        self.address = f'ws://{host}:{port}/{self.query}'
-
-    def routes(self) -> list[web.RouteDef]:
-        """Return the only address."""
-        return [web.get('/', self.stream)]
-
-    def greeting(self) -> list[str]:
-        """Return what the server can do, and its channels with their definitions."""
-        channels = [
-            {
-                'id': self._numbers[topic],
-                'topic': name,
-                'encoding': 'cdr',
-                'schemaName': topic.type,
-                'schemaEncoding': 'ros2msg',
-                'schema': schema_text(topic.type),
-            }
-            for name, topic in self._topics.items()
-        ]
-        server = {
-            'op': 'serverInfo',
-            'name': 'engine mount',
-            'capabilities': ['time'],
-            'supportedEncodings': ['cdr'],
-            'metadata': {},
+    def __init__(self, topics: Mapping[str, Topic], port: int):
+        """Begin to serve; raises `FeedError` with the remedy where the port is taken."""
+        self._context = context = Context()  # the server holds none of it
+        self._channels = {
+            topic: Channel(
+                name,
+                schema=Schema(name=topic.type, encoding='ros2msg', data=schema_text(topic.type).encode()),
+                message_encoding='cdr',
+                context=context,
+            )
+            for name, topic in topics.items()
         }
-        return [json.dumps(server), json.dumps({'op': 'advertise', 'channels': channels})]
-
-    def receive(self, viewer: Viewer, text: str) -> None:
-        """Change the subscriptions of a viewer; what is no such request changes nothing."""
+        self._last_time = 0
+        host = LOOPBACK[0]
         try:
-            request: dict[str, Any] = json.loads(text)
-            if request['op'] == 'subscribe':
-                viewer.subscriptions |= {
-                    int(each['channelId']): int(each['id']) & 0xFFFFFFFF for each in request['subscriptions']
-                }
-            elif request['op'] == 'unsubscribe':
-                ended, known = set(request['subscriptionIds']), viewer.subscriptions.items()
-                viewer.subscriptions = {channel: number for channel, number in known if number not in ended}
-        except (ValueError, KeyError, TypeError):
-            pass
+            self._server = start_server(
+                name='engine mount', host=host, port=port, capabilities=[Capability.Time], context=context,
+                message_backlog_size=_BACKLOG,
+            )  # fmt: skip
+        except RuntimeError as error:
+            raise FeedError(
+                f'the Foxglove server cannot listen at {host}:{port} ({error}): choose another '
+                '--foxglove-port, or 0 for none'
+            ) from None
+        self.address = f'ws://{host}:{port}/'
+        self.stop = self._server.stop
 
     def take(self, message: Message) -> None:
         """Pass a message on to the viewers that have subscribed to its topic."""
-        number = self._numbers.get(message.topic)
-        if number is not None and self.viewers:
-            self.loop.call_soon_threadsafe(self._deliver, number, message)
-
-    def _deliver(self, number: int, message: Message) -> None:
-        time_due = message.received - self._last_time > _TIME_STEP
-        if time_due:
+        self._channels[message.topic].log(message.raw, log_time=message.received)
+        if message.received - self._last_time > _TIME_STEP:
             self._last_time = message.received
-        for viewer in self.viewers:
-            subscription = viewer.subscriptions.get(number)
-            if subscription is not None:
-                viewer.add(_MESSAGE.pack(_MESSAGE_OPCODE, subscription, message.received) + message.raw)
-            if time_due:
-                viewer.add(_TIME.pack(_TIME_OPCODE, message.received))
+            self._server.broadcast_time(message.received)

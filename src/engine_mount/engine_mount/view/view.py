@@ -86,9 +86,8 @@ def serve_view(
         stack.enter_context(ending_signals(ending.set))
         receivers = []
         if foxglove_port:
-            server = FoxgloveServer(feed.topics, host, foxglove_port)
+            server = FoxgloveServer(feed.topics, foxglove_port)
             stack.callback(server.stop)
-            server.start()
             receivers.append(server.take)
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
         look = running_model(feed, beside=beside, receivers=receivers, on_failure=ending.set)

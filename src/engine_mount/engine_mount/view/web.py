@@ -1,45 +1,90 @@
-"""The page at localhost: HTTP for its files, a WebSocket for what happens."""
+"""The page at localhost: HTTP for its files, a WebSocket for what happens; both in a thread of their own."""
 
+import asyncio
 import json
+import secrets
+import threading
+from collections import deque
 from importlib.resources import files
 from typing import Any
 
 from aiohttp import web
 
 from engine_mount.reports.drawing.page import asset
+from engine_mount.view.feed import FeedError
 from engine_mount.view.model import INTERVALS_PER_SECOND, WINDOW, Interval, Model
-from engine_mount.view.server import LocalServer
 
+LOOPBACK = ('127.0.0.1', 'localhost', '::1')
+_CLOSE_LIMIT = 2.0  # s, chosen
+_BACKLOG = 90  # intervals of a viewer, chosen: 3 s; one that lags behind them misses some
 _STATE_EVERY = 10  # intervals, chosen: three times a second
 _OWN, _OF_REPORTS = ('view.html', 'view.js', 'view.css'), ('chart.js', 'page.css')
 _TYPES = {'html': 'text/html', 'js': 'text/javascript', 'css': 'text/css'}
 _POLICY = "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' data:; frame-ancestors 'none'"
 
 
-class Web(LocalServer):
-    """Serves the page of a model from `start` to `stop`."""
+class Viewer:
+    """A connection with the messages that it has yet to receive; of too many the oldest are dropped."""
 
-    name = 'page'
-    remedy = 'choose another --port'
-    backlog = 90  # intervals, chosen: 3 s; a viewer that lags behind them misses some
+    def __init__(self, socket: web.WebSocketResponse):
+        self._socket = socket
+        self._waiting: deque[str] = deque(maxlen=_BACKLOG)
+        self._ready = asyncio.Event()
+
+    def add(self, message: str) -> None:
+        """Let `send` send a message."""
+        self._waiting.append(message)
+        self._ready.set()
+
+    async def send(self) -> None:
+        """Send what is added, until the task is cancelled or the connection ends."""
+        while not self._socket.closed:
+            await self._ready.wait()
+            self._ready.clear()
+            while self._waiting:
+                await self._socket.send_str(self._waiting.popleft())
+
+
+class Web:
+    """Serves the page of a model from `start` to `stop`.
+
+    On loopback it answers requests to the name of this machine from no page, or from a page of its own; where
+    others can reach it, requests with the token that `address` carries.
+    """
 
     def __init__(self, model: Model, title: str, host: str, port: int):
-        """Bind to `host`; where others can reach it, only with the token that `address` carries."""
-        super().__init__(host, port)
-        self._model, self._title = model, title
-        self.address = f'http://{host}:{port}/{self.query}'
+        self._loop = asyncio.new_event_loop()  # other threads hand work to it by `call_soon_threadsafe`
+        self._viewers: tuple[Viewer, ...] = ()
+        self._model, self._title, self._host, self._port = model, title, host, port
+        self._token = '' if host in LOOPBACK else secrets.token_urlsafe(16)
+        self.address = f'http://{host}:{port}/' + (f'?token={self._token}' if self._token else '')
         """What to type into a browser."""
+        self._thread = threading.Thread(target=self._serve, name='page', daemon=True)
+        self._begun = threading.Event()
+        self._refusal = ''
         model.on_interval = self._add
 
-    def routes(self) -> list[web.RouteDef]:
-        """Return the files of the page and its stream."""
-        return [
-            web.get('/stream', self.stream),
-            web.get('/{name:.*}', _file),
-        ]
+    def start(self) -> None:
+        """Begin to serve; raises `FeedError` with the remedy where the port is taken."""
+        self._thread.start()
+        self._begun.wait()
+        if self._refusal:
+            raise FeedError(
+                f'the page cannot listen at {self._host}:{self._port} ({self._refusal}): choose another '
+                '--port'
+            )
 
-    def greeting(self) -> list[str]:
-        """Return all that is known."""
+    def stop(self) -> None:
+        """End; safe to call twice."""
+        self._viewers = ()
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    async def _stream(self, request: web.Request) -> web.WebSocketResponse:
+        """Serve a viewer until it leaves: all that is known, then each interval."""
+        socket = web.WebSocketResponse(heartbeat=10.0)
+        await socket.prepare(request)
         model = self._model
         content = {
             'title': self._title,
@@ -48,18 +93,61 @@ class Web(LocalServer):
             'state': model.state_json(),
             'intervals': [interval.as_json() for interval in list(model.intervals)],
         }
-        return [json.dumps(content)]
+        await socket.send_json(content)
+        viewer = Viewer(socket)
+        self._viewers += (viewer,)
+        sender = asyncio.create_task(viewer.send())
+        try:
+            async for _ in socket:
+                pass  # a viewer has nothing to say
+        finally:
+            self._viewers = tuple(each for each in self._viewers if each is not viewer)
+            sender.cancel()
+        return socket
 
     def _add(self, interval: Interval) -> None:
         """Take an interval from the thread of the model."""
-        if not self.viewers:
+        if not self._viewers:
             return
         content: dict[str, Any] = {'intervals': [interval.as_json()]}
         if interval.number % _STATE_EVERY == 0:
             content |= {'state': self._model.state_json(), 'chart': self._model.chart()}
         text = json.dumps(content)
-        for viewer in self.viewers:
-            self.loop.call_soon_threadsafe(viewer.add, text)
+        for viewer in self._viewers:
+            self._loop.call_soon_threadsafe(viewer.add, text)
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        application = web.Application(middlewares=[self._guard])
+        application.router.add_routes([web.get('/stream', self._stream), web.get('/{name:.*}', _file)])
+        runner = web.AppRunner(application, access_log=None, shutdown_timeout=_CLOSE_LIMIT)
+        try:
+            self._loop.run_until_complete(runner.setup())
+            self._loop.run_until_complete(web.TCPSite(runner, self._host, self._port).start())
+        except OSError as error:
+            self._refusal = str(error.strerror)
+            return
+        finally:
+            self._begun.set()
+        self._loop.run_forever()
+        self._loop.run_until_complete(runner.cleanup())
+
+    @web.middleware
+    async def _guard(self, request: web.Request, handler: Any) -> web.StreamResponse:
+        origin = request.headers.get('Origin')
+        if self._token:
+            given = request.query.get('token') or request.cookies.get('token') or ''
+            if not secrets.compare_digest(given.encode(errors='replace'), self._token.encode()):
+                raise web.HTTPForbidden(text='The page needs the token that the command printed.')
+        elif request.url.host not in LOOPBACK:
+            # A foreign name that leads here would let a page of its owner read what is served.
+            raise web.HTTPForbidden(text=f'The page answers to localhost, not to {request.host}.')
+        if origin is not None and origin.split('://')[-1] != request.host:
+            raise web.HTTPForbidden(text=f'A page of {origin} has no access to this one.')
+        response = await handler(request)
+        if self._token and not response.prepared:
+            response.set_cookie('token', self._token, httponly=True, samesite='Strict')
+        return response
 
 
 async def _file(request: web.Request) -> web.Response:

@@ -15,6 +15,7 @@ from engine_mount.experiments.check.suite import (
     worst_first,
 )
 from engine_mount.experiments.harness.experiment import Settings, Values
+from engine_mount.recordings.difference import known
 from engine_mount.recordings.screen import Screen, Table
 
 _HEADS = ('', 'manoeuvre', 'quantity', 'value', 'limit', 'left')
@@ -106,10 +107,10 @@ def figures_of(trials: Sequence[Trial], settings: Settings, results: Results, ve
         limit = verdict.limit
         return {
             'quantity': limit.measure,
-            'value': _known(verdict.value),
+            'value': known(verdict.value),
             limit.bound: limit.value,
             'verdict': verdict.judged,
-            'left': _known(verdict.margin),
+            'left': known(verdict.margin),
             'source': limit.source,
             'reason': limit.reason,
         }
@@ -123,13 +124,9 @@ def figures_of(trials: Sequence[Trial], settings: Settings, results: Results, ve
                 'passed': passed(verdicts[name]),
                 'broke_down': result.broke_down,
                 'remarks': list(result.remarks),
-                'figures': {measure: _known(value) for measure, value in result.figures.items()},
+                'figures': {measure: known(value) for measure, value in result.figures.items()},
                 'verdicts': list(map(as_json, verdicts[name])),
             }
             for trial, (name, result) in zip(trials, results.items(), strict=True)
         },
     }
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

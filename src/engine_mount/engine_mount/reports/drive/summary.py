@@ -1,6 +1,5 @@
 """The figures of a drive: those of `--json`, and the same for people."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,7 +7,8 @@ import numpy as np
 
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import TopicAudit, control_spans
-from engine_mount.recordings.events import switching_times
+from engine_mount.recordings.difference import known
+from engine_mount.recordings.events import Switching, switching_times
 from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
@@ -21,7 +21,6 @@ from mount_sim.plant.mounts import seat_of, without_friction
 Figures = dict[str, Any]
 
 _LATE_CONTROL = 0.5  # s, chosen: so much of the excitation may pass before control answers
-_SWITCHINGS = 6  # printed
 _MEASURED = ('rest_gap', 'contact_gap', 'rest_gap_std', 'contact_gap_std')
 
 
@@ -50,8 +49,8 @@ def summarise(
         begin = float(time[0]) if len(time) else None
         on, off = switching_times(time, trace['damping_active'][order])
         switched_on, switched_off = on.tolist(), off.tolist()
-        peak = _known(peak_current(recording, control_spans(audits)))
-        error = _known(tracking_error(drive, *policy_of(parameters)))
+        peak = known(peak_current(recording, control_spans(audits)))
+        error = known(tracking_error(drive, *policy_of(parameters)))
     return {
         'recording': str(recording.path),
         'recordings': run['recordings'],
@@ -72,7 +71,7 @@ def summarise(
         'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
         'peak_current_a': peak,
         'tracking_error_rms': error,
-        **{name: _known(run[name]) for name in ('latency_median_s', 'latency_p99_s')},
+        **{name: known(run[name]) for name in ('latency_median_s', 'latency_p99_s')},
     }
 
 
@@ -116,7 +115,7 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
             'damping was never on' if error is None else f'{100 * error:.1f} % rms of the peak wanted force'
         )
         rows += [
-            ('damping switched', _switching_text(figures)),
+            ('damping switched', Switching(figures['switch_on_s'], figures['switch_off_s']).sentence(2)),
             ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
             ('friction force error', percent),
         ]
@@ -141,17 +140,3 @@ def _restart(restart: Restart, zero: int) -> Figures:
         'remedy': restart.action.value,
         'took_s': restart.took,
     }
-
-
-def _switching_text(figures: Figures) -> str:
-    ons, offs = figures['switch_on_s'], figures['switch_off_s']
-    if not ons:
-        return 'never on'
-    ends = (next((f'{off:.2f} s' for off in offs if off > on), 'the end') for on in ons)
-    shown = [f'{on:.2f} s to {end}' for on, end in zip(ons, ends, strict=True)]
-    more = f' and {len(shown) - _SWITCHINGS} more' if len(shown) > _SWITCHINGS else ''
-    return f'on from {", ".join(shown[:_SWITCHINGS])}{more}'
-
-
-def _known(value: float) -> float | None:
-    return None if value is None or math.isnan(value) else float(value)
