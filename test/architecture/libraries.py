@@ -24,6 +24,7 @@ LIBRARIES = {
     'distributed': Library('distributed'),
     'duckdb': Library('duckdb'),
     'e2e': Library('autosar-e2e'),
+    'foxglove': Library('foxglove-sdk'),
     'fsspec': Library('fsspec'),
     'gcsfs': Library('gcsfs'),
     'h5py': Library('h5py', 'python3-h5py'),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_mount.recordings.screen import Table
+from mount_models.arithmetic.sums import mean
 from mount_ros.topics import CONTROL_TRACE, CURRENT_SETPOINT, DISPLACEMENT
 
 Values = NDArray[np.float64]
@@ -228,7 +229,7 @@ def signal_difference(column: Column, tolerance: Tolerance) -> SignalDifference:
         unknown_in_one=int(np.count_nonzero(unknown_a != unknown_b)),
         first=column.at(int(differing[0])) if len(differing) else None,
         largest=column.at(int(np.flatnonzero(numbers)[np.argmax(distances)])) if unlike else None,
-        rms=float(np.sqrt(np.mean(distances**2))) if len(distances) else math.nan,
+        rms=math.sqrt(mean(distances * distances)) if len(distances) else math.nan,
         scale=scale,
     )
 
