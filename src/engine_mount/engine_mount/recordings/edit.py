@@ -160,7 +160,7 @@ def recover(
             for number, topic in file.topics.items()
         }
         for file in recording.files:
-            for block in file.blocks(file.topics):
+            for _, block in file.blocks([list(file.topics)]):
                 heads = block.heads[['topic', 'log_time', 'publish_time', 'sequence']].tolist()
                 for (number, *head), raw in zip(heads, map(bytes, block.payloads()), strict=True):
                     bag.write(channels[file, number], raw, *head)

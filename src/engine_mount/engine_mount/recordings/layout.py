@@ -84,7 +84,7 @@ class Numbers:
     def column(self, messages: np.ndarray, place: int = 0) -> np.ndarray:
         """Return number `place` of the run from each row of `messages` (rows x bytes)."""
         own = self.bytes_at(place)
-        return np.ascontiguousarray(messages[:, own.start : own.stop]).view(self.dtype)[:, 0]
+        return messages[:, own.start : own.stop].view(self.dtype)[:, 0]
 
 
 @dataclass

@@ -83,11 +83,11 @@ class StoredMessages:
     def __len__(self) -> int:
         return len(self.heads)
 
-    def of(self, topics: Collection[int]) -> 'StoredMessages':
+    def of(self, topics: Sequence[int]) -> 'StoredMessages':
         """Return the messages of these topics alone."""
         number = self.heads['topic']
-        wanted = np.isin(number, list(topics))
-        return self if np.all(wanted) else self.at(np.flatnonzero(wanted))
+        wanted = number == topics[0] if len(topics) == 1 else np.isin(number, topics)
+        return self if wanted.all() else self.at(np.flatnonzero(wanted))
 
     def at(self, places: NDArray[np.int64] | slice) -> 'StoredMessages':
         """Return the messages at these places."""
@@ -299,7 +299,7 @@ def indexed_offsets(data: mmap.mmap, chunk: Chunk, channels: Collection[int]) ->
         if (opcode, number, size % 16) != (Opcode.MESSAGE_INDEX, channel, 0) or begin + size > len(data):
             return None
         found.append(np.frombuffer(data, '<i8', size // 8, begin)[1::2])
-    return np.sort(np.concatenate(found))
+    return np.sort(np.concatenate(found)) if len(found) > 2 else found[-1]
 
 
 def messages_at(content: bytes | mmap.mmap, offsets: Offsets) -> StoredMessages | None:

@@ -253,18 +253,18 @@ class Recording:
         """
         counts = {self.resolve(name): 0 for name in names}
         places = {
-            file: [n for name in counts for n in self.topics[name].places.get(file, ())]
+            file: {
+                name: self.topics[name].places[file] for name in counts if file in self.topics[name].places
+            }
             for file in self.files
         }
         for file in filter(places.get, self.files):
-            for block in file.blocks(places[file]):
-                for name in counts:
-                    part = block.of(self.topics[name].places.get(file, ()))
-                    if len(part):
-                        counts[name] += len(part)
-                        yield self._make_series(
-                            name, (Payloads([part.at(slice(most)).payloads()]), part.heads[:most])
-                        )
+            names = list(places[file])
+            for place, part in file.blocks(list(places[file].values())):
+                counts[names[place]] += len(part)
+                yield self._make_series(
+                    names[place], (Payloads([part.at(slice(most)).payloads()]), part.heads[:most])
+                )
         for name, present in counts.items():
             expected = self.topics[name].message_count
             if self.missing.get(name, 0) < expected - present:

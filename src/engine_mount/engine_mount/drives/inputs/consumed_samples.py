@@ -301,6 +301,9 @@ def places_in(stamps: Times, wanted: Times) -> tuple[NDArray[np.bool_], NDArray[
     """
     if not len(stamps):
         return np.zeros(len(wanted), bool), np.zeros(len(wanted), np.intp)
+    begin = int(np.searchsorted(stamps, wanted[:1])[0]) if len(wanted) else 0
+    if np.array_equal(stamps[begin : begin + len(wanted)], wanted):  # as they mostly are: a tenth of the time
+        return np.ones(len(wanted), bool), np.arange(begin, begin + len(wanted))
     places = np.minimum(np.searchsorted(stamps, wanted), len(stamps) - 1)
     return stamps[places] == wanted, places
 

@@ -28,6 +28,7 @@ from engine_mount.recordings.session import (
     session_content,
     session_parameters,
 )
+from engine_mount.recordings.times import each_once
 from engine_mount.settings.chosen import (
     Parameters,
     chosen_initialisation,
@@ -214,14 +215,14 @@ def recorded_answers(
         return None
     setpoints = recording[topics.CURRENT_SETPOINT.name]
     # When mount_control is deactivated it answers its last sample once more, with 0 A.
-    stamps, first = np.unique(setpoints.stamps, return_index=True)
+    stamps, first = each_once(setpoints.stamps)
     currents = setpoints['coil_current'][first]
     if not has(recording, topics.CONTROL_TRACE):
         notes.append('the recording holds no control_trace: every sample with a setpoint counts as taken')
         empty = dict.fromkeys(topics.CONTROL_TRACE.names, np.empty(0))
         return RecordedAnswers(stamps, currents, np.empty(0, np.int64), empty)
     series = recording[topics.CONTROL_TRACE.name]
-    trace_stamps, places = np.unique(series.stamps, return_index=True)
+    trace_stamps, places = each_once(series.stamps)
     traces = {name: series[name][places] for name in series.names}
     return RecordedAnswers(stamps, currents, trace_stamps, traces, quiet_at_first(control))
 
@@ -244,7 +245,7 @@ def displacement_of(recording: Recording) -> tuple[Times, Column]:
             f'{series.stamps[back[0]] / 1e9:.3f} s to {series.stamps[back[0] + 1] / 1e9:.3f} s; '
             'cut the recording there and replay the pieces'
         )
-    stamps, first = np.unique(series.stamps, return_index=True)
+    stamps, first = each_once(series.stamps)
     return stamps, series['mount'][first]
 
 
