@@ -28,7 +28,7 @@ MOUNTS = {'hydromount': 'hydro', 'no current': 'friction'}
 """{name: mount in the seat, at 0 A} of what stands beside every drive."""
 THIS = 'this mount'
 _OWN = {'hydro': 'hydromount', 'friction_off': 'no current', 'elastomer': 'no current'}
-LONGEST = 300.0  # s of a run, chosen: 14 s of computing
+LONGEST = 300.0  # s of a run, chosen: 3 s of computing
 EXCITED = ('road_height', 'chassis_acceleration')  # of sim/truth; the first that is not 0 throughout
 _KEPT = ('displacement', *EXCITED)
 _QUIET = np.zeros(5)  # no noise of the sensors
