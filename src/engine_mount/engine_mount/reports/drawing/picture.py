@@ -99,9 +99,9 @@ def _name_lines(axes: Axes, panel: Panel) -> None:
     if not kept:
         return
     axes.legend(
-        kept.values(), kept, loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=3,
-        frameon=False, fontsize='small', labelcolor='linecolor', handlelength=1.4, columnspacing=1.2,
-        borderaxespad=0.1,
+        kept.values(), kept, loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=3, frameon=False,
+        fontsize='small', labelcolor=[handle.get_color() for handle in kept.values()],
+        handlelength=1.4, columnspacing=1.2, borderaxespad=0.1,
     )  # fmt: skip
 
 
