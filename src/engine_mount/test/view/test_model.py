@@ -45,7 +45,7 @@ def test_a_mount_without_current_swings_further_than_the_one_that_is_driven(show
     assert highest(shown, 'beside.no current') > 1.2 * highest(shown, 'displacement')
     assert 0.0 < highest(shown, 'beside.hydromount') < highest(shown, 'beside.no current')
     dashes = {curve['name']: curve['dash'] for curve in shown.chart()['panels'][0]['curves']}
-    assert dashes == {'this mount': 'solid', 'hydromount': 'dash', 'no current': 'dot'}
+    assert dashes == {'this mount': 'solid', 'hydromount': 'dashed', 'no current': 'dotted'}
 
 
 def test_gap_and_levels_are_told(shown):

@@ -37,7 +37,7 @@ COLOUR_OF = {
 Array = NDArray[np.float64]
 Limits = tuple[float, float]
 
-SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
+SOLID, DASHED, DOTTED = 'solid', 'dashed', 'dotted'
 DASH_OF = {'hydromount': DASHED, 'no current': DOTTED}
 """Of the mounts that are not solid: with their colours, their look everywhere."""
 

@@ -12,23 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.chart import (
-    DASHED,
-    DOTTED,
-    SHADING,
-    SOLID,
-    Array,
-    Chart,
-    Curve,
-    Limits,
-    Panel,
-)
+from engine_mount.reports.drawing.chart import SHADING, Array, Chart, Curve, Limits, Panel
 from engine_mount.reports.drawing.detail import ranges
 
-_STYLES: dict[str, Any] = {SOLID: '-', DASHED: '--', DOTTED: ':'}
 _POINTS = 4000  # of a curve, chosen: 2 to a pixel of both kinds, lowest and highest
 _SHADES = 2000  # of the width, chosen: 2 to a pixel
-_OVERVIEW = 0.8  # chosen: share of its height
 
 
 def draw_chart(chart: Chart, *files: Path) -> None:
@@ -38,7 +26,7 @@ def draw_chart(chart: Chart, *files: Path) -> None:
     """
     views = [(panel, chart.view or chart.limits, panel.share) for panel in chart.panels]
     if chart.view and chart.limits:
-        views.append((chart.panels[0], chart.limits, _OVERVIEW))
+        views.append((chart.panels[0], chart.limits, 0.8))  # share of the height: chosen
     shares = [share for *_, share in views]
     picture = Figure(figsize=(10.0, 1.0 + 2.6 * sum(shares)), layout='constrained')
     rows = picture.subplots(len(views), height_ratios=shares, squeeze=False)[:, 0]
@@ -68,13 +56,13 @@ def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | 
     for curve in panel.curves:
         x, y = _shown(curve, limits)
         steps = 'steps-post' if curve.steps else 'default'
-        style = {'linestyle': _STYLES[curve.dash], 'linewidth': curve.width, 'drawstyle': steps}
+        style: Any = {'linestyle': curve.dash, 'linewidth': curve.width, 'drawstyle': steps}
         axes.plot(x, y, color=curve.colour, label=curve.name, **style)
     for dots in panel.dots:
         axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
         for value in (level.value, -level.value):
-            style = {'linestyle': _STYLES[level.dash], 'linewidth': 1.0}
+            style = {'linestyle': level.dash, 'linewidth': 1.0}
             axes.axhline(value, color=level.colour, label=level.name, **style)
     if limits is not None:
         axes.set_xlim(*limits)

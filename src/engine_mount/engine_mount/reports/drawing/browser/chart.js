@@ -7,7 +7,7 @@ window.addEventListener('error', (event) => { root.dataset.error = event.message
 
 const LEFT = 58, RIGHT = 8, TOP = 6, BOTTOM = 36; // pixels round the drawing area, BOTTOM of the last panel
 const NARROW = 620, HEIGHT = 190, LOW_HEIGHT = 150; // pixels: a panel of share 1, and where the page is narrow
-const UNKNOWN = -32768, DASHES = { solid: [], dash: [6, 4], dot: [2, 3] };
+const UNKNOWN = -32768, DASHES = { solid: [], dashed: [6, 4], dotted: [2, 3] };
 const charts = [];
 
 function add(parent, kind, name, text = '') {
