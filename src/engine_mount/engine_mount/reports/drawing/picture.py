@@ -25,7 +25,7 @@ def draw_chart(chart: Chart, *files: Path) -> None:
     It shows what the chart shows at first; where that is a part, the first panel over all stands below.
     """
     views = [(panel, chart.view or chart.limits, panel.share) for panel in chart.panels]
-    if chart.view and chart.limits:
+    if chart.view and chart.limits not in (None, chart.view):
         views.append((chart.panels[0], chart.limits, 0.8))  # share of the height: chosen
     shares = [share for *_, share in views]
     picture = Figure(figsize=(10.0, 1.0 + 2.6 * sum(shares)), layout='constrained')
