@@ -76,6 +76,7 @@ def test_a_damaged_file_is_refused_or_read(whole, kind, tmp_path, place, noise):
     path.write_bytes(content[:begin] + noise + content[begin + len(noise) :])
     _read_or_refused(path, file.stated)
 
+
 # nothing of a library reaches the screen, its failing destructors included
 pytestmark = pytest.mark.filterwarnings('error::pytest.PytestUnraisableExceptionWarning')
 
