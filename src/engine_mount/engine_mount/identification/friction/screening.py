@@ -44,7 +44,7 @@ EXPLAINED = 0.6
 LARGEST_ERROR = 0.35
 """Error, rms over rms, above which no law of the ladder counts (chosen): an eighth of the square."""
 EXPECTED_ERROR = 0.25  # chosen
-"""Largest error that is expected of a contact that slides and is clamped (docs/explanation/identification.md)."""
+"""Largest error expected of a contact that slides and is clamped (docs/explanation/identification.md)."""
 _STIFFNESSES = (5.0, 20.0, 80.0)  # of half the range of force over the stroke, chosen
 _PLAYS = (0.002, 0.05, 0.2)  # of the stroke, chosen
 _FINISHED = 3  # searches that are carried through, chosen
@@ -295,8 +295,8 @@ def ladder_case(ladder: Mapping[str, Mapping[str, Any]], best: str) -> Case | No
         return Case(
             'poorly predicted',
             f'{best} errs by {error:.1%} of what was held out (expected: up to {EXPECTED_ERROR:.0%}): a '
-            'loosely clamped contact does, whose pressure is not that of the clamp, or one that changed in between; '
-            'clamp it firmly, or measure the normal force',
+            'loosely clamped contact does, whose pressure is not that of the clamp, or one that changed in '
+            'between; clamp it firmly, or measure the normal force',
         )
     if training > LARGEST_ERROR:
         return Case(

@@ -130,7 +130,8 @@ def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
             raise SignalError(f'{path}, column {header!r}: {what}; fill it in or remove the row')
         numbers = stamps.astype(np.int64)
         if numbers.min() >= 0 and numbers.max() < _DAY:  # midnight may lie between
-            days = np.cumsum(np.diff(numbers, prepend=numbers[0]) < -_DAY // 2)
+            midnights = np.flatnonzero(np.diff(numbers) < -_DAY // 2) + 1
+            days = np.searchsorted(midnights, np.arange(numbers.size), 'right')
             return TimeBase((numbers + _DAY * days) / SECOND, 0, f'times of day in column {header!r}')
         told = f'dates in column {header!r}, taken as UTC where they name no zone'
         return TimeBase((numbers - numbers[0]) / SECOND, int(numbers[0]), told)
