@@ -39,7 +39,7 @@ class InitParameters(NamedTuple):
     light_pressure: Annotated[
         float,
         Quantity('N', 'normal force in the ready position', 0.0, 20.0, 'chosen; section 3.2'),
-    ] = 2.0
+    ] = 0.5
 
     crossing_half_width: Annotated[
         float, Quantity('A', 'samples this near to the crossing locate it', 0.05, 0.4)

@@ -239,6 +239,8 @@ def _refuse_where(failed: npt.NDArray[np.bool_], gaps: FloatArray, currents: Flo
 
 
 _STEP = 0.5  # N, chosen
+_SURELY = 1.01  # chosen: over the closing current
+_WAY = 41  # places between rest and contact, chosen: 4 um apart at most
 
 
 class ForceTableError(ValueError):
@@ -270,9 +272,15 @@ def contact_force(spring_stiffness: float, rest_gap: float, contact_gap: float) 
 def offset_current(
     law: ForceLaw, spring_stiffness: float, rest_gap: float, contact_gap: float, light_pressure: float
 ) -> float:
-    """Return the current (A) of the ready position, `light_pressure` (N) past just touching (section 3.2)."""
-    wanted = contact_force(spring_stiffness, rest_gap, contact_gap) + light_pressure
-    return float(checked_current_for_force(law, wanted, contact_gap))
+    """Return the current (A) of the ready position, `light_pressure` (N) past just touching (section 3.2).
+
+    Where the pads are worn so far that the halves pull in before they touch, it takes more current to close
+    than to touch: then it is the current that closes them for sure, with the larger pressure that it makes.
+    """
+    touching = contact_force(spring_stiffness, rest_gap, contact_gap) + light_pressure
+    way = np.linspace(contact_gap, rest_gap, _WAY)
+    closing = checked_current_for_force(law, spring_stiffness * (rest_gap - way), way).max()
+    return float(max(checked_current_for_force(law, touching, contact_gap), _SURELY * closing))
 
 
 def current_force_table(

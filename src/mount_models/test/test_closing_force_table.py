@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mount_models.actuator import (
     ForceTableError,
+    checked_force,
     contact_force,
     current_force_table,
     force,
@@ -33,9 +34,17 @@ def test_the_offset_current_is_the_published_one_within_the_error_of_the_law(lig
     assert force(LAW, found, CONTACT) == pytest.approx(22.26 + light_pressure, abs=1e-6)
 
 
+@pytest.mark.parametrize('worn', [285e-6, 272e-6])
+def test_the_offset_current_closes_worn_pads_that_pull_in_before_they_touch(worn):
+    way = np.linspace(worn, REST, 1000)
+    found = offset_current(LAW, SPRING, REST, worn, 0.5)
+    assert (checked_force(LAW, found, way) > SPRING * (REST - way)).all()
+    assert force(LAW, found, worn) > contact_force(SPRING, REST, worn) + 0.5
+
+
 def test_the_table_starts_at_the_contact_current_and_ends_at_full_current():
     assert TABLE[1, 0] == 0.0
-    assert TABLE[0, 0] == pytest.approx(offset_current(LAW, SPRING, REST, CONTACT, 0.0), abs=1e-9)
+    assert force(LAW, TABLE[0, 0], CONTACT) == pytest.approx(contact_force(SPRING, REST, CONTACT), abs=1e-6)
     assert TABLE[0, 0] == pytest.approx(0.4725, abs=0.0015)
     assert TABLE[0, -1] == 3.0
     assert TABLE[1, -1] == pytest.approx(305, abs=3)

@@ -1,35 +1,36 @@
-"""A viscous damper that opens with the amplitude in the band, without waiting for a period.
+"""A viscous damper that engages with the amplitude in the band, and cancels the engine's line meanwhile.
 
-How much force comes from the unfiltered velocity, so that friction vanishes where the true velocity reverses;
-the band-pass only decides whether to damp. An idle line is told apart from the engine's motion: it keeps the
-damper from opening, and what force there is follows the engine alone.
+The force comes from the unfiltered velocity without the engine's line, so that friction is small where the
+true velocity reverses; the band-pass only sets the degree of damping. While the slow motion fixes the
+direction of friction, its size is modulated against the line's force in the elastomer.
 
-    x_n = x - idle line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the idle line
-    A = sqrt(x_b^2 + (v_b / w0)^2),  A_i = idle_weight (w_i / w0) (amplitude of the idle line)
-    q = smoothstep((A - A_low) / (A_full - A_low)) A^2 / (A^2 + A_i^2),  g follows q, fast up, slowly down
-    s = min(2 |v|, max(v_n sign v, 0)),  |F| = min(c g (sqrt(s^2 + d^2) - d), F_max)
+    x_n = x - line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the line
+    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight (w_l / w0)^2 a,  A_n = noise_weight times the noise
+    q = A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2),  g follows q, fast up, slowly down
+    s = max(v_n sign v, 0),  |F| = max(c g (sqrt(s^2 + d^2) - d) - K kappa x_l sign v, 0)
 
 v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is designed so that v_n has
-phase 0 at the eigenfrequency, tracker and delay of the loop included. Figures: docs/explanation/policy.md.
+phase 0 at the eigenfrequency, tracker and delay of the loop included. a and w_l are the amplitude and the
+frequency of the line, x_l its displacement when the force acts, kappa = a^2 / (a^2 + a_0^2). Figures:
+docs/explanation/policy.md.
 """
 
 import math
 from typing import Annotated, NamedTuple
 
-from mount_control import band_pass, idle_line
+from mount_control import band_pass, engine_line
 from mount_control.delay import LOOP_DELAY, check_lead, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.elementary import expm1, log, sine_and_cosine
 from mount_models.arithmetic.record import record_type
-from mount_models.quantity import ParameterError, Quantity
+from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
 
-_REVERSAL_SLOPE = 2.0
-"""So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
-_LOWEST_OPENING = 0.03
-"""Below this opening there is no current (chosen): the offset current alone would rub with some 2 N."""
-_SMALLEST_SQUARE = 1e-12  # m^2: of a micrometre, keeps 0 / 0 away
+_LEAST_DEGREE = 0.01
+"""Degree of damping below which there is no current (chosen): the offset current alone would rub."""
+_CLEAR_LINE = 1.2e-5  # m, chosen: amplitude a_0 of a line that is half cancelled
+_SMALLEST_SQUARE = 1e-14  # m^2: of 0.1 um, keeps 0 / 0 away
 
 
 class Parameters(NamedTuple):
@@ -59,32 +60,33 @@ class Parameters(NamedTuple):
         Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95),
     ] = 0.7
     damping_coefficient: Annotated[
-        float, Quantity('N s/m', 'c: force over velocity, opened fully', 1.0, 1e4)
+        float, Quantity('N s/m', 'c: force over velocity, fully engaged', 1.0, 1e4)
     ] = 2600.0
     rounding_velocity: Annotated[
         float,
         Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
     ] = 0.0008
-    force_limit: Annotated[float, Quantity('N', 'largest force asked for', 1.0, 1e4)] = 300.0
-    lowest_amplitude: Annotated[
-        float, Quantity('m', 'amplitude in the band up to which there is no damping', 0.0, 0.01)
-    ] = 0.00012
-    full_amplitude: Annotated[
-        float, Quantity('m', 'amplitude in the band from which damping is full', 1e-6, 0.01)
-    ] = 0.0004
-    opening_time: Annotated[float, Quantity('s', 'time constant of the opening', 0.001, 1.0)] = 0.008
-    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0)] = 0.4
-    idle_weight: Annotated[
-        float,
-        Quantity('1', 'how much an idle line closes; 0: as if the engine never idled', 0.0, 100.0),
-    ] = 5.0
+    half_amplitude: Annotated[
+        float, Quantity('m', 'A_0: amplitude in the band at which damping is half engaged', 1e-6, 0.01)
+    ] = 0.00016
+    engaging_time: Annotated[float, Quantity('s', 'time constant of a rising degree', 0.001, 1.0)] = 0.01
+    releasing_time: Annotated[float, Quantity('s', 'and of a falling one', 0.001, 10.0)] = 0.25
+    line_weight: Annotated[
+        float, Quantity('1', 'how much a line of the engine releases the damper; 0: not at all', 0.0, 100.0)
+    ] = 0.12
+    noise_weight: Annotated[
+        float, Quantity('1', 'how much noise of the displacement releases the damper', 0.0, 1000.0)
+    ] = 37.0
+    line_stiffness: Annotated[
+        float, Quantity('N/m', 'K: force of the line that friction cancels, by displacement', 0.0, 1e6)
+    ] = 8e4
 
 
 class Law(NamedTuple):
     """What a step needs: gains per sample, and the rest as in the module's formulas."""
 
     band: band_pass.BandPass
-    line: idle_line.IdleLine
+    line: engine_line.EngineLine
     sample_time: float
     alpha: float
     beta_rate: float
@@ -92,36 +94,37 @@ class Law(NamedTuple):
     w0: float
     damping: float
     rounding: float
-    force_limit: float
-    lowest: float
-    per_range: float
-    opening: float
-    closing: float
-    idle_weight: float
+    half_square: float
+    engaging: float
+    releasing: float
+    line_weight: float
+    noise_weight: float
+    line_stiffness: float
 
 
 STATE = record_type(
     [
         ('band', band_pass.STATE),
-        ('line', idle_line.STATE),
+        ('line', engine_line.STATE),
         ('position', 'f8'),
         ('velocity', 'f8'),
-        ('opening', 'f8'),
+        ('degree', 'f8'),
     ]
 )
 TRACE = {
     'band_displacement': 'm',
     'amplitude': 'm',
-    'idle_amplitude': 'm',
-    'idle_frequency': 'Hz',
+    'line_amplitude': 'm',
+    'line_frequency': 'Hz',
     'engine_velocity': 'm/s',
     'predicted_velocity': 'm/s',
 }
 
 
 def design(parameters: Parameters, sample_time: float) -> Design:
-    """Return the law; raises `ParameterError` for amplitudes in the wrong order or too long a lead."""
-    _check(parameters)
+    """Return the law; raises `ParameterError` for too long a lead."""
+    check_lead(parameters.lead_time, parameters.eigenfrequency)
+    turns = parameters.eigenfrequency * sample_time
     w0 = 2.0 * math.pi * parameters.eigenfrequency
     alpha = _alpha(parameters.position_gain, sample_time)
     lead_time = delay_at(parameters.lead_time, sample_time)
@@ -129,7 +132,7 @@ def design(parameters: Parameters, sample_time: float) -> Design:
     return Design(
         Law(
             band=band_pass.design(parameters.eigenfrequency, parameters.quality, 0.0, sample_time),
-            line=idle_line.design(lead_time, sample_time),
+            line=engine_line.design(lead_time, sample_time),
             sample_time=sample_time,
             alpha=alpha,
             beta_rate=beta / sample_time,
@@ -137,23 +140,16 @@ def design(parameters: Parameters, sample_time: float) -> Design:
             w0=w0,
             damping=parameters.damping_coefficient,
             rounding=parameters.rounding_velocity,
-            force_limit=parameters.force_limit,
-            lowest=parameters.lowest_amplitude,
-            per_range=1.0 / (parameters.full_amplitude - parameters.lowest_amplitude),
-            opening=min(sample_time / parameters.opening_time, 1.0),
-            closing=min(sample_time / parameters.closing_time, 1.0),
-            idle_weight=parameters.idle_weight / (parameters.eigenfrequency * sample_time),
-        )
+            half_square=parameters.half_amplitude * parameters.half_amplitude,
+            engaging=min(sample_time / parameters.engaging_time, 1.0),
+            releasing=min(sample_time / parameters.releasing_time, 1.0),
+            line_weight=parameters.line_weight / (turns * turns),
+            noise_weight=parameters.noise_weight * parameters.noise_weight,
+            line_stiffness=parameters.line_stiffness,
+        ),
+        engine_line.rotations(sample_time),
+        2 * engine_line.RESONATORS,
     )
-
-
-def _check(parameters: Parameters) -> None:
-    if not parameters.lowest_amplitude < parameters.full_amplitude:
-        raise ParameterError(
-            f'lowest_amplitude ({1e3 * parameters.lowest_amplitude:g} mm) must lie below full_amplitude '
-            f'({1e3 * parameters.full_amplitude:g} mm)'
-        )
-    check_lead(parameters.lead_time, parameters.eigenfrequency)
 
 
 def _alpha(position_gain: float, sample_time: float) -> float:
@@ -194,42 +190,45 @@ def _band_share(
 def start(law, state, window, displacement):
     """Set a memory of zeros to a mount at rest at `displacement` (m), damping off."""
     band_pass.settle(law.band, state.band, displacement)
-    idle_line.rest(law.line, state.line, displacement)
+    engine_line.rest(law.line, state.line, displacement)
     state.position = displacement
 
 
 @compiled
 def transfer(law, new_law, state, window, new_window):
-    """Go on from the same last samples; tracker, idle line and opening keep their past."""
+    """Go on from the same last samples; tracker, line and degree keep their past."""
+    new_window[:] = window
     band_pass.transfer(law.band, new_law.band, state.band)
 
 
 @compiled
 def step(law, table, state, window, trace, displacement):
-    """Take one sample (m); return force (N), velocity (m/s) at which it acts, and opening 0 .. 1."""
-    line_displacement, line_velocity = idle_line.step(law.line, state.line, displacement)
-    engine = displacement - line_displacement
+    """Take one sample (m); return force (N), velocity (m/s) at which it acts, and the degree 0 .. 1."""
+    line_now, line_ahead, line_velocity = engine_line.step(law.line, table, state.line, window, displacement)
+    engine = displacement - line_now
     banded, _, band_velocity = band_pass.step(law.band, state.band, engine)
     engine_velocity = _tracked(law, state, engine) - law.band_share * banded
     velocity = engine_velocity + line_velocity
 
     in_band = band_velocity / law.w0
     square = banded * banded + in_band * in_band
-    amplitude = math.sqrt(square)
-    opening = _opening(law, state, amplitude, square)
+    line_square = state.line.amplitude * state.line.amplitude
+    _set_degree(law, state, square, line_square)
 
     trace.band_displacement = banded
-    trace.amplitude = amplitude
-    trace.idle_amplitude = state.line.amplitude
-    trace.idle_frequency = state.line.turns / law.sample_time
+    trace.amplitude = math.sqrt(square)
+    trace.line_amplitude = state.line.amplitude
+    trace.line_frequency = state.line.turns / law.sample_time
     trace.engine_velocity = engine_velocity
     trace.predicted_velocity = velocity
-    if opening == 0.0:
+    if state.degree < _LEAST_DEGREE:
         return 0.0, velocity, 0.0
     direction = -1.0 if velocity < 0.0 else 1.0
-    speed = min(_REVERSAL_SLOPE * abs(velocity), max(direction * engine_velocity, 0.0))
+    speed = max(direction * engine_velocity, 0.0)
     rounded = math.sqrt(speed * speed + law.rounding * law.rounding) - law.rounding
-    return direction * min(law.damping * opening * rounded, law.force_limit), velocity, opening
+    cancelled = law.line_stiffness * line_square / (line_square + _CLEAR_LINE * _CLEAR_LINE) * line_ahead
+    force = max(law.damping * state.degree * rounded - direction * cancelled, 0.0)
+    return direction * force, velocity, state.degree
 
 
 @compiled
@@ -243,10 +242,10 @@ def _tracked(law, state, displacement):
 
 
 @compiled
-def _opening(law, state, amplitude, square):
-    """Return how far the damper is open, 0 or `_LOWEST_OPENING` .. 1, for an amplitude (m) and its square."""
-    share = min(max((amplitude - law.lowest) * law.per_range, 0.0), 1.0)
-    idle = law.idle_weight * state.line.turns * state.line.amplitude
-    wanted = share * share * (3.0 - 2.0 * share) * square / (square + idle * idle + _SMALLEST_SQUARE)
-    state.opening += (law.opening if wanted > state.opening else law.closing) * (wanted - state.opening)
-    return state.opening if state.opening >= _LOWEST_OPENING else 0.0
+def _set_degree(law, state, square, line_square):
+    """Let the degree of damping follow the squares of the amplitudes (m^2) in the band and of the line."""
+    turns_square = state.line.turns * state.line.turns
+    line = law.line_weight * law.line_weight * turns_square * turns_square * line_square
+    others = law.half_square + line + law.noise_weight * state.line.noise_square
+    wanted = square / (square + others + _SMALLEST_SQUARE)
+    state.degree += (law.engaging if wanted > state.degree else law.releasing) * (wanted - state.degree)
