@@ -46,7 +46,7 @@ ELSEWHERE = {
 """{beginning of the commands: where they are run}."""
 
 STAND_INS = {
-    'make drive': 'engine-mount drive --core',
-    "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --core --out bags/first',
+    'make drive': 'engine-mount drive --lockstep',
+    "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --lockstep --out bags/first',
 }
 """{command: what the test of the page runs in its place}."""
