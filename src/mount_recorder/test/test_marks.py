@@ -97,7 +97,7 @@ def observe_steps(marks, steps, mount=''):
     ('steps', 'begins'),
     [
         ({0: 0.0, 1: 1.0, 2: 0.0} | dict.fromkeys(range(3, 100), 0.0) | {100: 1.0}, (1, 100)),
-        # Damping that flutters, with pauses shorter than 40 ms, is on.
+        # An opening that flutters, with pauses shorter than 40 ms, is one.
         ({time: 0.03 if time % 30 < 15 and 100 < time < 300 else 0.0 for time in range(400)}, (101,)),
         (dict(enumerate((0.0, 0.1, 0.7, 1.0, 0.4))), (1,)),
     ],
