@@ -3,13 +3,13 @@
 Those that drive something are written at its rate, others as sampled.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.even_grid import evenly_spaced
@@ -36,8 +36,24 @@ PREFIX = 'measured/'
 """The beginning of topics that only foreign recordings have."""
 SCENARIO = 'imported'
 """The scenario of such a recording, as its session tells it."""
-_BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for each topic
-Times = NDArray[np.int64]
+_BLOCK = 5_000_000_000  # ns, chosen: 5 s at 1 kHz are 2 MB of messages for each topic
+
+
+@dataclass(frozen=True, eq=False)
+class SampledStamps:
+    """Stamps in ns of `times` (n,), s after `begin` (ns), made where they are needed: it can be an hour."""
+
+    times: FloatArray
+    begin: int
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.begin + np.rint(SECOND * self.times[place]).astype(np.int64)
+
+
+Stamps = SampledStamps | range
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +63,7 @@ class Channel:
     topic: Topic
     field: str
     unit: str
-    stamps: Times
+    stamps: Stamps
     values: FloatArray
 
 
@@ -70,7 +86,7 @@ def channels_of(
     Raises `SignalError` for what no command could follow.
     """
     notes: list[str] = []
-    found: dict[str, tuple[Times, FloatArray]] = {}
+    found: dict[str, tuple[Stamps, FloatArray]] = {}
     ends = (DISPLACEMENT,) if DISPLACEMENT in signals else (ENGINE, CHASSIS)
     if all(name in signals for name in ends):
         sides = [signals[name] for name in ends]
@@ -88,7 +104,7 @@ def channels_of(
             found[name] = stamps, values
         elif name != DISPLACEMENT:
             check_order(signal.name, signal.times, 'cut the file there')
-            found[name] = signal.begin + np.rint(SECOND * signal.times).astype(np.int64), signal.values
+            found[name] = SampledStamps(signal.times, signal.begin), signal.values
     channels = []
     for name, (stamps, values) in found.items():
         wanted = quantities.get(name) or QUANTITIES[name]
@@ -120,7 +136,7 @@ def write_channels(
 
 def _resampled(
     signals: Sequence[Signal], lowest_rate: float, shortest: float, notes: list[str]
-) -> tuple[Times, list[FloatArray]]:
+) -> tuple[Stamps, list[FloatArray]]:
     """Return stamps (ns) at the rate of a drive for as long as all signals last, and the values of each.
 
     Adds what was done to `notes`; raises `SignalError`, also where they last for less than `shortest` (s).
@@ -143,7 +159,7 @@ def _resampled(
         if not has_step(one, step)
     ]
     values = [resampled(one, step, (begin - one.begin) / SECOND, count)[:] for one in even]
-    return np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64), values
+    return range(begin, begin + count * step_ns, step_ns), values
 
 
 def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, behind: int) -> None:
@@ -152,9 +168,10 @@ def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, beh
     messages: list[bytes] = []
     stamps = [np.zeros(0, np.int64)]
     for channel in channels:
-        part = slice(*np.searchsorted(channel.stamps, [first, behind]))
+        part = slice(bisect_left(channel.stamps, first), bisect_left(channel.stamps, behind))
         if part.start < part.stop:
-            topic, own, values = channel.topic, channel.stamps[part], channel.values[part]
+            topic, values = channel.topic, channel.values[part]
+            own = np.asarray(channel.stamps[part], np.int64)
             if topic.type == JOINT_STATE:
                 rows = ScalarsLayout(topic).pack_rows(own, values[:, None])
             else:

@@ -22,11 +22,10 @@ from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
-from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count, mean
 from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, si_unit, unit_of
-from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
@@ -65,8 +64,8 @@ def select(
     if not mapping.choices:
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
-    uri = measured.provenance.uri
-    signals, quantities, columns = {}, {}, {}
+    uri, provenance, own_notes = measured.provenance.uri, measured.provenance, measured.notes
+    signals, quantities, columns, chosen = {}, {}, {}, []
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
         if name not in mapping.others:
@@ -84,28 +83,36 @@ def select(
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
+        chosen.append((wanted, choice, column, where, base, notes))
+    del measured, column, base
+    while chosen:  # by and by, so that what the file holds of a column goes before the next is converted
+        wanted, choice, column, where, base, notes = chosen.pop(0)
+        name, count = wanted.name, column.values.size
         is_known = _known(where, column, base, whole=whole)
-        own = replace(column, values=column.values[is_known])
-        unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
-        values = unit.to_si(own.values)
+        times = base.times
+        if not is_known.all():
+            column, times = replace(column, values=column.values[is_known]), times[is_known]
+        unit, scale, more = unit_of_column(where, column, wanted, choice, mapping.option)
+        values = unit.to_si(column.values)
         values *= scale  # in place: it can be an hour
         offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
         if offset:
             values -= offset
             which = 'its mean' if choice.offset == MEAN else 'as said'
             more.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
-        times = base.times[is_known]
         begin = base.begin + round(SECOND * float(times[0]))
-        if missing := column.values.size - values.size:
+        if missing := count - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
+        if times[0]:
+            times = times - times[0]
+        signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
             'times': base.told, 'samples': int(values.size),
             **({'offset': choice.offset} if choice.offset else {}),
         }  # fmt: skip
         quantities[name] = wanted
-    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
+    return Selection(signals, quantities, columns, provenance, own_notes)
 
 
 def select_rows(

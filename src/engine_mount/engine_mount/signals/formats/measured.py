@@ -1,12 +1,12 @@
 """What any file of measured signals is read into: columns as the file holds them, none converted."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.sources.uris import is_local, name_of, shown
-from engine_mount.signals.units import unit_of
+from engine_mount.signals.units import Unit, unit_of
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -75,13 +75,15 @@ class MeasuredColumn(Heading):
 class Measured:
     """A file as named columns, with what a reader must know: `notes` are sentences.
 
-    `others` are the headings of columns that were not asked for.
+    `others` are the headings of columns that were not asked for, `time_bases` those made of columns so far,
+    by name and unit.
     """
 
     columns: Mapping[str, MeasuredColumn]
     provenance: Provenance
     notes: tuple[str, ...] = ()
     others: tuple[Heading, ...] = ()
+    time_bases: dict[tuple[str, Unit], TimeBase] = field(default_factory=dict)
 
     @property
     def headings(self) -> list[Heading]:
