@@ -64,18 +64,14 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
             f'{name}: time does not rise: all samples are at {signal.times[0]:g} s; say their --rate'
         )
     again = (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)
-    times, values = signal.times, signal.values
-    if again.any():
-        once = np.concatenate([[True], ~again])
-        times, values = times[once], values[once]
+    once = np.concatenate([[True], ~again]) if again.any() else slice(None)
+    times, values = signal.times[once], signal.values[once]
     check_count(name, times.size)
-    numbers = np.arange(times.size, dtype=np.float64) - 0.5 * (times.size - 1)
+    numbers = np.arange(times.size) - 0.5 * (times.size - 1)
     period = mean(numbers * times) / mean(numbers * numbers)
     first = mean(times) + numbers[0] * period
     del numbers  # it can be an hour
-    line = first + period * np.arange(times.size, dtype=np.float64)
-    line -= times
-    late = float(max(line.max(), -line.min())) / period
+    late = float(np.abs(times - (first + period * np.arange(times.size))).max()) / period
     notes = list(signal.notes)
     if late > JITTER:
         first, period, values, done = _by_stamps(name, times, values, period, longest_gap)

@@ -64,7 +64,7 @@ def select(
     if not mapping.choices:
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
-    uri, provenance, own_notes = measured.provenance.uri, measured.provenance, measured.notes
+    uri = measured.provenance.uri
     signals, quantities, columns, chosen = {}, {}, {}, []
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
@@ -77,34 +77,31 @@ def select(
             raise SignalError(
                 f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
             )
-        where = f'{name_of(uri)}, column {column.name!r}'
         base, notes = column.time, ()
         if timed:
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
-        chosen.append((wanted, choice, column, where, base, notes))
-    del measured, column, base
-    while chosen:  # by and by, so that what the file holds of a column goes before the next is converted
-        wanted, choice, column, where, base, notes = chosen.pop(0)
-        name, count = wanted.name, column.values.size
+        chosen.append((name, choice, wanted, column, base, notes))
+    measured = replace(measured, columns={})  # what the file holds of a column goes when it is converted
+    while chosen:
+        name, choice, wanted, column, base, notes = chosen.pop(0)
+        where = f'{name_of(uri)}, column {column.name!r}'
         is_known = _known(where, column, base, whole=whole)
-        times = base.times
-        if not is_known.all():
-            column, times = replace(column, values=column.values[is_known]), times[is_known]
-        unit, scale, more = unit_of_column(where, column, wanted, choice, mapping.option)
-        values = unit.to_si(column.values)
+        own = replace(column, values=column.values[is_known])
+        unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
+        values = unit.to_si(own.values)
         values *= scale  # in place: it can be an hour
         offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
         if offset:
             values -= offset
             which = 'its mean' if choice.offset == MEAN else 'as said'
             more.append(f'{where}: {offset:.5g} {wanted.unit.symbol} subtracted ({which})')
+        times = base.times[is_known]
         begin = base.begin + round(SECOND * float(times[0]))
-        if missing := count - values.size:
+        if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        if times[0]:
-            times = times - times[0]
+        times = times - times[0] if missing else base.from_first
         signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
@@ -112,7 +109,7 @@ def select(
             **({'offset': choice.offset} if choice.offset else {}),
         }  # fmt: skip
         quantities[name] = wanted
-    return Selection(signals, quantities, columns, provenance, own_notes)
+    return Selection(signals, quantities, columns, measured.provenance, measured.notes)
 
 
 def select_rows(
@@ -183,7 +180,7 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
     return fitting[0] if fitting else None
 
 
-def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:
+def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_] | slice:
     """Return which samples hold a number; raises `SignalError` for values without times or bounds."""
     if base.times.size != column.values.size:
         raise SignalError(
@@ -198,7 +195,7 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
             said = f'row {place + 1} is {value}'
         raise SignalError(f'{where}: {said} ({bad.size} such of {known.size}); repair it or cut it out')
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
-    return known
+    return slice(None) if known.all() else known  # a copy of an hour less
 
 
 def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:

@@ -89,10 +89,7 @@ def _in_column(measured: Measured, column: MeasuredColumn, said: str) -> Times:
     told = f'column {column.name!r} in {unit.symbol}'
     told += ', counted from 1970' if _EPOCH[0] < origin < _EPOCH[1] else ''
     begin = round(float(raw[0]) * round(unit.factor * SECOND))
-    bases = measured.time_bases
-    if (column.name, unit) not in bases:
-        bases[column.name, unit] = TimeBase((raw - raw[0]) * unit.factor, begin, told)
-    return bases[column.name, unit], notes
+    return TimeBase((raw - raw[0]) * unit.factor, begin, told), notes
 
 
 def _unit(where: str, column: MeasuredColumn, said: str) -> tuple[Unit, tuple[str, ...]]:

@@ -1,12 +1,13 @@
 """What any file of measured signals is read into: columns as the file holds them, none converted."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.sources.uris import is_local, name_of, shown
-from engine_mount.signals.units import Unit, unit_of
+from engine_mount.signals.units import unit_of
 
 _LISTED = 40  # names in a refusal, chosen
 
@@ -43,6 +44,11 @@ class TimeBase:
     begin: int
     told: str
 
+    @cached_property
+    def from_first(self) -> FloatArray:
+        """The times in s after the first, shared by the columns too."""
+        return self.times - self.times[0] if self.times[0] else self.times
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -75,15 +81,13 @@ class MeasuredColumn(Heading):
 class Measured:
     """A file as named columns, with what a reader must know: `notes` are sentences.
 
-    `others` are the headings of columns that were not asked for, `time_bases` those made of columns so far,
-    by name and unit.
+    `others` are the headings of columns that were not asked for.
     """
 
     columns: Mapping[str, MeasuredColumn]
     provenance: Provenance
     notes: tuple[str, ...] = ()
     others: tuple[Heading, ...] = ()
-    time_bases: dict[tuple[str, Unit], TimeBase] = field(default_factory=dict)
 
     @property
     def headings(self) -> list[Heading]:

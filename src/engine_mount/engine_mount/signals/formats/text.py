@@ -48,27 +48,27 @@ def open_text(path: Path, stated: Stated) -> Content:
     titles, units, first, notes = _titles(path, dialect, head[: dialect.first - 1])
     if len(titles) > 1 and not titles[-1] and dialect.kinds[-1] == 'missing':
         titles = titles[:-1]  # behind a delimiter at the end of each line
-    columns: dict[int, NDArray[Any]] = {}
+    # they grow in place: what is joined of blocks would be an hour twice
+    columns = [bytearray() for _ in dialect.kinds]
     dates = [place for place, kind in enumerate(dialect.kinds) if kind == 'date'][:1]
 
     def prepare(numbers: Sequence[int]) -> None:
         places = list(dict.fromkeys([*numbers, *dates]))
-        # columns grow in place: blocks and what is joined of them would be an hour twice
-        bytes_of = {place: bytearray() for place in places}
         for number, block in _samples(path, codec, dialect, first) if places else ():
-            parts = _in_bulk(block, dialect, places)
-            parts = parts or _cell_by_cell(path, number, block, dialect, places, titles)
+            parts = _in_bulk(block, dialect, places) or _cell_by_cell(
+                path, number, block, dialect, places, titles
+            )
             for place, part in zip(places, parts, strict=True):
-                bytes_of[place] += part.tobytes()
-        if not all(bytes_of.values()):
+                columns[place] += part.tobytes()
+        if places and not columns[places[0]]:
             raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-        for place, whole in bytes_of.items():
-            columns[place] = np.frombuffer(whole, 'M8[ns]' if dialect.kinds[place] == 'date' else np.float64)
 
     leaves = [
         Leaf(
-            name, None if kind == 'text' else partial(columns.__getitem__, place), unit, header,
-            kind == 'date',
+            name,
+            None if kind == 'text'
+            else partial(np.frombuffer, columns[place], 'M8[ns]' if kind == 'date' else float),
+            unit, header, kind == 'date',
         )
         for place, ((name, header, unit), kind) in enumerate(
             zip(titles_and_units(titles, units), dialect.kinds, strict=False)
