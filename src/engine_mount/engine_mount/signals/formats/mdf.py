@@ -1,6 +1,11 @@
 """MDF files of measurement systems (versions 3 and 4): each channel on the time base of its own group."""
 
+import gc
+import sys
+import traceback
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +34,7 @@ def open_mdf(path: Path, stated: Stated) -> Content:
             'header block begins with HD or ##HD; is it cut off, or another format?'
         )
     notes, reader = list[str](), 'asammdf'
-    with readable(path, 'MDF file'):
+    with readable(path, 'MDF file'), _silent_destructor():
         # By a stream, for a path would be mapped whole into memory; of a logger that never closed its file
         # asammdf completes a copy. Frames are decoded by the user's database, by one within the file only
         # where there is none.
@@ -51,6 +56,20 @@ def open_mdf(path: Path, stated: Stated) -> Content:
         elif raw:
             notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
     return Content(path, f'MDF {file.version}', reader, leaves, notes)
+
+
+@contextmanager
+def _silent_destructor() -> Iterator[None]:
+    """Keep the destructor of a file that asammdf cannot open, which fails too, off the screen."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    except Exception as error:
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()
+        raise
+    finally:
+        sys.unraisablehook = hook
 
 
 def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:
