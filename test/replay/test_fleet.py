@@ -13,7 +13,7 @@ from engine_mount.fleet.example import make_example
 
 pytestmark = pytest.mark.slow
 
-SETTINGS = {'continuous_viscous.full_amplitude': 0.0006}
+SETTINGS = {'continuous_viscous.half_amplitude': 0.00024}
 RECORDINGS = 12
 OF_THE_PLACE = ('uri', 'fingerprint')
 

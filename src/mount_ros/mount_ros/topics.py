@@ -150,8 +150,8 @@ CONTROL_TRACE = Topic(
         Scalar('predicted_velocity', 'm/s'),
         Scalar('magnitude', 'm'),
         Scalar('amplitude', 'm'),
-        Scalar('idle_amplitude', 'm'),
-        Scalar('idle_frequency', 'Hz'),
+        Scalar('line_amplitude', 'm'),
+        Scalar('line_frequency', 'Hz'),
         Scalar('engine_velocity', 'm/s'),
     ),
 )

@@ -57,7 +57,7 @@ def test_a_replay_tells_how_many_have_no_figures_and_writes_what_it_tells(fleet,
 
 
 def test_recordings_with_another_policy_are_told_apart(fleet, tmp_path):
-    change = ('--set', 'continuous_viscous.full_amplitude=0.0006')
+    change = ('--set', 'continuous_viscous.half_amplitude=0.00024')
     printed = command('fleet', 'replay', fleet, *change, '--out', tmp_path / 'result')
     assert 'recordings 2: 0 replayed, 1 with another policy, 1 failed' in printed
 

@@ -114,7 +114,7 @@ def test_a_damaged_recording_is_a_row_with_its_reason(fleet, tmp_path, inside):
 
 
 def test_a_recording_with_another_policy_is_told_apart_from_one_that_failed(fleet, tmp_path, inside):
-    changes = parsed_changes({'continuous_viscous.full_amplitude': 0.0006})
+    changes = parsed_changes({'continuous_viscous.half_amplitude': 0.00024})
     done = replayed(fleet, tmp_path / 'result', changes)
     rows = done.table.to_pylist()
     assert [row['outcome'] for row in rows] == ['failed', 'another policy', 'replayed', 'another policy']

@@ -53,7 +53,7 @@ Examples:
 
 `engine-mount fleet replay CATALOGUE --set policy=switched_viscous --out result --workers 2`
 
-`engine-mount fleet replay s3://bucket/drives --set continuous_viscous.full_amplitude=0.0006 --out result`
+`engine-mount fleet replay s3://bucket/drives --set continuous_viscous.half_amplitude=0.00024 --out result`
 
 `engine-mount fleet replay drives --set highest_current=2.0 --closed-loop --out moved` - and the motion?
 
