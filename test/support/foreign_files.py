@@ -5,6 +5,7 @@
 """
 
 import csv
+import gzip
 import json
 import struct
 from pathlib import Path
@@ -60,6 +61,51 @@ def _table(path, times, columns, delimiter, decimal, before=()):
         for row in np.column_stack([times, stacked(columns)]).tolist():
             writer.writerow([repr(value).replace('.', decimal) for value in row])
     return Made(path, own_names(columns), 't')
+
+
+def make_gzip(folder, name, times, columns):
+    """Write a CSV file and compress it."""
+    made = make_csv(folder, name, times, columns)
+    path = folder / f'{name}.csv.gz'
+    path.write_bytes(gzip.compress(made.path.read_bytes()))
+    return made._replace(path=path)
+
+
+def lvm(form):
+    """Return the maker of a LabVIEW measurement with one, several or no columns of X."""
+
+    def make(folder, name, times, columns):
+        count, path = len(columns), folder / f'{name}.lvm'
+        header = {
+            'Writer_Version': ['2'],
+            'Separator': ['Tab'],
+            'Decimal_Separator': ['.'],
+            'X_Columns': [form],
+        }
+        units = [unit for unit, _ in columns.values()]
+        segment = {
+            'Channels': [str(count)], 'Y_Unit_Label': units, 'X_Dimension': ['Time'] * count,
+            'X0': [repr(float(times[0]))] * count, 'Delta_X': [repr(float(times[1] - times[0]))] * count,
+        }  # fmt: skip
+        lines = ['LabVIEW Measurement\t']
+        for part in (header, segment):
+            lines += ['\t'.join([key, *cells, '']) for key, cells in part.items()]
+            lines += ['***End_of_Header***\t', '\t'] if part is header else ['***End_of_Header***\t']
+        titles = (
+            'X_Value\t'.join(f'{key}\t' for key in columns) if form == 'Multi' else '\t'.join([*columns, ''])
+        )
+        lines += [f'X_Value\t{titles}Comment']
+        for time, row in zip(times.tolist(), stacked(columns).tolist(), strict=True):
+            x = '' if form == 'No' else repr(time)
+            lines += [
+                '\t'.join(f'{x}\t{value!r}' for value in row)
+                if form == 'Multi'
+                else '\t'.join([x, *map(repr, row)])
+            ]
+        path.write_text('\r\n'.join(lines) + '\r\n', newline='')
+        return Made(path, own_names(columns))
+
+    return make
 
 
 def make_text(folder, name, times, columns):
@@ -125,6 +171,16 @@ def make_matlab(folder, name, times, columns):
 
     path = folder / f'{name}.mat'
     savemat(path, {'rec': {'t': times, **{key: values for key, (_, values) in columns.items()}}})
+    return Made(path, own_names(columns), 't', units=False)
+
+
+def make_matlab_sparse(folder, name, times, columns):
+    """Write a MATLAB 5 file with sparse columns."""
+    from scipy.io import savemat
+    from scipy.sparse import csc_array
+
+    path = folder / f'{name}.mat'
+    savemat(path, {'t': times, **{key: csc_array(one[:, np.newaxis]) for key, (_, one) in columns.items()}})
     return Made(path, own_names(columns), 't', units=False)
 
 
@@ -300,7 +356,9 @@ def _bag(folder, storage, times, columns):
 
 
 MAKERS = {
-    'csv': make_csv, 'german_csv': make_german_csv, 'text': make_text, 'npy': make_npy,
+    'csv': make_csv, 'csv_gz': make_gzip,
+    'lvm_one': lvm('One'), 'lvm_multi': lvm('Multi'), 'lvm_no': lvm('No'),
+    'matlab_sparse': make_matlab_sparse, 'german_csv': make_german_csv, 'text': make_text, 'npy': make_npy,
     'comma2k19': make_comma2k19, 'npz': make_npz, 'json': make_json, 'parquet': make_parquet,
     'matlab': make_matlab, 'matlab_73': make_matlab_73, 'hdf5': make_hdf5, 'excel': make_excel,
     'mdf': make_mdf, 'mdf3': make_mdf3, 'blf': can_log('blf'), 'asc': can_log('asc'),

@@ -7,6 +7,7 @@ not `ms`), but that of words of three letters or more is not (`Sec`). Factors ar
 """
 
 import difflib
+import re
 from dataclasses import dataclass
 
 from engine_mount.signals.signal import FloatArray, SignalError
@@ -51,7 +52,7 @@ _UNITS_OF: dict[str, dict[str, float]] = {
         "ft foot feet '": _FOOT,
     },
     'velocity': {
-        'm/s mps m*s^-1': 1.0,
+        'm/s mps': 1.0,
         'mm/s': 1e-3,
         'um/s': 1e-6,
         'cm/s': 1e-2,
@@ -61,8 +62,8 @@ _UNITS_OF: dict[str, dict[str, float]] = {
         'ft/s fps ft/sec': _FOOT,
     },
     'acceleration': {
-        'm/s^2 m/s2 m/s/s mps2 m/sec^2 m/sec2 m*s^-2 m*s-2 m*s^-2 ms^-2 ms-2': 1.0,
-        'g g_n gn g0 g_0': STANDARD_GRAVITY,
+        'm/s^2 m/s2 m/s/s mps2 m/sec^2 m/sec2 m*s-2 ms^-2 ms-2': 1.0,
+        'g g_n gn g0 g_0 G': STANDARD_GRAVITY,
         'mg milli-g': 1e-3 * STANDARD_GRAVITY,
         'mm/s^2 mm/s2': 1e-3,
         'cm/s^2 cm/s2 gal': 1e-2,
@@ -116,8 +117,8 @@ _UNITS_OF: dict[str, dict[str, float]] = {
 }
 _ZEROS = {'degC': ZERO_CELSIUS, 'degF': ZERO_CELSIUS - 32.0 * 5.0 / 9.0}  # K
 _SIGNS = str.maketrans({'µ': 'u', 'μ': 'u', '²': '^2', '·': '*', '⋅': '*', '°': 'deg', '″': '"', 'Ω': 'Ω'})
+_PRODUCT = re.compile(r' *[* ] *([a-z]+)\^-(\d)')  # m s^-2 is m/s^2
 _TRAPS = {
-    'G': 'G is gauss or gravity; for gravity write g, for gauss give the values in T',
     'S': 'S is siemens; for seconds write s',
     'mS': 'mS is millisiemens; for milliseconds write ms',
     'uS': 'uS is microsiemens; for microseconds write us',
@@ -186,4 +187,6 @@ def units_of(dimension: str) -> tuple[Unit, ...]:
 
 
 def _plain(text: str) -> str:
-    return text.strip().strip('[](){}').replace('**', '^').replace(' ', '').translate(_SIGNS)
+    text = text.strip().strip('[](){}').replace('**', '^').translate(_SIGNS)
+    quotient = _PRODUCT.sub(r'/\1^\2', text).replace('^1', '')
+    return quotient if quotient in _UNITS else text.replace(' ', '')

@@ -88,3 +88,22 @@ def test_frames_without_their_database_and_with_another_are_refused(stated, tmp_
         read_frames(tmp_path / 'a.mf4', frames(), Stated(dbc=tmp_path / 'other.dbc'))
     with pytest.raises(SignalError, match=r'a\.mf4 holds raw CAN frames; name the database .* with --dbc'):
         read(tmp_path / 'a.mf4')
+
+
+def test_j1939_is_matched_by_group_a_column_for_each_source_without_values_not_available(tmp_path):
+    (tmp_path / 'truck.dbc').write_text(
+        'VERSION ""\nBU_: E\nBO_ 2364540158 EEC1: 8 E\n SG_ speed : 24|16@1+ (0.125,0) [0|8031.875] "rpm" E\n'
+    )
+    engine, other = 0x0CF00400 | 1 << 31, 0x18F00427 | 1 << 31  # other priority and source than 0x0CF004FE
+    written = [
+        (0.01 * place, 1, key, struct.pack('<BBBHBBB', 0, 0, 0, raw, 0, 0, 0))
+        for place in range(20)
+        for key, raw in ((engine, 0xFFFF if place == 3 else 8 * place), (other, 0xFAFF))
+    ]
+    measured = read_frames(tmp_path / 'a.mf4', written, Stated(dbc=tmp_path / 'truck.dbc'))
+    speed = measured.column('0x00/EEC1.speed')
+    assert speed.values.tolist() == [float(place) for place in range(20) if place != 3]
+    assert set(measured.column('0x27/EEC1.speed').values.tolist()) == {8031.875}
+    assert '1 of 20 samples are sent as not available or as errors (above 8031.88)' in ' '.join(
+        measured.notes
+    )

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engine_mount.signals.formats import text as module
-from engine_mount.signals.formats.cells import name_and_unit
+from engine_mount.signals.formats.cells import date_in, name_and_unit
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.mapping import mapping_in_file
@@ -127,6 +127,7 @@ def test_missing_values_are_nan_and_told(tmp_path):
     [
         ('2024-05-01 12:00:0{}.250', 0), ('2024-05-01T12:00:0{}.250Z', 0),
         ('2024-05-01 12:00:0{}.250+01:00', 1), ('1.5.2024 12:00:0{},250', 0),
+        ('5/1/2024 12:00:0{}.250 PM', 0), ('2024/5/1 12:00:0{}.250', 0),
     ],
 )  # fmt: skip
 def test_dates_are_the_times_of_the_other_columns(tmp_path, form, hours):
@@ -134,6 +135,25 @@ def test_dates_are_the_times_of_the_other_columns(tmp_path, form, hours):
     column = _read(tmp_path, '\n'.join(lines), ['az']).column('az')
     np.testing.assert_array_equal(column.time.times, np.arange(5.0))
     assert column.time.begin == (1714564800 - 3600 * hours) * 10**9 + 250_000_000
+
+
+def test_a_day_above_12_is_no_month():
+    assert date_in('24/11/2026 9:30') == date_in('11/24/2026 9:30') == date_in('2026-11-24 09:30')
+
+
+def test_times_of_day_pass_midnight_and_a_clock_slower_than_the_samples_gives_no_times(tmp_path):
+    samples = [(f'{hour}:{minute}:{second}.5', place) for place, (hour, minute, second) in enumerate(
+        [('23', '59', '58'), ('23', '59', '59'), ('00', '00', '00'), ('00', '00', '01')]
+    )]  # fmt: skip
+    text = '\n'.join(['day;clock;az', *(f'24.11.2026;{clock};{value}' for clock, value in samples)])
+    time = _read(tmp_path, text, ['az']).column('az').time
+    assert time.times.tolist() == [86398.5, 86399.5, 86400.5, 86401.5]
+    assert time.begin == 0
+    text = '\n'.join(['t;clock;az', *(f'{place / 4};10:00:0{place // 4};1' for place in range(16))])
+    measured = _read(tmp_path, text)
+    assert list(measured.columns) == ['t', 'az']
+    assert measured.column('az').time is None
+    assert 'clock: one date for several samples, no times of these' in measured.notes
 
 
 @pytest.mark.parametrize(

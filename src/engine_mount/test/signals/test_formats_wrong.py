@@ -77,6 +77,10 @@ def test_a_damaged_file_is_refused_or_read(whole, kind, tmp_path, place, noise):
     _read_or_refused(path, file.stated)
 
 
+# nothing of a library reaches the screen, its failing destructors included
+pytestmark = pytest.mark.filterwarnings('error::pytest.PytestUnraisableExceptionWarning')
+
+
 def _refusal(path, columns=None, **stated):
     with pytest.raises(SignalError) as caught:
         read(path, columns, Stated(**stated))
@@ -90,6 +94,7 @@ def test_what_is_not_there_or_not_read_is_named(tmp_path):
         'empty.mf4': (b'', 'is empty'),
         'a.wav': (b'RIFF\0\0\0\0WAVE', 'type .wav are not read; read are CSV'),
         'old.xls': (b'\xd0\xcf\x11\xe0', 'save it as .xlsx'), 'a.bag': (b'#ROSBAG V2.0\n', 'rosbags-convert'),
+        'ride.fit': (b'\x0e\x10\0\0\0\0\0\0.FIT\0\0', 'export it as CSV'),
         'a.csv': (b'version https://git-lfs.github.com/spec/v1\n', 'git lfs pull'),
     }  # fmt: skip
     for name, (content, reason) in contents.items():

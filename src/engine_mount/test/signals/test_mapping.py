@@ -88,7 +88,7 @@ def test_quantity_and_unit_of_an_option(option, quantity, column, unit):
     ('options', 'reason'),
     [
         ({'columns': ['foo']}, 'say what it is, as in displacement=foo'),
-        ({'columns': ['foo:G']}, 'for gravity write g'),
+        ({'columns': ['foo:KN']}, 'for kilonewtons write kN'),
         ({'columns': ['a:mm', 'b:um']}, 'displacement is named twice'),
         ({'time': 't', 'rate': 100.0}, 'both say the times'),
     ],

@@ -17,6 +17,8 @@ from engine_mount.signals.units import is_unit, unit_of
         ('mg', 'mg', 1000.0, 9.80665),
         ('m/s²', 'm/s^2', 1.0, 1.0),
         ('m·s^-2', 'm/s^2', 1.0, 1.0),
+        ('m s^-1', 'm/s', 1.0, 1.0),
+        ('(G)', 'g', 1.0, 9.80665),
         ('lbf', 'lbf', 1.0, 4.4482216152605),
         ('kip', 'kip', 1.0, 4448.2216152605),
         ('Sec', 's', 1.0, 1.0),
@@ -38,7 +40,6 @@ def test_a_spelling_leads_to_si(text, symbol, value, in_si):
 @pytest.mark.parametrize(
     ('text', 'hint'),
     [
-        ('G', 'for gravity write g'),
         ('mS', 'for milliseconds write ms'),
         ('S', 'for seconds write s'),
         ('KN', 'write kN'),

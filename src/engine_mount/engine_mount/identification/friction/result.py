@@ -164,6 +164,8 @@ class FrictionIdentification:
         """Show notes, steps, ladder and what keeps a coefficient from being written."""
         for sentence in self.notes:
             screen.note(sentence)
+        for case in self.cases:
+            screen.note(case.sentence, 'warning')
         if self.ramps:
             rows = [
                 (
@@ -195,7 +197,7 @@ class FrictionIdentification:
         if self.ladder:
             screen.table(_ladder_table(self.ladder))
             screen.say(f'best: {self.best}')
-        for case in self.all_cases():
+        if self.ladder and (case := ladder_case(self.ladder, self.best)):
             screen.note(case.sentence, 'warning')
 
     def specimen(self, name: str = '') -> Specimen:

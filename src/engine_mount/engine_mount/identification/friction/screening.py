@@ -37,12 +37,14 @@ LOOK_SAMPLES = 1200
 """Samples of a recording that the fit sees (chosen)."""
 NEVER = 0.02
 """Share of the way below which a contact does not slide (chosen)."""
-MOST = 0.5
-"""Share of the way above which sticking, or play, is what is seen (chosen)."""
+MOST = 0.5  # chosen
+"""Share of the way above which sticking, or play, is what is seen, and below which sliding is not."""
 EXPLAINED = 0.6
 """Share of a force's mean square about its zero that friction with spring and play must explain (chosen)."""
 LARGEST_ERROR = 0.35
 """Error, rms over rms, above which no law of the ladder counts (chosen): an eighth of the square."""
+EXPECTED_ERROR = 0.25  # chosen
+"""Largest error expected of a contact that slides and is clamped (docs/explanation/identification.md)."""
 _STIFFNESSES = (5.0, 20.0, 80.0)  # of half the range of force over the stroke, chosen
 _PLAYS = (0.002, 0.05, 0.2)  # of the stroke, chosen
 _FINISHED = 3  # searches that are carried through, chosen
@@ -81,7 +83,12 @@ class FirstLook(NamedTuple):
     @property
     def known(self) -> bool:
         """Whether the loop determines the zero well enough to be used."""
-        return self.deviation < LARGEST_DEVIATION * (self.limits[0] + self.limits[1]) / 2.0
+        return self.deviation < LARGEST_DEVIATION * self.sliding_force
+
+    @property
+    def sliding_force(self) -> float:
+        """Mean force of sliding of both sides, N."""
+        return (self.limits[0] + self.limits[1]) / 2.0
 
 
 class Case(NamedTuple):
@@ -101,13 +108,14 @@ def subtract_zero(recording: FrictionRecording, zero_from: str = '') -> tuple[Fr
     if source not in ZEROS:
         raise IdentificationError(f'--zero {source!r} must be one of {", ".join(ZEROS)}')
     look = first_look(recording)
-    by_loop, zero, note = f'{look.zero:.0f} +- {look.deviation:.0f} N', 0.0, ''
+    width = f'+- {look.deviation:.0f} N, {look.deviation / look.sliding_force:.1%} of the force of sliding'
+    by_loop, zero, note = f'{look.zero:.0f} N ({width})', 0.0, ''
     if source == 'law' and look.known:
-        zero, note = look.zero, f'force zero {by_loop}, from the loop'
+        zero, note = look.zero, f'force zero {by_loop} from the loop'
     elif source == 'law':
         note = (
-            f'force zero as recorded: the loop gives it only to +- {look.deviation:.0f} N; unclamp the '
-            'damper once and read the cell then'
+            f'force zero as recorded: the loop gives it only to {width} (limit {LARGEST_DEVIATION:.0%}); '
+            'unclamp the damper once and read the cell then'
         )
     elif look.known and abs(look.zero) > DOUBTED * look.deviation:
         note = f'force zero as recorded; doubtful: the loop gives {by_loop}; --zero law subtracts it'
@@ -248,6 +256,10 @@ def case_of(recording: FrictionRecording, look: FirstLook) -> Case | None:
         return Case('play dominates', f'{name}: play dominates: {shares}; {longer}, or take the play out')
     if look.sticking > MOST:
         return Case('mostly sticks', f'{name}: the contact mostly sticks: {shares}; {longer}')
+    if look.sliding < MOST:
+        return Case(
+            'hardly slides', f'{name}: the contact slides on less than {MOST:.0%}: {shares}; {longer}'
+        )
     return None
 
 
@@ -277,8 +289,15 @@ def ladder_case(ladder: Mapping[str, Mapping[str, Any]], best: str) -> Case | No
     """Return the case that a ladder is, by the errors of its best law; None where that one is of use."""
     training, held_out = ladder[best]['train_error'], ladder[best]['held_out_error']
     error = training if held_out is None else held_out
-    if error <= LARGEST_ERROR:
+    if error <= EXPECTED_ERROR or (held_out is None and error <= LARGEST_ERROR):
         return None
+    if error <= LARGEST_ERROR:
+        return Case(
+            'poorly predicted',
+            f'{best} errs by {error:.1%} of what was held out (expected: up to {EXPECTED_ERROR:.0%}): a '
+            'loosely clamped contact does, whose pressure is not that of the clamp, or one that changed in '
+            'between; clamp it firmly, or measure the normal force',
+        )
     if training > LARGEST_ERROR:
         return Case(
             'not explained',

@@ -1,5 +1,6 @@
 """CAN frames, of logs and within MDF 4 files, decoded by a user's database: a column for each signal."""
 
+import math
 from array import array
 from collections import Counter, defaultdict
 from functools import cache, partial
@@ -33,6 +34,7 @@ class Frames:
         with readable(dbc, 'database of CAN messages', 'give a .dbc, .arxml, .kcd or .sym file'):
             messages = cantools.database.load_file(str(dbc), strict=False).messages
         self._messages = {one.frame_id | _EXTENDED * one.is_extended_frame: one for one in messages}
+        self._groups = {_group(one.frame_id): one for one in messages if _is_j1939(one)}
         self._path, self._dbc, self._notes = path, dbc, notes
         self._times: dict[Key, array[float]] = defaultdict(lambda: array('d'))
         self._payloads: dict[Key, list[bytes]] = defaultdict(list)
@@ -42,8 +44,10 @@ class Frames:
         """Add a frame; `time` in s."""
         key = bus, identifier | _EXTENDED * extended
         if key[1] not in self._messages:
-            self._unknown[key[1]] += 1
-            return
+            if not extended or _group(identifier) not in self._groups:
+                self._unknown[key[1]] += 1
+                return
+            self._messages[key[1]] = self._groups[_group(identifier)]
         self._times[key].append(time)
         self._payloads[key].append(data)
 
@@ -64,10 +68,14 @@ class Frames:
                 f'{self._unknown.total()} frames of {len(self._unknown)} identifiers that {self._dbc.name} '
                 f'does not name: {unknown}'
             )
-        buses, leaves = Counter(key for _, key in self._times), []
+        leaves, senders = list[Leaf](), defaultdict[Any, set[Key]](set)
+        for key in self._times:
+            senders[self._messages[key[1]]].add(key)
         for key in sorted(self._times):
             message, decoded = self._messages[key[1]], cache(partial(self._decode, key, begin))
-            prefix = f'{key[0]}/{message.name}' if buses[key[1]] > 1 else message.name
+            buses, sources = map(set, zip(*senders[message], strict=True))
+            prefix = f'{key[0]}/' * (len(buses) > 1) + f'0x{key[1] & 0xFF:02X}/' * (len(sources) > 1)
+            prefix += message.name
             for signal in message.signals:
                 name = signal.name
                 read, clock = (lambda part=part, name=name, of=decoded: of()[name][part] for part in (0, 1))
@@ -90,6 +98,15 @@ class Frames:
                 continue
             for name, value in values.items():
                 columns[name][place] = value
+        for signal in message.signals if _is_j1939(message) else ():
+            column, most = columns[signal.name], _valid_to(signal)
+            absent = column > most
+            if absent.any():
+                column[absent] = np.nan
+                self._notes.append(
+                    f'{message.name}.{signal.name}: {np.count_nonzero(absent)} of {column.size} samples are '
+                    f'sent as not available or as errors (above {most:g}), left out'
+                )
         if faulty:
             self._notes.append(
                 f'{message.name}: {faulty} of {len(payloads)} frames do not decode ({reason}), left out'
@@ -104,6 +121,31 @@ class Frames:
             base = TimeBase(times[known], begin, f'times of the frames of {message.name}')
             found[name] = column[known], bases.setdefault(known.tobytes(), base)
         return found
+
+
+def _is_j1939(message: Any) -> bool:
+    """Return whether a message belongs to J1939: by its attributes, or by the null address as source."""
+    null = message.is_extended_frame and message.frame_id & 0xFF == 0xFE
+    return bool(null or message.protocol == 'j1939')
+
+
+def _group(identifier: int) -> int:
+    """Return the parameter group number of a J1939 identifier (SAE J1939-21): without priority and source.
+
+    A PDU format below 240 is followed by the address of the receiver, which is no part of the number.
+    """
+    group = identifier >> 8 & 0x3FFFF
+    return group if group & 0xFF00 >= 240 << 8 else group & 0x3FF00
+
+
+def _valid_to(signal: Any) -> float:
+    """Return the largest valid value of a J1939 signal; larger ones mean an error or no value.
+
+    SAE J1939-71, section 5.1.4: the raw values of a whole number of bytes are valid up to 0xFA, 0xFAFF, ...
+    """
+    if signal.is_signed or signal.is_float or signal.length % 8 or signal.conversion.scale < 0.0:
+        return math.inf
+    return float(signal.conversion.raw_to_scaled((0xFB << signal.length - 8) - 1, decode_choices=False))
 
 
 def open_can_log(path: Path, stated: Stated) -> Content:

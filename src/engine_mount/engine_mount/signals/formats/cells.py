@@ -31,10 +31,22 @@ _GROUPS = {
     ',': re.compile(r"[+-]?\d{1,3}(?:(?:[.' ]\d{3}){2,}|(?:[.' ]\d{3})+,\d+)"),
 }
 """Numbers with signs between thousands, which are told from others and refused."""
-_DATE = re.compile(
-    r'(?:\d{4}-\d\d-\d\d|(\d\d?)\.(\d\d?)\.(\d{4}))[T ]'
-    r'(\d\d:\d\d(?::\d\d)?)(?:[.,](\d{1,9}))?(Z|[+-]\d\d:?\d\d)?'
-)  # ISO 8601, or as in 24.11.2026 10:00:00,5
+_CLOCK = (
+    r'(?P<hour>\d\d?):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,](?P<fraction>\d{1,9}))?'
+    r'(?: ?(?P<half>[AP])M)?(?P<zone>Z|[+-]\d\d:?\d\d)?'
+)
+_DATES = tuple(
+    re.compile(day + _CLOCK)
+    for day in (
+        r'(?P<year>\d{4})[-/](?P<month>\d\d?)[-/](?P<day>\d\d?)[T ]',
+        r'(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{4})[T ]',
+        r'(?P<day>1[3-9]|[23]\d)/(?P<month>\d\d?)/(?P<year>\d{4}) ',
+        r'(?P<month>\d\d?)/(?P<day>\d\d?)/(?P<year>\d{4}) ',
+        r'(?=\d+:\d+:)',
+    )
+)
+"""ISO 8601, `24.11.2026 10:00:00,5`, `24/11/2026 10:00`, `11/24/2026 10:00:00 AM`, and times of day."""
+_FIRST = {'year': '1970', 'month': '1', 'day': '1', 'second': '0', 'fraction': '', 'half': '', 'zone': ''}
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -52,7 +64,7 @@ def kind_of(cell: str, decimal: str) -> str:
         return 'number'
     if _GROUPS[decimal].fullmatch(cell):
         return 'thousands'
-    return 'date' if _DATE.fullmatch(cell) else 'text'
+    return 'date' if any(date.fullmatch(cell) for date in _DATES) else 'text'
 
 
 def number_in(cell: str, decimal: str) -> float:
@@ -65,15 +77,20 @@ def number_in(cell: str, decimal: str) -> float:
 
 
 def date_in(cell: str) -> int:
-    """Return a date in ns since 1970, without a zone taken as UTC; raises `ValueError`."""
-    match = _DATE.fullmatch(cell)
+    """Return a date in ns since 1970, without a zone taken as UTC; raises `ValueError`.
+
+    A time of day is one of 1970-01-01. Of dates with strokes the month is first, unless it exceeds 12.
+    """
+    match = next((match for date in _DATES if (match := date.fullmatch(cell))), None)
     if not match:
         raise ValueError(cell)
-    day, month, year, clock, fraction, zone = match.groups()
-    date = f'{year}-{month:0>2}-{day:0>2}' if year else cell[:10]
-    moment = datetime.fromisoformat(f'{date}T{clock}{zone or ""}')
+    part = _FIRST | {name: text for name, text in match.groupdict().items() if text}
+    hour = int(part['hour']) % 12 + 12 * (part['half'] == 'P') if part['half'] else part['hour']
+    moment = datetime.fromisoformat(
+        '{year}-{month:0>2}-{day:0>2}T{0:0>2}:{minute}:{second:0>2}{zone}'.format(hour, **part)
+    )
     seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-    return round(seconds) * 1_000_000_000 + int((fraction or '').ljust(9, '0'))
+    return round(seconds) * 1_000_000_000 + int(part['fraction'].ljust(9, '0'))
 
 
 _OTHERS = (

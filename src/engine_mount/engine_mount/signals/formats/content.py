@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from engine_mount.signals.formats.measured import Heading, MeasuredColumn, TimeBase
 from engine_mount.signals.signal import SECOND, FloatArray, SignalError
 
+_DAY = 86_400 * SECOND  # ns
 _LONGEST = 200  # letters of a library's own words, chosen
 
 
@@ -128,6 +129,10 @@ def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
             what = f'date number {missing[0]} is missing' if missing.size else 'there is no date'
             raise SignalError(f'{path}, column {header!r}: {what}; fill it in or remove the row')
         numbers = stamps.astype(np.int64)
+        if numbers.min() >= 0 and numbers.max() < _DAY:  # midnight may lie between
+            midnights = np.flatnonzero(np.diff(numbers) < -_DAY // 2) + 1
+            days = np.searchsorted(midnights, np.arange(numbers.size), 'right')
+            return TimeBase((numbers + _DAY * days) / SECOND, 0, f'times of day in column {header!r}')
         told = f'dates in column {header!r}, taken as UTC where they name no zone'
         return TimeBase((numbers - numbers[0]) / SECOND, int(numbers[0]), told)
 

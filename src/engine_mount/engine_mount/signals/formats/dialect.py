@@ -5,6 +5,7 @@ of cells are possible; of these the ones with the fewest columns of text stay. W
 they differ, the titles decide; where these do not either, the table is refused.
 """
 
+import operator
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -45,6 +46,11 @@ class Dialect:
         """The dialect in words."""
         name = _NAMES.get(self.delimiter, repr(self.delimiter))
         return f'{name}, decimal {"point" if self.decimal == "." else "comma"}'
+
+    def repeats(self, place: int) -> bool:
+        """Return whether most samples hold what the one before holds in the column at `place`."""
+        cells = [row[place] for row in self.rows if len(row) == len(self.kinds)]
+        return 2 * sum(map(operator.eq, cells, cells[1:])) > len(cells)
 
     @property
     def texts(self) -> float:

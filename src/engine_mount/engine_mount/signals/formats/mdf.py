@@ -1,6 +1,11 @@
 """MDF files of measurement systems (versions 3 and 4): each channel on the time base of its own group."""
 
+import gc
+import sys
+import traceback
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -29,7 +34,7 @@ def open_mdf(path: Path, stated: Stated) -> Content:
             'header block begins with HD or ##HD; is it cut off, or another format?'
         )
     notes, reader = list[str](), 'asammdf'
-    with readable(path, 'MDF file'):
+    with readable(path, 'MDF file'), _silent_destructor():
         # By a stream, for a path would be mapped whole into memory; of a logger that never closed its file
         # asammdf completes a copy. Frames are decoded by the user's database, by one within the file only
         # where there is none.
@@ -51,6 +56,20 @@ def open_mdf(path: Path, stated: Stated) -> Content:
         elif raw:
             notes.append('raw CAN frames are left out; --dbc names the database that decodes them')
     return Content(path, f'MDF {file.version}', reader, leaves, notes)
+
+
+@contextmanager
+def _silent_destructor() -> Iterator[None]:
+    """Keep the destructor of a file that asammdf cannot open, which fails too, off the screen."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        yield
+    except Exception as error:
+        traceback.clear_frames(error.__traceback__)
+        gc.collect()
+        raise
+    finally:
+        sys.unraisablehook = hook
 
 
 def _leaves(file: Any, path: Path, begin: int, notes: list[str]) -> list[Leaf]:
@@ -100,22 +119,20 @@ def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -
             )
     name = group.channels[index].name
     # asammdf itself would leave out invalid samples, but not their times
-    get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True)
-    signal = get()
-    if signal.samples.dtype.kind in 'SUO':
-        signal = get(raw=True)
-        if signal.samples.dtype.kind in 'fiub':
+    get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True, samples_only=True)
+    samples, invalid = get()
+    if samples.dtype.kind in 'SUO':
+        samples, invalid = get(raw=True)
+        if samples.dtype.kind in 'fiub':
             notes.append(f'{name}: its conversion gives text, so its raw numbers are taken')
-    samples = signal.samples
     if samples.dtype.kind not in 'fiub' or samples.ndim != 1:
         raise NoNumbersError(
             f'{path}, channel {name!r}: {samples.dtype} of shape {samples.shape} is no number for each '
             'sample; choose another channel'
         )
-    values = np.array(samples, np.float64)
-    if signal.invalidation_bits is not None:
-        values[np.asarray(signal.invalidation_bits, bool)] = np.nan
-    return values
+    if invalid is None:
+        return np.asarray(samples, np.float64)
+    return np.where(np.asarray(invalid, bool), np.nan, samples)
 
 
 def _group_name(file: Any, number: int) -> str:

@@ -1,22 +1,26 @@
 """The front door: any file of measured signals as named columns with unit, time base and provenance."""
 
+import gzip
 import hashlib
 import importlib
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from engine_mount.signals.formats.arrays import is_array_folder
 from engine_mount.signals.formats.can_frames import is_can_log
-from engine_mount.signals.formats.content import NOT_STATED, Content, Stated
+from engine_mount.signals.formats.content import NOT_STATED, Content, Stated, readable
 from engine_mount.signals.formats.measured import Heading, Measured, Provenance, found
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.sources.stores import local_copy
 
 _READ = (
-    'CSV and other text tables, JSON, NPY, NPZ, Parquet, MATLAB, HDF5, Excel (.xlsx), MDF, CAN logs '
-    '(BLF, ASC, TRC, candump), MCAP and rosbag2'
+    'CSV, LabVIEW (.lvm) and other text tables, JSON, NPY, NPZ, Parquet, MATLAB, HDF5, Excel (.xlsx), MDF, '
+    'CAN logs (BLF, ASC, TRC, candump), MCAP and rosbag2, and those compressed as .gz'
 )
 _MARKS = {
     b'\x93NUMPY': 'npy', b'PAR1': 'parquet', b'\x89HDF': 'hdf5', b'MATLAB': 'matlab',
@@ -26,11 +30,12 @@ _MARKS = {
 _REFUSED = {
     b'\xd0\xcf\x11\xe0': 'is a workbook of Excel before 2007; save it as .xlsx',
     b'#ROSBAG V2': 'is a bag of ROS 1; convert it with rosbags-convert',
+    b'.FIT': 'is a FIT file of a sports watch; export it as CSV',
     b'TDSm': 'is a TDMS file; export it as CSV, or as MDF',
-    b'\x1f\x8b': 'is compressed; unpack it with gunzip',
     b'version https://git-lfs': 'is a pointer of Git LFS; fetch the file itself with git lfs pull',
 }
 """What is known but not read, by the first bytes."""
+_GZIP = b'\x1f\x8b'
 _SUFFIXES = {
     '.json': 'json', '.jsonl': 'json', '.ndjson': 'json', '.npy': 'npy', '.npz': 'npz', '.parquet': 'parquet',
     '.xlsx': 'excel', '.mf4': 'mdf', '.mdf': 'mdf', '.h5': 'hdf5', '.hdf5': 'hdf5', '.mat': 'matlab',
@@ -48,8 +53,8 @@ def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated =
 
     Raises `SignalError` or `SourceError` with one sentence: file, place, value, what was expected, remedy.
     """
-    with local_copy(str(uri)) as path:
-        content = _opened(path, stated)
+    with local_copy(str(uri)) as path, _unpacked(path) as plain:
+        content = _opened(plain, stated)
         there = content.headings
         chosen = there if columns is None else [found(wanted, there, str(uri)) for wanted in columns]
         loaded = content.load(list(dict.fromkeys(chosen)), named=columns is not None)
@@ -66,8 +71,8 @@ def read(uri: str | Path, columns: Sequence[str] | None = None, stated: Stated =
 
 def headings(uri: str | Path, stated: Stated = NOT_STATED) -> tuple[Heading, ...]:
     """Return which columns the file or folder at `uri` has, without their values; raises as `read`."""
-    with local_copy(str(uri)) as path:
-        return _opened(path, stated).headings
+    with local_copy(str(uri)) as path, _unpacked(path) as plain:
+        return _opened(plain, stated).headings
 
 
 def is_recording(path: Path) -> bool:
@@ -81,6 +86,19 @@ def is_foreign(path: Path) -> bool:
     if is_recording(path) or (path / 'recording').exists():
         return False
     return path.is_file() or is_array_folder(path)
+
+
+@contextmanager
+def _unpacked(path: Path) -> Iterator[Path]:
+    """Give the content of a .gz file as a file for as long as the block lasts, any other path itself."""
+    if path.is_dir() or path.open('rb').read(2) != _GZIP:
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        plain = Path(folder, path.stem)
+        with readable(path, 'gzip file'), gzip.open(path) as packed, plain.open('wb') as file:
+            shutil.copyfileobj(packed, file)
+        yield plain
 
 
 def _opened(path: Path, stated: Stated) -> Content:
@@ -110,7 +128,7 @@ def _kind(path: Path) -> str:
     if not head:
         raise SignalError(f'{path} is empty; give a file with samples')
     for mark, why in _REFUSED.items():
-        if head.startswith(mark):
+        if head.startswith(mark) or head[8:12] == mark:  # behind the sizes of a FIT file
             raise SignalError(f'{path} {why}')
     if head.startswith(b'PK'):
         return 'npz' if suffix == '.npz' else 'excel'

@@ -7,6 +7,7 @@ import codecs
 import csv
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from engine_mount.signals.formats.cells import (
 )
 from engine_mount.signals.formats.content import Content, Leaf, Stated, with_dates
 from engine_mount.signals.formats.dialect import COMMENTS, Dialect, find_dialect, is_comment, is_content
+from engine_mount.signals.formats.labview import on_own_times, take_header, x_places
 from engine_mount.signals.signal import SignalError
 
 HEAD = 1 << 18
@@ -44,34 +46,46 @@ def open_text(path: Path, stated: Stated) -> Content:
     """Return the columns of a text table; raises `SignalError`."""
     codec = _codec(path)
     head = next(_blocks(path, codec, HEAD), '').split('\n')
+    header = take_header(head)
+    if header:
+        own = Stated(header.get('Decimal_Separator', ['.'])[0], header['Separator'][0])
+        stated = replace(own, **{name: said for name, said in vars(stated).items() if said})
     dialect = find_dialect(path, list(enumerate(head, 1)), _later(path, codec), stated)
     titles, units, first, notes = _titles(path, dialect, head[: dialect.first - 1])
+    coarse = [place for place, kind in enumerate(dialect.kinds) if kind == 'date' and dialect.repeats(place)]
+    kinds = ['text' if place in coarse else kind for place, kind in enumerate(dialect.kinds)]
+    notes += [f'{titles[place]}: one date for several samples, no times of these' for place in coarse]
     if len(titles) > 1 and not titles[-1] and dialect.kinds[-1] == 'missing':
         titles = titles[:-1]  # behind a delimiter at the end of each line
-    columns: dict[int, NDArray[Any]] = {}
-    dates = [place for place, kind in enumerate(dialect.kinds) if kind == 'date'][:1]
+    # they grow in place: what is joined of blocks would be an hour twice
+    columns = [bytearray() for _ in dialect.kinds]
+    times = x_places(header, len(kinds)) or [place for place, kind in enumerate(kinds) if kind == 'date'][:1]
 
     def prepare(numbers: Sequence[int]) -> None:
-        places = list(dict.fromkeys([*numbers, *dates]))
-        blocks = [
-            _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
-            for number, block in (_samples(path, codec, dialect, first) if places else ())
-        ]
-        if places and not blocks:
+        places = list(dict.fromkeys([*numbers, *times]))
+        for number, block in _samples(path, codec, dialect, first) if places else ():
+            parts = _in_bulk(block, dialect, places) or _cell_by_cell(
+                path, number, block, dialect, places, titles
+            )
+            for place, part in zip(places, parts, strict=True):
+                columns[place] += part.tobytes()
+        if places and not columns[places[0]]:
             raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-        columns.update(zip(places, map(np.concatenate, zip(*blocks, strict=True)), strict=True))
 
     leaves = [
         Leaf(
-            name, None if kind == 'text' else partial(columns.__getitem__, place), unit, header,
-            kind == 'date',
+            name,
+            None if kind == 'text'
+            else partial(np.frombuffer, columns[place], 'M8[ns]' if kind == 'date' else float),
+            unit, header, kind == 'date',
         )
         for place, ((name, header, unit), kind) in enumerate(
-            zip(titles_and_units(titles, units), dialect.kinds, strict=False)
+            zip(titles_and_units(titles, units), kinds, strict=False)
         )
     ]  # fmt: skip
+    leaves = on_own_times(leaves, header) if header else with_dates(path, leaves)
     notes.insert(0, f'read as {dialect.told}, {codec}')
-    return Content(path, 'text table', 'engine_mount.signals', with_dates(path, leaves), notes, prepare)
+    return Content(path, 'text table', 'engine_mount.signals', leaves, notes, prepare)
 
 
 def _codec(path: Path) -> str:
@@ -228,7 +242,10 @@ def _in_bulk(block: str, dialect: Dialect, places: Sequence[int]) -> list[NDArra
         return None
     if any(table.column(name).null_count for name, kind in types.items() if kind == date):
         return None
-    return [column.to_numpy() for column in table.columns]
+    return [  # `to_numpy` loads pandas, 40 MB
+        column.to_numpy() if column.null_count or column.type == date else np.from_dlpack(column.chunk(0))
+        for column in table.columns
+    ]
 
 
 def _cell_by_cell(

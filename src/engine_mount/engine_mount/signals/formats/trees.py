@@ -128,10 +128,11 @@ def open_matlab(path: Path, stated: Stated) -> Content:
     notes: list[str] = []
     with readable(path, 'MATLAB file', 'is it cut off? Save it again'):
         tree = loadmat(str(path), simplify_cells=True)
-    known = {name: value for name, value in tree.items() if not (name[:2] == '__' or _is_opaque(value))}
+        known = {name: value for name, value in tree.items() if not (name[:2] == '__' or _is_opaque(value))}
+        known = _plain(known)
     if '__function_workspace__' in tree or any(map(_is_opaque, tree.values())):
         notes.append(_OBJECTS)
-    return Content(path, 'MATLAB', 'scipy', list(leaves_in(_plain(known), notes)), notes)
+    return Content(path, 'MATLAB', 'scipy', list(leaves_in(known, notes)), notes)
 
 
 def _is_opaque(value: Any) -> bool:
@@ -140,9 +141,12 @@ def _is_opaque(value: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """Return a cell array as a list, so that its elements are walked."""
+    """Return a cell array as a list, so that its elements are walked, and a sparse matrix in full."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}
+    if hasattr(value, 'toarray') and min(value.shape) <= _LONGEST_VECTOR:
+        value.check_format()  # of a damaged file SciPy would write beyond the array
+        return value.toarray()
     if isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
         return [_plain(one) for one in np.ravel(value)[:_MOST]]
     return value
@@ -163,6 +167,11 @@ def _node(file: Any, node: Any, notes: list[str], depth: int) -> Any:
     """Return a group as a mapping, a cell array as a list, and any other dataset as it is."""
     if depth > _DEEPEST:
         return None
+    if 'MATLAB_sparse' in getattr(node, 'attrs', {}):
+        from scipy.sparse import csc_array
+
+        parts = tuple(np.asarray(node[key]) for key in ('data', 'ir', 'jc'))
+        return _plain(csc_array(parts, (int(node.attrs['MATLAB_sparse']), parts[2].size - 1)))
     if hasattr(node, 'items'):
         groups = {key: one for key, one in node.items() if not key.startswith('#')}
         return {key: _node(file, one, notes, depth + 1) for key, one in groups.items()}
