@@ -2,9 +2,9 @@
 
 A running engine shakes itself with a line and twice its frequency. A bank of resonators, one for each hertz,
 shows at which frequency the high-passed displacement moves fastest; from there two oscillators follow the
-line and its double, the phase of the first corrects the common frequency (a phase-locked loop of second order).
-The gain and phase of the high-pass are known and taken back, so that both lines can be subtracted from the
-displacement and carried ahead in time.
+line and its double; the phase of the first corrects the common frequency (a phase-locked loop of second
+order). The gain and phase of the high-pass are known and taken back, so that both lines can be subtracted
+from the displacement and carried ahead in time.
 """
 
 import math
@@ -23,18 +23,16 @@ _FIRST_FREQUENCY = 27.0  # Hz, chosen: an idling engine
 _CORNER = 24.0  # Hz, chosen: of the high-pass, four poles; engine and wheel shake at 6 to 13 Hz
 _MEMORY = 0.35  # s, chosen: time constant of the resonators
 _SEARCH = 16  # samples, chosen: from one search in the bank to the next
-_STRONGER = (
-    1.3  # chosen: so many times the square of the velocity at another frequency, and the line is there
-)
+_STRONGER = 2.4  # chosen: ratio of squared velocities at which the line moves to another frequency
 _ELSEWHERE = 2  # Hz, chosen: the loop itself follows nearer frequencies
-_FOLLOWING = 7.4
+_FOLLOWING = 6.5
 """1/s: share of the deviation from the expected sample that a line takes up in a time (chosen)."""
-_PULLING = 9.5
+_PULLING = 9.0
 """Hz/s by which the frequency follows (chosen)."""
-_SMALLEST_LINE = 7.5e-6  # m, chosen: smaller ones pull the frequency less
+_SMALLEST_LINE = 8e-6  # m, chosen: smaller ones pull the frequency less
 _LARGEST_DEVIATION = 2.5e-5  # m, chosen: a larger one, beyond twice the line, is an impact
-_AMPLITUDE_TIME = 0.057  # s, chosen
-_NOISE_TIME = 0.4  # s, chosen: longer than an impact
+_AMPLITUDE_TIME = 0.04  # s, chosen
+_NOISE_TIME = 0.55  # s, chosen: longer than an impact
 
 
 class EngineLine(NamedTuple):

@@ -5,7 +5,7 @@ true velocity reverses; the band-pass only sets the degree of damping. While the
 direction of friction, its size is modulated against the line's force in the elastomer.
 
     x_n = x - line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the line
-    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight (w_l / w0)^2 a,  A_n = noise_weight times the noise
+    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight (w_l / w0)^3 a,  A_n = 37 times the noise
     q = A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2),  g follows q, fast up, slowly down
     s = max(v_n sign v, 0),  |F| = max(c g (sqrt(s^2 + d^2) - d) - K kappa x_l sign v, 0)
 
@@ -27,9 +27,10 @@ from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
 
-_LEAST_DEGREE = 0.01
+_LEAST_DEGREE = 0.03
 """Degree of damping below which there is no current (chosen): the offset current alone would rub."""
-_CLEAR_LINE = 1.2e-5  # m, chosen: amplitude a_0 of a line that is half cancelled
+_NOISE_WEIGHT = 1369.0  # chosen: square of how much noise of the displacement releases the damper
+_CLEAR_LINE = 7.5e-6  # m, chosen: amplitude a_0 of a line that is half cancelled
 _SMALLEST_SQUARE = 1e-14  # m^2: of 0.1 um, keeps 0 / 0 away
 
 
@@ -58,25 +59,24 @@ class Parameters(NamedTuple):
     position_gain: Annotated[
         float,
         Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95),
-    ] = 0.7
+    ] = 0.58
     damping_coefficient: Annotated[
         float, Quantity('N s/m', 'c: force over velocity, fully engaged', 1.0, 1e4)
-    ] = 2600.0
+    ] = 2900.0
     rounding_velocity: Annotated[
         float,
         Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
-    ] = 0.0008
+    ] = 0.0009
     half_amplitude: Annotated[
         float, Quantity('m', 'A_0: amplitude in the band at which damping is half engaged', 1e-6, 0.01)
-    ] = 0.00016
-    engaging_time: Annotated[float, Quantity('s', 'time constant of a rising degree', 0.001, 1.0)] = 0.01
-    releasing_time: Annotated[float, Quantity('s', 'and of a falling one', 0.001, 10.0)] = 0.25
+    ] = 0.00013
+    engaging_time: Annotated[
+        float, Quantity('s', 'time constant by which the degree of damping rises', 0.001, 1.0)
+    ] = 0.016
+    releasing_time: Annotated[float, Quantity('s', 'and by which it falls', 0.001, 10.0)] = 0.14
     line_weight: Annotated[
         float, Quantity('1', 'how much a line of the engine releases the damper; 0: not at all', 0.0, 100.0)
-    ] = 0.12
-    noise_weight: Annotated[
-        float, Quantity('1', 'how much noise of the displacement releases the damper', 0.0, 1000.0)
-    ] = 37.0
+    ] = 0.02
     line_stiffness: Annotated[
         float, Quantity('N/m', 'K: force of the line that friction cancels, by displacement', 0.0, 1e6)
     ] = 8e4
@@ -98,7 +98,6 @@ class Law(NamedTuple):
     engaging: float
     releasing: float
     line_weight: float
-    noise_weight: float
     line_stiffness: float
 
 
@@ -143,8 +142,7 @@ def design(parameters: Parameters, sample_time: float) -> Design:
             half_square=parameters.half_amplitude * parameters.half_amplitude,
             engaging=min(sample_time / parameters.engaging_time, 1.0),
             releasing=min(sample_time / parameters.releasing_time, 1.0),
-            line_weight=parameters.line_weight / (turns * turns),
-            noise_weight=parameters.noise_weight * parameters.noise_weight,
+            line_weight=parameters.line_weight / (turns * turns * turns),
             line_stiffness=parameters.line_stiffness,
         ),
         engine_line.rotations(sample_time),
@@ -244,8 +242,9 @@ def _tracked(law, state, displacement):
 @compiled
 def _set_degree(law, state, square, line_square):
     """Let the degree of damping follow the squares of the amplitudes (m^2) in the band and of the line."""
-    turns_square = state.line.turns * state.line.turns
-    line = law.line_weight * law.line_weight * turns_square * turns_square * line_square
-    others = law.half_square + line + law.noise_weight * state.line.noise_square
+    turns = state.line.turns
+    per_amplitude = law.line_weight * turns * turns * turns
+    line = per_amplitude * per_amplitude * line_square
+    others = law.half_square + line + _NOISE_WEIGHT * state.line.noise_square
     wanted = square / (square + others + _SMALLEST_SQUARE)
     state.degree += (law.engaging if wanted > state.degree else law.releasing) * (wanted - state.degree)

@@ -47,8 +47,7 @@ def levels_of(policy: Policy, parameters: Any) -> dict[str, float]:
         on, off = parameters.switch_on_level, parameters.switch_off_level
         return {'switch-on level': on, 'switch-off level': off}
     if policy is continuous_viscous:
-        lowest, full = parameters.lowest_amplitude, parameters.full_amplitude
-        return {'damping begins': lowest, 'damping is full': full}
+        return {'damping half engaged': parameters.half_amplitude}
     return {}
 
 
