@@ -174,11 +174,7 @@ def _found(line, state, bank):
     if abs(best - here) <= _ELSEWHERE or _speed_square(bank, best) <= _STRONGER * _speed_square(bank, here):
         return False
     state.turns = (LOWEST_FREQUENCY + best) * line.sample_time
-    state.cosine_part, state.sine_part = bank[best], bank[RESONATORS + best]
-    double = best + int(LOWEST_FREQUENCY) + best
-    known = double < RESONATORS
-    state.double_real = bank[double] if known else 0.0
-    state.double_imaginary = bank[RESONATORS + double] if known else 0.0
+    state.cosine_part = state.sine_part = state.double_real = state.double_imaginary = 0.0
     return True
 
 

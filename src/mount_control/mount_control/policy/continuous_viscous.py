@@ -7,7 +7,8 @@ direction of friction, its size is modulated against the line's force in the ela
     x_n = x - line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the line
     A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight (w_l / w0)^3 a,  A_n = 37 times the noise
     q = A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2),  g follows q, fast up, slowly down
-    s = max(v_n sign v, 0),  |F| = max(c g (sqrt(s^2 + d^2) - d) - K kappa x_l sign v, 0)
+    s = max(v_n sign v, 0)
+    |F| = min(max(c g (sqrt(s^2 + d^2) - d) - K kappa x_l sign v, 0), 2 c g |v|)
 
 v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is designed so that v_n has
 phase 0 at the eigenfrequency, tracker and delay of the loop included. a and w_l are the amplitude and the
@@ -27,6 +28,8 @@ from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
 
+_REVERSAL_SLOPE = 2.0
+"""So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
 _LEAST_DEGREE = 0.03
 """Degree of damping below which there is no current (chosen): the offset current alone would rub."""
 _NOISE_WEIGHT = 1369.0  # chosen: square of how much noise of the displacement releases the damper
@@ -225,7 +228,10 @@ def step(law, table, state, window, trace, displacement):
     speed = max(direction * engine_velocity, 0.0)
     rounded = math.sqrt(speed * speed + law.rounding * law.rounding) - law.rounding
     cancelled = law.line_stiffness * line_square / (line_square + _CLEAR_LINE * _CLEAR_LINE) * line_ahead
-    force = max(law.damping * state.degree * rounded - direction * cancelled, 0.0)
+    damping = law.damping * state.degree
+    force = min(
+        max(damping * rounded - direction * cancelled, 0.0), _REVERSAL_SLOPE * damping * abs(velocity)
+    )
     return direction * force, velocity, state.degree
 
 
