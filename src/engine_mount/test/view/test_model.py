@@ -52,7 +52,7 @@ def test_gap_and_levels_are_told(shown):
     values = {entry['name']: entry['value'] for entry in shown.state_json()['values']}
     assert values['contact gap'].startswith('349.')
     levels = shown.chart()['panels'][0]['levels']
-    assert [level['name'] for level in levels] == ['damping begins, 0.12 mm', 'damping is full, 0.4 mm']
+    assert [level['name'] for level in levels] == ['damping half engaged, 0.13 mm']
 
 
 def test_a_malformed_message_is_no_end(drive):
