@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from engine_mount.fleet.job import JOURNAL, ORDER
 from engine_mount.fleet.tables import COLUMNS, NEEDED_FOR
 from engine_mount.signals.extras import required
+from mount_models.quantity import nearest
 
 if TYPE_CHECKING:
     import pyarrow
@@ -124,7 +125,7 @@ def worst(folder: str | os.PathLike[str], by: str, count: int = 10) -> list[Wors
     name = 'result' if 'result' in tables else 'recordings'
     numbers = [field.name for field in tables[name].schema if str(field.type) in ('double', 'int64')]
     if by not in numbers:
-        raise QueryError(f'{by!r} is no column of numbers of {name}; there are {", ".join(numbers)}')
+        raise QueryError(f'{by!r} is no column of numbers of {name}; {nearest(by, numbers)}')
     order = f'abs("{by}") desc, recording, mount'
     sql = f'select * from {name} where "{by}" is not null order by {order} limit {count}'
     places = _places(Path(folder)) if name == 'result' else {}

@@ -26,6 +26,7 @@ from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.selection import select_rows
 from engine_mount.signals.units import unit_of
+from mount_models.quantity import nearest
 
 _NEEDED = ('displacement', 'friction_force', 'normal_force')
 FRICTION = by_name(
@@ -94,7 +95,7 @@ def _read_damper(path: Path, mapping: Mapping, clamp: str) -> FrictionRecording:
     A channel `normal_force` is measured, and used instead of all this.
     """
     if clamp not in CLAMPS:
-        raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
+        raise IdentificationError(f'clamp {clamp!r} is unknown; {nearest(clamp, CLAMPS)}')
     table = _rig_table(path)
     columns = select_rows(table, mapping, FRICTION, _NEEDED[:2], timed=True)
     time, displacement = columns.pop('time'), columns['displacement']
