@@ -16,10 +16,33 @@ _WORDS = {
     'str': 'TEXT',
     'path': 'PATH',
 }
+RENAMED = {
+    'view --rate': '--playback-speed',
+    'replay --mount': '--position',
+    'fleet query --csv': '--format csv',
+    'fleet query --json': '--format json',
+    'identify friction --channel': '--column',
+    '--time-column': '--time',
+}
+"""Options that had two meanings or two names, some of one command only, and their names today."""
+MOVED = {
+    **dict.fromkeys(('accept', 'bench', 'faults', 'prepare'), 'dev'),
+    **dict.fromkeys(('cut', 'recover'), 'edit'),
+}
+"""Commands that stood alone, and their group today."""
 
 
 class Command(TyperCommand):
     """A sub-command."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Return the rest of the arguments; a former option is refused with its name today."""
+        command = ctx.command_path.partition(' ')[2]
+        for word in args:
+            old = word.partition('=')[0]
+            if new := RENAMED.get(f'{command} {old}', RENAMED.get(old)):
+                ctx.fail(f'{old} is now {new}')
+        return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""
@@ -33,6 +56,12 @@ class Command(TyperCommand):
 
 class Group(TyperGroup):
     """A command with sub-commands."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the sub-command; a former one is refused with its group today."""
+        if (name := args[0]) in MOVED and name not in self.commands:
+            ctx.fail(f'{name} is now {MOVED[name]} {name}')
+        return super().resolve_command(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""

@@ -105,9 +105,7 @@ def actuator(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
     from engine_mount.identification.rack import FileValues
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
@@ -158,9 +156,7 @@ def inductance(
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))

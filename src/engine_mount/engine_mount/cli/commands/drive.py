@@ -161,7 +161,7 @@ def drive(
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print the results."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.drive import CombinationError
+    from engine_mount.drives.drive import CombinationError, report_early_end
     from engine_mount.drives.drive import drive as run_drive
     from engine_mount.reports.drive.results import evaluate_drive
     from engine_mount.settings.amounts import recorder_options
@@ -218,7 +218,8 @@ def drive(
         )  # fmt: skip
     except CombinationError as error:
         raise typer.BadParameter(str(error)) from None
-    told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+    with report_early_end(driven.folder, screen):
+        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     write_figures(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []
     for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):

@@ -12,6 +12,7 @@ from engine_mount.cli.commands.options import (
     Listing,
     Page,
     Priority,
+    names_in,
     option,
     write_figures,
 )
@@ -52,11 +53,8 @@ def faults(
     from engine_mount.settings.run_folder import make_run_folder
     from mount_bringup.graph.domain import chosen_domain
 
-    screen, wanted = TerminalScreen(), list(filter(None, only.split(',')))
-    unknown = [name for name in wanted if name not in MATRIX]
-    if unknown:
-        raise typer.BadParameter(f'{", ".join(unknown)}: no such fault; --list tells which there are')
-    chosen = [case for case in MATRIX.values() if (not wanted or case.name in wanted)]
+    screen, wanted = TerminalScreen(), names_in(only, MATRIX, 'fault')
+    chosen = [case for case in MATRIX.values() if case.name in wanted]
     if show:
         rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]
         screen.table(Table('', 'll', rows, ('name', 'fault: what is required')))

@@ -17,6 +17,7 @@ from engine_mount.cli.commands.options import (
     argument,
     changes_of,
     flag,
+    names_in,
     option,
     write_figures,
 )
@@ -170,9 +171,9 @@ Examples:
 
 `engine-mount fleet query catalogue "select scenario, count(*) from recordings group by all"`
 
-`engine-mount fleet query catalogue "select uri, reason from recordings where reason != ''" --csv`
+`engine-mount fleet query catalogue "select uri, reason from recordings where reason != ''" --format csv`
 
-`engine-mount fleet query result "select recording from result where switchings_vanished > 0" --json`
+`engine-mount fleet query result "select recording from result where switchings_vanished > 0" --format json`
 
 Tables are `recordings` and `events` of a catalogue, `result` of a replay; their columns stand in
 docs/reference/fleet_columns.md, and `describe result` lists them. A query is one SELECT: it writes nothing,
@@ -219,19 +220,17 @@ _NUMBERS = ('int', 'uint', 'float', 'double', 'decimal')
 def query(
     folder: Annotated[Path, argument('catalogue or result', 'FOLDER')],
     sql: Annotated[str, argument('one SELECT', 'SQL')],
-    csv: Annotated[bool, flag('--csv', 'print the result as CSV')] = False,
-    as_json: Annotated[bool, flag('--json', 'print the result as JSON: a list of rows')] = False,
+    form: Annotated[str, option('table, csv, or json: a list of rows', 'FORMAT', None, '--format')] = 'table',
     time_limit: Annotated[float, option('a query that takes longer is refused', 'S', least=0.1)] = 60.0,
 ) -> None:
     """Query a catalogue or a result in SQL."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import query
 
-    if csv and as_json:
-        raise typer.BadParameter('choose --csv or --json, not both')
+    names_in(form, ('table', 'csv', 'json'), 'format')
     answer = query(folder, sql, time_limit)
-    if csv or as_json:
-        typer.echo(_csv(answer) if csv else _json(answer), nl=False)
+    if form in ('csv', 'json'):
+        typer.echo(_csv(answer) if form == 'csv' else _json(answer), nl=False)
     else:
         _print_rows(answer, TerminalScreen())
 

@@ -49,12 +49,12 @@ _BAND_SPREAD = 0.8
 def friction_mapping(
     texts: Sequence[str] = (), mapping: Mapping | None = None, stated: Stated = NOT_STATED
 ) -> Mapping:
-    """Return the columns of a mapping, and of `--channel NAME=COLUMN:UNIT` options, which go before it.
+    """Return the columns of a mapping, and of `--column NAME=COLUMN:UNIT` options, which go before it.
 
     Of a mapping these are displacement, force (or friction_force), normal force and time. Raises
     `SignalError`.
     """
-    mapping = replace((mapping or Mapping()).of(FRICTION), option='--channel {quantity}={column}:{unit}')
+    mapping = replace((mapping or Mapping()).of(FRICTION), option='--column {quantity}={column}:{unit}')
     return with_options(mapping, texts, known=FRICTION, stated=stated)
 
 
