@@ -142,7 +142,7 @@ def _commands(row: Mapping[str, Any], uri: str) -> list[str]:
     changes = json.loads(row.get('changes') or '{}')
     if not changes or row['asked'] == 'displacement':
         return [f'engine-mount report {place}', f'engine-mount view {place}']
-    mount = [f'--mount {row["mount"]}'] if row['mount'] else []
+    mount = [f'--position {row["mount"]}'] if row['mount'] else []
     settings = [
         f'--set {shlex.quote(f"{node}.{name}={value if isinstance(value, str) else json.dumps(value)}")}'
         for node, values in changes.items()

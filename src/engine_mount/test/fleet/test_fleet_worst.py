@@ -56,7 +56,7 @@ def test_the_commands_name_the_place_the_mount_and_the_change(result):
     place = result.parent / 'my drives' / 'b'
     assert one.commands == [
         f"engine-mount report '{place}'",
-        f"engine-mount replay '{place}' --mount left --set mount_control.switch_on_level=0.0006 "
+        f"engine-mount replay '{place}' --position left --set mount_control.switch_on_level=0.0006 "
         '--set mount_control.policy=switched_viscous',
     ]
 

@@ -1,4 +1,4 @@
-"""`engine-mount accept`: a reference recording made or renewed, with a reason."""
+"""`engine-mount dev accept`: a reference recording made or renewed, with a reason."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +12,7 @@ Examples:
 
 `engine-mount drive --core --scenario bench --duration 3 --out bags/new`
 
-`engine-mount accept bags/new --reference initialisation --reason "ramp is 50 ms shorter"`
+`engine-mount dev accept bags/new --reference initialisation --reason "ramp is 50 ms shorter"`
 """
 
 

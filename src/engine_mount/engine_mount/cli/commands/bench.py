@@ -1,4 +1,4 @@
-"""`engine-mount bench`: what matters for speed, beside its alternative."""
+"""`engine-mount dev bench`: what matters for speed, beside its alternative."""
 
 from dataclasses import asdict
 from importlib import import_module
@@ -16,9 +16,9 @@ Exit code: 0 when everything was measured, 1 when the graph refused or ended, wi
 
 Examples:
 
-`engine-mount bench --only graph --json bench.json` - the graph beside the bare middleware
+`engine-mount dev bench --only graph --json bench.json` - the graph beside the bare middleware
 
-`engine-mount bench --only graph --sample-rate 2000` - the same at 2 kHz
+`engine-mount dev bench --only graph --sample-rate 2000` - the same at 2 kHz
 """
 
 

@@ -1,4 +1,4 @@
-"""`engine-mount cut`: a piece of a recording as a recording of its own."""
+"""`engine-mount edit cut`: a piece of a recording as a recording of its own."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,11 +12,11 @@ EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1
 
 Examples:
 
-`engine-mount cut RECORDING --from 12s --to 20s`
+`engine-mount edit cut RECORDING --from 12s --to 20s`
 
-`engine-mount cut RECORDING --event switch-on --before 5s --after 10s --out bags/first_switching`
+`engine-mount edit cut RECORDING --event switch-on --before 5s --after 10s --out bags/first_switching`
 
-`engine-mount cut RECORDING --event 2` - around the second event
+`engine-mount edit cut RECORDING --event 2` - around the second event
 """
 
 

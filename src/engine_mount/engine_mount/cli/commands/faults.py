@@ -1,4 +1,4 @@
-"""`engine-mount faults`: every fault in the real graph, and what the graph does about it."""
+"""`engine-mount dev faults`: every fault in the real graph, and what the graph does about it."""
 
 import sys
 from pathlib import Path
@@ -24,11 +24,11 @@ The graphs run in real time, and a machine with other work makes them late: repe
 
 Examples:
 
-`engine-mount faults --list` - all faults with their requirements
+`engine-mount dev faults --list` - all faults with their requirements
 
-`engine-mount faults --only coil_open,kill_driver --json faults.json` - two of them
+`engine-mount dev faults --only coil_open,kill_driver --json faults.json` - two of them
 
-`engine-mount faults --page docs/reference/faults.md` - all, with the page
+`engine-mount dev faults --page docs/reference/faults.md` - all, with the page
 """
 
 _DRIVE = (sys.executable, '-P', '-c', 'from engine_mount.cli.command import main; main()', 'drive')

@@ -33,7 +33,7 @@ Examples:
 `engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
 Import several files one by one; `rosbags-convert --src A B --dst C --dst-storage mcap` joins their
-recordings, and `engine-mount cut` takes a part.
+recordings, and `engine-mount edit cut` takes a part.
 """
 
 

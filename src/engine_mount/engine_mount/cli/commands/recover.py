@@ -1,4 +1,4 @@
-"""`engine-mount recover`: a sound recording out of a cut or damaged one."""
+"""`engine-mount edit recover`: a sound recording out of a cut or damaged one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,9 +16,9 @@ command.
 
 Examples:
 
-`engine-mount recover bags/first/recording`
+`engine-mount edit recover bags/first/recording`
 
-`engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
+`engine-mount edit recover crash/drive_0.mcap --out bags/drive_recovered`
 
 All chunks whose checksum holds are kept, with topics, times, session, metadata and the recorder's report of
 its own losses. A last chunk that was cut off is lost. The original is not touched.
