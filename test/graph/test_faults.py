@@ -55,7 +55,8 @@ def outcomes_of(folder, *chosen):
         ended = subprocess.run(
             [
                 str(Path(sys.executable).parent / 'engine-mount'), 'dev', 'faults', *chosen,
-                '--priority', '0', '--domain', str(domain), '--out', str(folder / 'runs'), '--json', str(folder / 'faults.json'),
+                '--priority', '0', '--domain', str(domain), '--out', str(folder / 'runs'),
+                '--json', str(folder / 'faults.json'),
             ],
             stdin=subprocess.DEVNULL,
             capture_output=True,

@@ -62,7 +62,7 @@ def test_the_commands_name_the_place_the_mount_and_the_change(result):
 
 
 def test_a_column_without_numbers_is_refused_with_those_that_have_some(result):
-    with pytest.raises(QueryError, match=r'is no column of numbers of result; there are size_bytes, '):
+    with pytest.raises(QueryError, match=r'is no column of numbers of result; known are size_bytes, '):
         worst(result, 'recording')
 
 
