@@ -26,9 +26,8 @@ def export(recording: Path, out: Path, signals: Sequence[str] = ()) -> str:
     if out.suffix not in _WRITERS:
         raise SignalError(f'{out}: nothing is written as {out.suffix!r}; known are {", ".join(_WRITERS)}')
     columns = read(recording, list(signals) or None).columns.values()
-    found = {
-        each.name.lstrip('/'): each for each in columns if each.values.size and (signals or _is_signal(each))
-    }
+    fewest = 1 if signals else 2  # a latched value is none over time
+    found = {each.name.lstrip('/'): each for each in columns if _known(each) >= fewest}
     stamps = {name: _stamps(each) for name, each in found.items()}
     if not found:
         raise SignalError(f'{recording} holds no such signal with samples')
@@ -40,9 +39,9 @@ def export(recording: Path, out: Path, signals: Sequence[str] = ()) -> str:
     return f'{len(found)} signals, {rows.size} rows at the samples of {grid}; others hold their last value'
 
 
-def _is_signal(column: MeasuredColumn, fewest: int) -> bool:
-    """Return whether a number of a topic has so many samples that are known, and is none of a list."""
-    return '[' not in column.name and np.count_nonzero(~np.isnan(column.values)) >= fewest
+def _known(column: MeasuredColumn) -> int:
+    """Return how many samples are known; none counts of a number within a list."""
+    return 0 if '[' in column.name else int(np.count_nonzero(~np.isnan(column.values)))
 
 
 def _stamps(column: MeasuredColumn) -> np.ndarray:
