@@ -30,7 +30,7 @@ from engine_mount.cli.commands import (
     view,
 )
 from engine_mount.cli.commands.options import with_repeated_options
-from engine_mount.cli.help import Command, Group, group
+from engine_mount.cli.help import Command, Group, check_former_names, group
 from engine_mount.cli.terminal import refuse, terminal
 from engine_mount.signals.sources.uris import SourceError, StoreAwayError
 from mount_ros.environment import prepare_environment
@@ -93,46 +93,23 @@ _DEV = group('dev', 'This project on this machine: speed, faults, references, co
 _EDIT = group('edit', 'Change recordings: cut a piece out, recover a damaged one.')
 
 for _group, _panel, _functions in (
-    (
-        app,
-        'Drive and watch',
-        (
-            (drive.drive, drive.EPILOG),
-            (view.view, view.EPILOG),
-            (view.status, view.STATUS_EPILOG),
-            (record.record, record.EPILOG),
-            (check.check, check.EPILOG),
-        ),
-    ),
+    (app, 'Drive and watch', (drive.drive, view.view, view.status, record.record, check.check)),
     (
         app,
         _RECORDINGS,
         (
-            (ls.ls, ls.EPILOG),
-            (ls.info, ls.INFO_EPILOG),
-            (report.report, report.EPILOG),
-            (replay.replay, replay.EPILOG),
-            (compare.compare, compare.EPILOG),
-            (audit.audit, audit.EPILOG),
-            (import_files.import_file, import_files.EPILOG),
-            (export.export, export.EPILOG),
+            *(ls.ls, ls.info, report.report, replay.replay, compare.compare, audit.audit),
+            *(import_files.import_file, export.export),
         ),
     ),
-    (app, _MOUNT, ((experiment.experiment, experiment.EPILOG),)),
-    (_EDIT, None, ((cut.cut, cut.EPILOG), (recover.recover, recover.EPILOG))),
-    (
-        _DEV,
-        None,
-        (
-            (faults.faults, faults.EPILOG),
-            (bench.bench, bench.EPILOG),
-            (accept.accept, accept.EPILOG),
-            (prepare, None),
-        ),
-    ),
+    (app, _MOUNT, (experiment.experiment,)),
+    (_EDIT, None, (cut.cut, recover.recover)),
+    (_DEV, None, (faults.faults, bench.bench, accept.accept, prepare)),
 ):
-    for _function, _epilog in _functions:
+    for _function in _functions:
         _name = _function.__name__.removesuffix('_file')
+        _texts = vars(sys.modules[_function.__module__])
+        _epilog = _texts.get(f'{_name.upper()}_EPILOG', _texts.get('EPILOG'))
         _group.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
 for _group, _panel in (
     *((_EDIT, _RECORDINGS), (fleet.app, _RECORDINGS), (road.app, _RECORDINGS)),
@@ -156,6 +133,7 @@ def main(arguments: list[str] | None = None) -> None:
     words = with_repeated_options(sys.argv[1:] if arguments is None else arguments)
     try:
         prepare_environment()
+        check_former_names(words)
         code = app(args=words, prog_name='engine-mount', standalone_mode=False) or 0
         if code == INTERRUPTED:
             raise KeyboardInterrupt  # which Typer has caught

@@ -1,7 +1,7 @@
 """What `--help` and Tab show: words of this project, names from the code, runs from folders."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -16,33 +16,34 @@ _WORDS = {
     'str': 'TEXT',
     'path': 'PATH',
 }
-RENAMED = {
-    'view --rate': '--playback-speed',
-    'replay --mount': '--position',
+FORMER = {
+    'accept': 'dev accept',
+    'bench': 'dev bench',
+    'cut': 'edit cut',
+    'faults': 'dev faults',
+    'prepare': 'dev prepare',
+    'recover': 'edit recover',
+    '--time-column': '--time',
     'fleet query --csv': '--format csv',
     'fleet query --json': '--format json',
     'identify friction --channel': '--column',
-    '--time-column': '--time',
+    'replay --mount': '--position',
+    'view --rate': '--playback-speed',
 }
-"""Options that had two meanings or two names, some of one command only, and their names today."""
-MOVED = {
-    **dict.fromkeys(('accept', 'bench', 'faults', 'prepare'), 'dev'),
-    **dict.fromkeys(('cut', 'recover'), 'edit'),
-}
-"""Commands that stood alone, and their group today."""
+"""Former names of commands and options (of all commands, or of one), and those of today."""
+
+
+def check_former_names(words: Sequence[str]) -> None:
+    """Refuse a former name, with that of today: an option with another meaning is never taken silently."""
+    given = [word.partition('=')[0] for word in words]
+    for former, today in FORMER.items():
+        *command, name = former.split()
+        if given[: len(command)] == command and name in (given if name.startswith('-') else given[:1]):
+            raise typer.BadParameter(f'{name} is now {today}')
 
 
 class Command(TyperCommand):
     """A sub-command."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Return the rest of the arguments; a former option is refused with its name today."""
-        command = ctx.command_path.partition(' ')[2]
-        for word in args:
-            old = word.partition('=')[0]
-            if new := RENAMED.get(f'{command} {old}', RENAMED.get(old)):
-                ctx.fail(f'{old} is now {new}')
-        return super().parse_args(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""
@@ -56,12 +57,6 @@ class Command(TyperCommand):
 
 class Group(TyperGroup):
     """A command with sub-commands."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the sub-command; a former one is refused with its group today."""
-        if (name := args[0]) in MOVED and name not in self.commands:
-            ctx.fail(f'{name} is now {MOVED[name]} {name}')
-        return super().resolve_command(ctx, args)
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""

@@ -22,7 +22,6 @@ from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.graph.domain import chosen_domain
 from mount_bringup.graph.nodes import RESTART_LIMIT, SIM, GraphError, GraphSettings, Grouping
-from mount_bringup.graph.shutdown import Interrupted
 from mount_bringup.settings import check_sample_rate, checked_settings
 from mount_control.controller import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
@@ -184,7 +183,7 @@ def report_early_end(folder: RunFolder, screen: Screen) -> Iterator[None]:
     """Name the recording of a drive that ends early; a `ValueError` is then no wrong use: a `GraphError`."""
     try:
         yield
-    except (KeyboardInterrupt, Interrupted, GraphError, ValueError, OSError) as error:
+    except BaseException as error:  # however it ends
         if folder.recording.exists():
             screen.say(f'recording  {folder.recording}')
         if isinstance(error, ValueError):
