@@ -81,7 +81,7 @@ Base = Annotated[Path | None, option('specimen with all other values; default: t
 Name = Annotated[str, option('name of the specimen; default: that of the base')]
 Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE', panel=OUTPUT, check=target)]
 
-EXIT_CODES = 'Exit code: 0 when all requested files are written, 1 with the reason when not.\n\nExamples:'
+EXIT_CODES = 'Exit code: 0 when all requested files are written, 2 with the reason when not.\n\nExamples:'
 
 
 def progress() -> AbstractContextManager[Callable[[float, str], None]]:

@@ -6,7 +6,7 @@ from typing import Annotated
 from engine_mount.cli.commands.options import option, recording_argument
 from engine_mount.cli.fetching import local
 
-EPILOG = """Exit code: 0 when the reference is made, 1 when it was refused, with the reason.
+EPILOG = """Exit code: 0 when the reference is made, 2 when it was refused, with the reason.
 
 Examples:
 

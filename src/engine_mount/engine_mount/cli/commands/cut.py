@@ -8,7 +8,8 @@ import typer
 from engine_mount.cli.commands.options import From, RecordingPlace, option, seconds
 from engine_mount.cli.fetching import beside, local
 
-EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1 when a part was not.
+EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1 when a part was not,
+2 when nothing was cut.
 
 Examples:
 

@@ -38,8 +38,8 @@ from mount_bringup.graph.nodes import RESTART_LIMIT
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, control active when the excitation began (0.5 s later at most), no fault, and the
-recording whole; 1 when one of these did not hold, or nothing was driven, with the reason; 2 for a wrong
-use of the command; 130 when interrupted.
+recording whole; 1 when one of these did not hold, with the reason; 2 for a wrong use of the command:
+nothing was driven; 130 when interrupted, with the path of the recording.
 
 Times are in s from the first displacement sample, as in `report`, `cut` and `compare`.
 

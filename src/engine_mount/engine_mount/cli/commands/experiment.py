@@ -15,7 +15,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.help import named, setting
 
-EPILOG = """Exit code: 0 when it ran, with any result; 1 when the order was refused.
+EPILOG = """Exit code: 0 when it ran, with any result; 2 when the order was refused.
 
 Examples:
 

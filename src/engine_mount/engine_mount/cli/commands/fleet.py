@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 app = group('fleet', 'Many recordings: catalogue, what if, queries.')
 
 _INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also when recordings are damaged, which
-their rows show; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
+their rows show; 1 when a store no longer answers or the cluster is lost; 2 when a place does not exist.
 
 Examples:
 
@@ -46,7 +46,7 @@ Unchanged recordings are not read again, missing ones leave the catalogue. After
 same command resumes where it stopped. Import foreign files first: `engine-mount import`.
 """
 _REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with a reason; 1
-when one could not be fetched, or the order was refused.
+when one could not be fetched; 2 when the order was refused.
 
 Examples:
 
@@ -165,7 +165,7 @@ def _note_question(screen: 'TerminalScreen', what: str, folder: Path, rows: str)
     screen.note(f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')
 
 
-_QUERY_EPILOG = """Exit code: 0 when the query has a result, 1 with the reason when not.
+_QUERY_EPILOG = """Exit code: 0 when the query has a result, 2 with the reason when not.
 
 Examples:
 
@@ -179,7 +179,7 @@ Tables are `recordings` and `events` of a catalogue, `result` of a replay; their
 docs/reference/fleet_columns.md, and `describe result` lists them. A query is one SELECT: it writes nothing,
 and reads these tables and no other file.
 """
-_WORST_EPILOG = """Exit code: 0 when the column exists, 1 with the reason when not.
+_WORST_EPILOG = """Exit code: 0 when the column exists, 2 with the reason when not.
 
 Examples:
 
@@ -190,7 +190,7 @@ Examples:
 `engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
 _REPORT_EPILOG = """Exit code: 0 when the page is written, also when a recording could not be read again for
-its picture, which the page reports; 1 when there is no result, or the page cannot be written.
+its picture, which the page reports; 2 when there is no result.
 
 Examples:
 
@@ -199,7 +199,7 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
-_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
+_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not; 2 when the order was refused.
 
 Examples:
 

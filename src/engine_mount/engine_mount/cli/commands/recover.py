@@ -11,7 +11,7 @@ from engine_mount.cli.fetching import beside, local
 INCOMPLETE = 3
 
 EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
-something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the
+something is lost and the rest stands in it, 2 when nothing could be recovered, or for a wrong use of the
 command.
 
 Examples:

@@ -17,7 +17,7 @@ from engine_mount.cli.fetching import local
 from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when the setpoints equal the recorded ones, or a change was requested; 1 when they
-differ, or the order was refused.
+differ; 2 when the order was refused.
 
 Examples:
 
