@@ -199,7 +199,7 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
-_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not; 2 when the order was refused.
+_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not; 2 when the order is wrong.
 
 Examples:
 
