@@ -42,12 +42,14 @@ def check_former_names(words: Sequence[str]) -> None:
             raise typer.BadParameter(f'{name} is now {today}')
 
 
-class Command(TyperCommand):
-    """A sub-command."""
-
+class _Worded:
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""
-        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]
+        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]  # type: ignore[misc]
+
+
+class Command(_Worded, TyperCommand):
+    """A sub-command."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return what stands behind the name of the command in its usage: options, then arguments."""
@@ -55,12 +57,8 @@ class Command(TyperCommand):
         return ['[OPTIONS]', *map(_in_usage, arguments)]
 
 
-class Group(TyperGroup):
+class Group(_Worded, TyperGroup):
     """A command with sub-commands."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Return the parameters with words for what they take."""
-        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]
 
 
 def group(name: str, text: str) -> typer.Typer:

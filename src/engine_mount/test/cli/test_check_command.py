@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import command
+from command_line import command, refused
 from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
@@ -103,12 +103,11 @@ def test_a_worse_controller_fails_by_name(check, setting, caught):
         (('--suite', 'nowhere.yaml'), 'cannot be read'),
     ],
 )
-def test_wrong_use_drives_nothing(check, tmp_path, options, word):
-    ended, figures = check('wrong', *options)
-    assert ended.exit_code == 2
-    assert word in ' '.join(ended.output.replace('│', ' ').split())
-    assert figures == b''
-    assert not (tmp_path / 'wrong').exists()
+def test_wrong_use_drives_nothing(tmp_path, options, word):
+    (tmp_path / 'ours.yaml').write_text(SUITE, encoding='utf-8')
+    out = tmp_path / 'wrong'
+    assert word in refused('check', '--suite', tmp_path / 'ours.yaml', '--out', out, *options, codes=(2,))
+    assert not out.exists()
 
 
 def test_the_manoeuvres_are_listed():

@@ -161,8 +161,8 @@ def drive(
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print the results."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.drive import CombinationError, report_early_end
     from engine_mount.drives.drive import drive as run_drive
+    from engine_mount.drives.drive import report_early_end
     from engine_mount.reports.drive.results import evaluate_drive
     from engine_mount.settings.amounts import recorder_options
 
@@ -209,15 +209,12 @@ def drive(
             str(local(file, screen)), column or [], time=time, rate=rate, scale=scale, mapping_file=map_file,
             stated=stated(dbc, decimal, delimiter),
         )  # fmt: skip
-    try:
-        driven = run_drive(
-            core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
-            mounts=mounts, duration=duration, sample_rate=sample_rate, seed=seed, faults=fault or (),
-            parameters=parameters, excitation=excitation, out=out, domain=domain, namespace=namespace,
-            priority=priority, restarts=restarts, screen=screen,
-        )  # fmt: skip
-    except CombinationError as error:
-        raise typer.BadParameter(str(error)) from None
+    driven = run_drive(
+        core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
+        mounts=mounts, duration=duration, sample_rate=sample_rate, seed=seed, faults=fault or (),
+        parameters=parameters, excitation=excitation, out=out, domain=domain, namespace=namespace,
+        priority=priority, restarts=restarts, screen=screen,
+    )  # fmt: skip
     with report_early_end(driven.folder, screen):
         told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     write_figures(told.figures, json_file)

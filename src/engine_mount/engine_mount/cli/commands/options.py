@@ -67,14 +67,10 @@ def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
 
 
 def changes_of(settings: list[str] | None) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of `--set`; raises `BadParameter` where it is written wrongly."""
+    """Return {node: {parameter: value}} of `--set`; raises `SettingError` where it is written wrongly."""
     from engine_mount.settings.options import settings_of_options
-    from mount_bringup.settings import SettingError
 
-    try:
-        return settings_of_options(settings or [])
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
+    return settings_of_options(settings or [])
 
 
 def names_in(text: str, known: Collection[str], what: str) -> list[str]:
