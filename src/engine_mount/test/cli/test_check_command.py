@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import command, refused
+from command_line import command
 from typer.testing import CliRunner
 
 from engine_mount.cli.command import app
@@ -92,22 +92,6 @@ def test_a_worse_controller_fails_by_name(check, setting, caught):
     one, other, first, *_ = [row for row in rows if row[:1] in (['ok'], ['fail'])]
     assert {one[1], other[1]} == {'gap', 'rack'}  # told when they were done
     assert first[0] == 'fail'
-
-
-@pytest.mark.parametrize(
-    ('options', 'word'),
-    [
-        (('--only', 'gpa'), "'gpa' is no manoeuvre of the suite; did you mean gap"),
-        (('--set', 'mount_control.polcy=x'), 'did you mean policy'),
-        (('--set', 'mount_sim.motorway.gap_depth=0'), 'is set by the manoeuvre gap itself'),
-        (('--suite', 'nowhere.yaml'), 'cannot be read'),
-    ],
-)
-def test_wrong_use_drives_nothing(tmp_path, options, word):
-    (tmp_path / 'ours.yaml').write_text(SUITE, encoding='utf-8')
-    out = tmp_path / 'wrong'
-    assert word in refused('check', '--suite', tmp_path / 'ours.yaml', '--out', out, *options, codes=(2,))
-    assert not out.exists()
 
 
 def test_the_manoeuvres_are_listed():

@@ -45,8 +45,7 @@ def test_topics_without_a_rate_have_no_expectation(tmp_path):
 @pytest.mark.parametrize(('current', 'duplicated'), [(0.0, 0), (0.5, 1)])
 def test_the_zero_current_with_which_control_ends_is_no_duplicate(tmp_path, current, duplicated):
     layout = ScalarsLayout(CURRENT_SETPOINT)
-    raws = [layout.pack(START + PERIOD * each, (1.0,)) for each in range(100)]
-    raws.append(layout.pack(START + PERIOD * 99, (current,)))
+    raws = [layout.pack(START + PERIOD * min(each, 99), (current,)) for each in range(101)]
     bag = bag_of(tmp_path / 'bag', '/current_setpoint', CURRENT_SETPOINT.type, raws)
     entry = audit(bag)['/current_setpoint']
     assert (entry.expected, entry.present, entry.duplicated) == (101 - duplicated, 101, duplicated)
