@@ -88,7 +88,10 @@ def record(
     domain: int = 0,
     namespace: str = '',
 ) -> Recorded:
-    """Record `topics` (none named: all) until Ctrl-C, SIGTERM or `duration` (s); raises a `ValueError` or `GraphError`."""
+    """Record `topics` (none named: all) until Ctrl-C, SIGTERM or `duration` (s).
+
+    Raises a `ValueError`, or `GraphError` where no graph can be reached.
+    """
     names = chosen_topics(topics)
     if refusal := loopback_refusal():
         raise GraphError(refusal)
