@@ -16,7 +16,7 @@ from engine_mount.cli.commands import (
     cut,
     drive,
     experiment,
-    export,
+    export_signals,
     faults,
     fleet,
     identify,
@@ -90,6 +90,7 @@ def prepare() -> None:
 
 
 _DEV = group('dev', 'This project on this machine: speed, faults, references, compilation.')
+_EXPORT = group('export', 'Export for other programs: signals of a recording as a table.')
 _EDIT = group('edit', 'Change recordings: cut a piece out, recover a damaged one.')
 
 for _group, _panel, _functions in (
@@ -99,10 +100,11 @@ for _group, _panel, _functions in (
         _RECORDINGS,
         (
             *(ls.ls, ls.info, report.report, replay.replay, compare.compare, audit.audit),
-            *(import_files.import_file, export.export),
+            import_files.import_file,
         ),
     ),
     (app, _MOUNT, (experiment.experiment,)),
+    (_EXPORT, None, (export_signals.signals,)),
     (_EDIT, None, (cut.cut, recover.recover)),
     (_DEV, None, (faults.faults, bench.bench, accept.accept, prepare)),
 ):
@@ -112,7 +114,7 @@ for _group, _panel, _functions in (
         _epilog = _texts.get(f'{_name.upper()}_EPILOG', _texts.get('EPILOG'))
         _group.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
 for _group, _panel in (
-    *((_EDIT, _RECORDINGS), (fleet.app, _RECORDINGS), (road.app, _RECORDINGS)),
+    *((_EXPORT, _RECORDINGS), (_EDIT, _RECORDINGS), (fleet.app, _RECORDINGS), (road.app, _RECORDINGS)),
     *((calibrate.app, _MOUNT), (identify.app, _MOUNT), (_DEV, 'This project')),
 ):
     app.add_typer(_group, rich_help_panel=_panel)
