@@ -52,6 +52,7 @@ faults: $(VENV)/.ready ## bring every fault into the real graph; writes docs/ref
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
 	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
+	@rm -rf build/drive && $(BIN)/engine-mount drive --core --out build/drive && cp build/drive/drive.png docs/explanation/figures
 ifneq ($(RECORDED_DRIVE),)
 	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
 		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/explanation/recorded_drive.md

@@ -1,6 +1,7 @@
 """The whole graph: real processes, real topics, from the CAN peer to the recording."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -126,6 +127,18 @@ def test_real_time_drive_records_every_sample_and_damps_the_gap(drive_in_time, t
     assert 1.0 < figures['switch_on_s'][0] - figures['excitation_start_s'] < 1.5
     assert figures['contact_gap_m'] == pytest.approx(figures['true_contact_gap_m'], abs=3e-6)
     assert figures['rest_gap_m'] == pytest.approx(figures['true_rest_gap_m'], abs=6e-6)
+    assert set(figures['beside']) == {'hydromount', 'no current'}
+    numbers = [figures['peak_displacement_m'], *figures['beside'].values()]
+    peaks = '{:.2f} mm; hydromount {:.2f} mm; no current {:.2f} mm'.format(*(1e3 * each for each in numbers))
+    assert re.search(f'peak displacement +{peaks}', result.output)
+    picture, page = ((result.folder / name).read_text() for name in ('drive.svg', 'report.html'))
+    assert f'<!-- Largest displacement: {peaks} -->' in picture  # a text that is drawn
+    for name in ('this mount', 'hydromount', 'no current', 'degree of damping'):
+        assert f'<!-- {name} -->' in picture
+        assert f'"name":"{name}"' in page
+    words = ' '.join(re.sub('<[^>]*>', ' ', page).split())
+    mounts = r'hydromount \S+ mm \(-\d+ %\) and no current \S+ mm \(-\d+ %\)'
+    assert re.search(rf'Isolation \(good\) peak displacement \S+ mm against {mounts}', words)
     assert (result.folder / 'drive.png').stat().st_size > 10_000
     recording = engine_mount.open(result.folder / 'recording')
     assert not [report for report in node_reports(recording) if report.is_error]  # nor when it ended

@@ -81,6 +81,8 @@ def _typed(name: str, value: Any, default: Any) -> Any:
     if isinstance(default, float) and not isinstance(value, bool):
         with contextlib.suppress(TypeError, ValueError):
             return float(value)  # of 3e-5 too, which is text in YAML
+    if isinstance(default, bool) and isinstance(value, str):  # of a launch argument
+        value = {'true': True, 'false': False}.get(value.lower(), value)
     if isinstance(default, tuple):
         if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
             return list(value)

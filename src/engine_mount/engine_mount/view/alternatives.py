@@ -9,24 +9,21 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from engine_mount.reports.drive.beside import simulations_beside
 from engine_mount.settings.chosen import Parameters, control_parameters
 from mount_models.quantity import with_flattened
 from mount_models.sampling import sample_time_ns
 from mount_sim.excitation.excitation import Seat
 from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import seated_mount
-from mount_sim.plant.plant import PlantSimulation
 
-MOUNTS = {'hydro': ('hydromount', 'hydro'), 'undamped': ('undamped', 'elastomer')}
-"""{key: (label, mount)} of what stands beside every drive."""
 _LONGEST_PAUSE = 1_000_000_000  # ns, chosen: behind a longer one all begin anew, at rest
 _QUIET = np.zeros(5)  # no noise of the sensors
 _AVERAGED = 5_000_000_000  # ns, chosen: gravity and offset of an accelerometer are averaged over 5 s
 
 
 class Alternatives:
-    """All `MOUNTS` over one stream of accelerations; begins anew after a pause."""
+    """All mounts that stand beside a drive over one stream of accelerations; begins anew after a pause."""
 
     def __init__(self, parameters: Parameters):
         """Take the parameters of the drive; raises a `ValueError` for those of another version."""
@@ -38,20 +35,17 @@ class Alternatives:
     def advance(
         self, stamps: Sequence[int], accelerations: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
-        """Return {key: displacements (n,) in m} at n samples of acceleration, m/s^2 upwards, stamps in ns."""
-        found = {key: np.empty(len(stamps)) for key in MOUNTS}
+        """Return {name: displacements (n,) in m} at n accelerations (m/s^2 upwards) with stamps in ns."""
+        found = {name: np.empty(len(stamps)) for name in self._mounts}
         for place, (stamp, acceleration) in enumerate(zip(stamps, accelerations.tolist(), strict=True)):
             values = self._excitation(stamp, acceleration)
-            for key, plant in self._mounts.items():
+            for name, plant in self._mounts.items():
                 plant.advance(values, np.zeros(len(values)), 0.0)
-                found[key][place] = plant.read(_QUIET)[0]
+                found[name][place] = plant.read(_QUIET)[0]
         return found
 
     def _begin(self) -> None:
-        plants = {key: self._plant._replace(mount=seated_mount(mount)) for key, (_, mount) in MOUNTS.items()}
-        self._mounts = {
-            key: PlantSimulation(plant, Seat.ACCELERATED_CHASSIS, STEP_TIME) for key, plant in plants.items()
-        }
+        self._mounts = simulations_beside(self._plant, Seat.ACCELERATED_CHASSIS, STEP_TIME)
         self._last: tuple[int, float] | None = None
         self._mean = 0.0
 

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from engine_mount.recordings.layout import LayoutError
 from engine_mount.recordings.mcap_records import HEAD
 from engine_mount.recordings.series import Payloads, Series, SeriesError
-from engine_mount.reports.drawing.chart import COLOUR_OF, Chart, Curve, Panel, level_lines
+from engine_mount.reports.drawing.chart import COLOUR_OF, DASH_OF, SOLID, Chart, Curve, Panel, level_lines
 from engine_mount.reports.drawing.detail import browser_chart
+from engine_mount.reports.drive.beside import MOUNTS, THIS
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import Parameters, policy_of
-from engine_mount.view.alternatives import MOUNTS, Alternatives
+from engine_mount.view.alternatives import Alternatives
 from engine_mount.view.feed import Feed, Message
 from engine_mount.view.state import GraphState
 from mount_ros.topics import (
@@ -63,7 +64,7 @@ class Interval(NamedTuple):
 
 
 TRACES = (
-    Trace('displacement', 'this mount', 'displacement', DISPLACEMENT, 'mount', 1e3),
+    Trace('displacement', THIS, 'displacement', DISPLACEMENT, 'mount', 1e3),
     Trace('damping', 'damping', 'damping', CONTROL_TRACE, 'damping_active'),
     Trace('setpoint', 'setpoint', 'current', CURRENT_SETPOINT, 'coil_current'),
     Trace('current', 'measured', 'current', COIL_RIPPLE, 'coil_current'),
@@ -129,7 +130,7 @@ class Model:
     @property
     def traces(self) -> list[Trace]:
         """All lines in the order of their panels."""
-        beside = [Trace(f'beside.{key}', label, 'displacement') for key, (label, _) in MOUNTS.items()]
+        beside = [Trace(f'beside.{name}', name, 'displacement') for name in MOUNTS]
         return [TRACES[0], *(beside if self.alternatives is not None else []), *TRACES[1:], _LATENCY]
 
     def chart(self) -> dict[str, Any]:
@@ -138,8 +139,8 @@ class Model:
         for name, (unit, share, least) in PANELS.items():
             curves = []
             for label, key in ((trace.label, trace.key) for trace in self.traces if trace.panel == name):
-                colour, width = COLOUR_OF[key.removeprefix('beside.')], 1.0 if 'beside' in key else 1.5
-                curves.append(Curve(label, np.empty(0), np.empty(0), colour, width=width, key=key))
+                look = COLOUR_OF[key.removeprefix('beside.')], DASH_OF.get(label, SOLID)
+                curves.append(Curve(label, np.empty(0), np.empty(0), *look, key=key))
             levels = level_lines(self._levels()) if name == 'displacement' else ()
             label = f'{name} ({unit})' if unit else name
             panels.append(Panel(label, curves, levels=levels, share=share, least=least))
@@ -161,7 +162,7 @@ class Model:
         series = {topic: _series(topic, found) for topic, found in by_topic.items()}
         found = {trace.key: _column(series, trace.topic, trace.column) * trace.factor for trace in TRACES}
         found[_LATENCY.key] = 1e3 * _latencies(series)
-        found |= {f'beside.{key}': 1e3 * moved for key, moved in self._moved_beside(series).items()}
+        found |= {f'beside.{name}': 1e3 * moved for name, moved in self._moved_beside(series).items()}
         if DISPLACEMENT in series and (stamps := series[DISPLACEMENT].stamps).size:
             self.zero = int(stamps[0]) if self.zero is None else self.zero
             self._time = (int(stamps[-1]) - self.zero) * 1e-9

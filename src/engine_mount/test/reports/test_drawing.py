@@ -2,14 +2,16 @@
 
 import base64
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib import image
 
-from engine_mount.reports.drawing.chart import Chart, Curve, Dots, Level, Panel, Span
-from engine_mount.reports.drawing.detail import NUMBERS, budget_of, even_numbers
+from engine_mount.reports.drawing.chart import SHADING, Chart, Curve, Dots, Level, Panel
+from engine_mount.reports.drawing.detail import NUMBERS, browser_chart, budget_of, even_numbers
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.drawing.picture import draw_chart
 from engine_mount.reports.sections.section import Section
@@ -58,19 +60,24 @@ def test_the_numbers_of_a_page_are_shared_by_its_long_curves():
     assert budget_of([chart_of(10), chart_of(200_000, 300_000)]) == NUMBERS // 2
 
 
-@pytest.mark.parametrize(
-    ('views', 'width'), [(None, 1000), ({'': None, 'where it is highest': (4.0, 5.0)}, 1200)]
-)
-def test_a_picture_of_long_curves_dots_and_levels_has_its_width(views, width, tmp_path):
+def test_a_picture_shows_the_first_view_the_whole_below_and_a_shade_by_its_degree(tmp_path):
     x = np.arange(20_000.0)
     y = np.where(x == 7777.0, 50.0, np.sin(x))
     dots = Dots('largest', x[:1], y[:1])
-    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y, steps=True)], [dots], [Level('on', 0.5)])
-    chart = Chart('c', 'c', 'x (s)', [panel, Panel('z (N)', [Curve('z', y, x)])], [Span(1.0, 2.0)], 'on')
-    draw_chart(chart, tmp_path / 'x.png', views=views)
-    raw = (tmp_path / 'x.png').read_bytes()
-    assert raw.startswith(b'\x89PNG')
-    assert int.from_bytes(raw[16:20], 'big') == width
+    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y, steps=True)], [dots], [Level('on', 40.0)])
+    shade = Curve('degree', x, np.where(x < 10_000.0, 0.5, 1.0), '#000000')
+    chart = Chart('c', 'c', 'x (s)', [panel, Panel('z (N)', [Curve('z', x, y)])], shade, (0.0, 20_000.0))
+    heights = []
+    for view in (None, (9_000.0, 11_000.0)):
+        draw_chart(replace(chart, view=view), tmp_path / 'x.png')
+        picture = image.imread(tmp_path / 'x.png')
+        assert picture.shape[1] == 1000
+        heights.append(len(picture))
+        row = picture[300, :, 0]  # of the first panel, above its curves
+        for degree in (0.5, 1.0):
+            assert np.count_nonzero(np.abs(row - (1.0 - degree * SHADING)) < 0.01) > 300
+    assert heights[1] > heights[0]
+    assert browser_chart(chart)['shade']['name'] == 'degree'
 
 
 def test_no_text_in_a_chart_ends_the_script_that_holds_it():

@@ -33,7 +33,7 @@ class Known(Subject):
         self._place, self._several = place, True
         self._signals = dict.fromkeys(pair for pairs in QUANTITIES.values() for pair in pairs)
         self._signals |= {QUANTITIES[name][0]: signal for name, signal in signals.items()}
-        self.run, self.undamped, self.session = run, 'not known', ''
+        self.run, self.beside, self.session = run, 'not known', ''
 
 
 @pytest.mark.parametrize(('frequency', 'close', 'amplitude'), [(8.137, 1e-6, 1e-6), (0.2, 1e-3, 1e-2)])

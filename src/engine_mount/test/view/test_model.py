@@ -41,9 +41,11 @@ def test_time_is_that_of_the_stamps(shown):
     assert times[-1] == pytest.approx(6.999, abs=0.001)
 
 
-def test_the_undamped_mount_beside_swings_further_than_the_one_that_is_driven(shown):
-    assert highest(shown, 'beside.undamped') > 1.2 * highest(shown, 'displacement')
-    assert 0.0 < highest(shown, 'beside.hydro') < highest(shown, 'beside.undamped')
+def test_a_mount_without_current_swings_further_than_the_one_that_is_driven(shown):
+    assert highest(shown, 'beside.no current') > 1.2 * highest(shown, 'displacement')
+    assert 0.0 < highest(shown, 'beside.hydromount') < highest(shown, 'beside.no current')
+    dashes = {curve['name']: curve['dash'] for curve in shown.chart()['panels'][0]['curves']}
+    assert dashes == {'this mount': 'solid', 'hydromount': 'dashed', 'no current': 'dotted'}
 
 
 def test_gap_and_levels_are_told(shown):

@@ -84,6 +84,7 @@ _COMMON = (
     ),
     ('log_level', 'lowest level of the log of the nodes', 'info', 'debug info warn error fatal'),
     ('sample_rate', 'Hz: how often the electronics measure and are answered; empty: as in the config file'),
+    ('use_sim_time', 'true: no effect but a warning of each node, which needs no /clock'),
 )
 _OWN = {
     'vehicle': (
@@ -224,7 +225,7 @@ def _known_parameters(nodes: Sequence[GraphNode]) -> dict[str, dict[str, Any]]:
     known[RECORDER.name] |= {'uri': '', 'mounts': '', 'topics': ['displacement']}
     if SIM in nodes:
         known[SIM.name] |= {'interface': '', 'channel': driver.channel, 'port': driver.port}
-    return known
+    return {node: {**values, 'use_sim_time': False} for node, values in known.items()}
 
 
 def _of_arguments(graph: str, given: Mapping[str, str], known: Mapping[str, Any]) -> dict[str, Any]:

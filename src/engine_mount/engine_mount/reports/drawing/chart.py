@@ -15,17 +15,15 @@ an undamped mount.
 """
 
 LEVEL_COLOUR, SPAN_COLOUR = '#b03030', '#666666'
+SHADING = 0.25  # chosen: opacity of a shade of 1
 UNDAMPED_COLOUR, HYDROMOUNT_COLOUR = '#888888', '#2f7d32'
 DIFFERENCE_COLOUR = '#666666'
 """Of B - A, and of what is left between two lines that coincide."""
 
 COLOUR_OF = {
     'displacement': '#1f5fa8',
-    'friction': '#1f5fa8',
-    'hydro': HYDROMOUNT_COLOUR,
-    'friction_off': UNDAMPED_COLOUR,
-    'elastomer': UNDAMPED_COLOUR,
-    'undamped': UNDAMPED_COLOUR,
+    'hydromount': HYDROMOUNT_COLOUR,
+    'no current': UNDAMPED_COLOUR,
     'switched_viscous': '#c77700',
     'continuous_viscous': '#6a3d9a',
     'setpoint': '#c77700',
@@ -39,7 +37,9 @@ COLOUR_OF = {
 Array = NDArray[np.float64]
 Limits = tuple[float, float]
 
-SOLID, DASHED, DOTTED = 'solid', 'dash', 'dot'
+SOLID, DASHED, DOTTED = 'solid', 'dashed', 'dotted'
+DASH_OF = {'hydromount': DASHED, 'no current': DOTTED}
+"""Of the mounts that are not solid: with their colours, their look everywhere."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Curve:
     colour: str = COLOURS[0]
     dash: str = SOLID
     steps: bool = False  # holds each value until the next point
-    width: float = 1.2  # pixels
+    width: float = 1.6  # pixels
     key: str = ''  # of the signal that the live view adds
 
 
@@ -68,14 +68,6 @@ class Level:
     value: float
     dash: str = DASHED
     colour: str = LEVEL_COLOUR
-
-
-@dataclass(frozen=True)
-class Span:
-    """A shaded stretch of the x axis, as where damping is on."""
-
-    begin: float
-    end: float
 
 
 @dataclass(frozen=True)
@@ -95,17 +87,16 @@ class Panel:
 class Chart:
     """Panels above each other over one x axis.
 
-    `name` is that of the file, `title` stands above. `spans` are shaded in all panels and
-    called `span_name`; `limits` are those of the x axis, None for all. `view` is the part of the x axis that
-    is looked at first: a picture shows only that.
+    `name` is that of the file, `title` stands above. `shade` (0 to 1) is drawn as shading of all panels;
+    `limits` are those of the x axis, None for all. `view` is the part of it that is seen first: a picture
+    shows that and, where there are `limits`, below it the first panel within these.
     """
 
     name: str
     title: str
     x_label: str
     panels: Sequence[Panel]
-    spans: Sequence[Span] = ()
-    span_name: str = ''
+    shade: Curve | None = None
     limits: Limits | None = None
     view: Limits | None = None
     ticks: Sequence[float] = ()  # of the x axis; empty: chosen by the drawing

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.reports.drawing.chart import SPAN_COLOUR, Array, Chart, Curve
+from engine_mount.reports.drawing.chart import SHADING, Array, Chart, Curve
 
 NUMBERS = 400_000
 """Of all long curves of a page together, chosen: 1.1 MB as text, in which 6 signals of 60 s fit whole."""
@@ -19,6 +19,7 @@ _UNEVEN = 0.1  # chosen: of the sample time, that a stamp may be off an even gri
 def budget_of(charts: Sequence[Chart]) -> int:
     """Return how many numbers each long curve may have, so that all together have at most `NUMBERS`."""
     curves = [curve for chart in charts for panel in chart.panels for curve in panel.curves]
+    curves += [chart.shade for chart in charts if chart.shade]
     return max(_LONG, NUMBERS // max(1, sum(len(curve.x) > _LONG for curve in curves)))
 
 
@@ -33,8 +34,8 @@ def browser_chart(chart: Chart, budget: int = NUMBERS) -> dict[str, Any]:
         }
         for panel in chart.panels
     ]
-    spans = [vars(span) for span in chart.spans]
-    return {**vars(chart), 'panels': panels, 'spans': spans, 'span_colour': SPAN_COLOUR}
+    shade = chart.shade and _browser_curve(chart.shade, budget)
+    return {**vars(chart), 'panels': panels, 'shade': shade, 'shading': SHADING}
 
 
 def _browser_curve(curve: Curve, budget: int) -> dict[str, Any]:

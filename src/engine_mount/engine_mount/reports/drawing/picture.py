@@ -1,6 +1,5 @@
 """Charts as PNG or SVG."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,74 +9,74 @@ matplotlib.use('Agg')
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.chart import (
-    DASHED,
-    DOTTED,
-    SOLID,
-    SPAN_COLOUR,
-    Array,
-    Chart,
-    Curve,
-    Limits,
-    Panel,
-)
+from engine_mount.reports.drawing.chart import SHADING, Array, Chart, Curve, Limits, Panel
 from engine_mount.reports.drawing.detail import ranges
 
-_STYLES: dict[str, Any] = {SOLID: '-', DASHED: '--', DOTTED: ':'}
-_POINTS = 8000  # of a curve, chosen: 4 to a pixel of both kinds, lowest and highest
+_POINTS = 4000  # of a curve, chosen: 2 to a pixel of both kinds, lowest and highest
+_SHADES = 2000  # of the width, chosen: 2 to a pixel
 
 
-def draw_chart(chart: Chart, *files: Path, views: Mapping[str, Limits | None] | None = None) -> None:
-    """Write the picture of `chart` to `files`, PNG or by its suffix SVG: 1000 pixels wide, 1200 of two views.
+def draw_chart(chart: Chart, *files: Path) -> None:
+    """Write the picture of `chart` to `files`, PNG or by its suffix SVG: 1000 pixels wide.
 
-    `views` are {title: limits of the x axis}, beside one another; by default what the chart shows at first.
+    It shows what the chart shows at first; where that is a part, the first panel over all stands below.
     """
-    views = views or {'': chart.view or chart.limits}
-    shares = [panel.share for panel in chart.panels]
-    size = (10.0, 1.0 + 2.6 * sum(shares)) if len(views) == 1 else (12.0, 1.0 + 2.0 * sum(shares))
-    picture = Figure(figsize=size, layout='constrained')
-    rows = picture.subplots(len(shares), len(views), sharex='col', height_ratios=shares, squeeze=False)
-    for column, (title, limits) in zip(rows.T, views.items(), strict=True):
-        for axes, panel in zip(column, chart.panels, strict=True):
-            first = axes is rows[0, 0]
-            _draw_panel(axes, panel, limits)
-            for place, span in enumerate(chart.spans):
-                name = chart.span_name if place == 0 and first else None
-                axes.axvspan(span.begin, span.end, color=SPAN_COLOUR, alpha=0.15, linewidth=0, label=name)
-            if axes in rows[:, 0]:
-                axes.set_ylabel(panel.label)
-                _name_lines(axes, panel)
-        column[0].set_title(title, fontsize='medium')
-        column[-1].set_xlabel(chart.x_label)
+    views = [(panel, chart.view or chart.limits, panel.share) for panel in chart.panels]
+    if chart.view and chart.limits not in (None, chart.view):
+        views.append((chart.panels[0], chart.limits, 0.8))  # share of the height: chosen
+    shares = [share for *_, share in views]
+    picture = Figure(figsize=(10.0, 1.0 + 2.6 * sum(shares)), layout='constrained')
+    rows = picture.subplots(len(views), height_ratios=shares, squeeze=False)[:, 0]
+    if shade := chart.shade:
+        look = {'markerfacecolor': to_rgba(shade.colour, SHADING), 'markeredgewidth': 0.0, 'markersize': 10}
+        rows[0].plot([], [], 's', color=shade.colour, label=shade.name, **look)
+    for place, (axes, (panel, limits, _)) in enumerate(zip(rows, views, strict=True)):
+        _draw_panel(axes, panel, limits, shade)
+        axes.set_ylabel(panel.label)
+        if place < len(chart.panels):
+            axes.sharex(rows[0])
+            _name_lines(axes, panel)
+        else:
+            axes.axvspan(*chart.view, fill=False)
         if chart.ticks:
-            column[-1].set_xticks(list(chart.ticks))
+            axes.set_xticks(list(chart.ticks))
+        if place < len(chart.panels) - 1:
+            axes.tick_params(labelbottom=False)
+    rows[-1].set_xlabel(chart.x_label)
     picture.suptitle(chart.title)
     for file in files:
-        picture.savefig(file, dpi=100)
+        # nothing of date or program in it: the same drive gives the same bytes
+        picture.savefig(file, dpi=100, metadata={'Software': None} if file.suffix == '.png' else None)
 
 
-def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None) -> None:
+def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | None) -> None:
     for curve in panel.curves:
         x, y = _shown(curve, limits)
         steps = 'steps-post' if curve.steps else 'default'
-        style = {'linestyle': _STYLES[curve.dash], 'linewidth': curve.width, 'drawstyle': steps}
+        style: Any = {'linestyle': curve.dash, 'linewidth': curve.width, 'drawstyle': steps}
         axes.plot(x, y, color=curve.colour, label=curve.name, **style)
     for dots in panel.dots:
         axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
         for value in (level.value, -level.value):
-            axes.axhline(value, color=level.colour, linestyle=_STYLES[level.dash], linewidth=1.0)
-        axes.annotate(
-            level.name, (0.0, level.value), xycoords=('axes fraction', 'data'), textcoords='offset points',
-            xytext=(4, 1), color=level.colour, fontsize='small', va='bottom',
-        )  # fmt: skip
+            style = {'linestyle': level.dash, 'linewidth': 1.0}
+            axes.axhline(value, color=level.colour, label=level.name, **style)
     if limits is not None:
         axes.set_xlim(*limits)
     if panel.log:
         axes.set_yscale('log')
     axes.grid(alpha=0.25)
+    if shade is not None:
+        first, last = axes.get_xlim()
+        axes.set(xlim=(first, last), ylim=axes.get_ylim())  # the image does not move them
+        time = np.linspace(first, last, _SHADES)
+        image = np.full((1, _SHADES, 4), to_rgba(shade.colour))
+        image[0, :, 3] = SHADING * np.interp(time, shade.x, shade.y, 0.0, 0.0)
+        across = axes.get_xaxis_transform()
+        axes.imshow(image, extent=(first, last, 0.0, 1.0), transform=across, aspect='auto')
 
 
 def _name_lines(axes: Axes, panel: Panel) -> None:
@@ -87,14 +86,11 @@ def _name_lines(axes: Axes, panel: Panel) -> None:
     kept = {name: handle for name, handle in handles.items() if len(names) > 1 or name not in names}
     if not kept:
         return
-    legend = axes.legend(
-        kept.values(), kept, loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=len(kept),
-        frameon=False, fontsize='small', labelcolor='linecolor', handlelength=1.4, columnspacing=1.2,
-        borderaxespad=0.1,
+    axes.legend(
+        kept.values(), kept, loc='lower right', bbox_to_anchor=(1.0, 0.99), ncols=3, frameon=False,
+        fontsize='small', labelcolor=[handle.get_color() for handle in kept.values()],
+        handlelength=1.4, columnspacing=1.2, borderaxespad=0.1,
     )  # fmt: skip
-    for text, name in zip(legend.get_texts(), kept, strict=True):
-        if name not in names:
-            text.set_color(SPAN_COLOUR)  # a shaded stretch, whose own colour is too pale to read
 
 
 def _shown(curve: Curve, limits: Limits | None) -> tuple[Array, Array]:

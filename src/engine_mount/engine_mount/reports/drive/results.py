@@ -59,7 +59,7 @@ def evaluate_drive(
     write_json(result.figures, folder.summary)
     if report:
         for part in parts:
-            _draw(folder, part, figures[part.mount], screen, result)
+            _draw(folder, part, screen, result)
         _make(folder.report, lambda: _write_page(folder, parts, screen), result)
     return result
 
@@ -101,9 +101,7 @@ def _audited(recording: Recording, screen: Screen) -> list[str]:
     return [*recording.warnings, *(f'{name}: {words}' for words in found.complaints())]
 
 
-def _draw(
-    folder: RunFolder, recording: Recording, figures: Figures, screen: Screen, result: DriveResult
-) -> None:
+def _draw(folder: RunFolder, recording: Recording, screen: Screen, result: DriveResult) -> None:
     file = folder.figure
     if recording.mount:
         file = file.with_name(f'{file.stem}_{recording.mount}{file.suffix}')
@@ -113,12 +111,10 @@ def _draw(
         from engine_mount.reports.sections.motion import draw_drive
         from engine_mount.reports.sections.subject import Subject
 
-        title = f'{figures["scenario"]}, {figures["mode"]}: mount displacement and actuator current'
-        begin = figures['excitation_start_s']
-        draw_drive(Subject(recording), begin, title, file, file.with_suffix('.svg'))
+        draw_drive(Subject(recording), file, file.with_suffix('.svg'))
         result.pictures.append(file)
 
-    with screen.line(f'simulating the undamped mount, drawing {file.name}'):
+    with screen.line(f'drawing {file.name}'):
         _make(file, draw, result)
 
 

@@ -12,7 +12,8 @@ from engine_mount.recordings.events import Switching, switching_times
 from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
-from engine_mount.reports.drive.evaluation import tracking_error
+from engine_mount.reports.drive.beside import name_of, peaks_beside, peaks_text
+from engine_mount.reports.drive.evaluation import error_text, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
@@ -69,6 +70,7 @@ def summarise(
         'switch_on_s': switched_on,
         'switch_off_s': switched_off,
         'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
+        'beside': peaks_beside(recording, parameters) or None,
         'peak_current_a': peak,
         'tracking_error_rms': error,
         **{name: known(run[name]) for name in ('latency_median_s', 'latency_p99_s')},
@@ -94,7 +96,8 @@ def late_control(figures: Mapping[str, Any]) -> list[str]:
 
 def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     """Return the figures for people, `mount` before their title; times in s from the first displacement."""
-    rows = []
+    peaks = {name_of(figures['mount']): figures['peak_displacement_m'], **(figures['beside'] or {})}
+    rows = [('peak displacement', peaks_text(peaks))]
     for name in ('rest', 'contact'):
         measured, std, true = (
             1e6 * figures[key] for key in (f'{name}_gap_m', f'{name}_gap_std_m', f'true_{name}_gap_m')
@@ -107,17 +110,13 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     )
     if not reason:
         rows.append(('control', 'answered no sample' if begin is None else f'from {begin:.2f} s on'))
-    rows.append(('peak displacement', f'{1e3 * figures["peak_displacement_m"]:.2f} mm'))
     if reason:
         rows.append(('friction', f'not applicable: {reason}'))
     else:
-        percent = (
-            'damping was never on' if error is None else f'{100 * error:.1f} % rms of the peak wanted force'
-        )
         rows += [
             ('damping switched', Switching(figures['switch_on_s'], figures['switch_off_s']).sentence(2)),
             ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
-            ('friction force error', percent),
+            ('friction force error', 'damping was never on' if error is None else error_text(error)),
         ]
     rows += found.rows()
     for entry in figures['restarts']:

@@ -67,7 +67,7 @@ def spread(pair: Pair) -> Section:
     curves = []
     for (name, colour, dash), values in zip(looks, both, strict=True):
         counts = np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
-        curves.append(Curve(name, edges, counts, colour, dash, steps=True, width=1.6))
+        curves.append(Curve(name, edges, counts, colour, dash, steps=True))
     panels, limits = [Panel('number of rows', curves)], (edges[0], edges[-1])
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
     form = '{:g}'.format if pair.whole else number

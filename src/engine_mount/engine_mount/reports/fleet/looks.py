@@ -178,8 +178,8 @@ def _compared(
     """Return two panels of a part of two signals: both, with a dot at the `largest`, and the difference."""
     x, before, after = time[part], factor * pair[0][part], factor * pair[1][part]
     curves = [
-        Curve('as recorded', x, before, COLOURS[0], width=1.6),
-        Curve('changed', x, after, COLOURS[1], DASHED, width=1.6),
+        Curve('as recorded', x, before, COLOURS[0]),
+        Curve('changed', x, after, COLOURS[1], DASHED),
     ]
     dots = []
     if largest is not None and largest.start < largest.stop:

@@ -9,17 +9,18 @@ import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.reports.drawing.chart import (
+    COLOUR_OF,
+    DASH_OF,
     DIFFERENCE_COLOUR,
-    UNDAMPED_COLOUR,
     Array,
     Chart,
     Curve,
     Dots,
-    Limits,
+    Level,
     Panel,
-    Span,
     level_lines,
 )
+from engine_mount.reports.drive.beside import peaks_text
 from engine_mount.reports.sections.periodic import (
     amplitude_density,
     cycle_work,
@@ -35,6 +36,7 @@ from engine_mount.reports.sections.section import Cell, Link, Section, Table
 from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
 
 TIME_LABEL = 'time from the first sample (s)'
+BEFORE, AFTER = 0.4, 0.6  # s, chosen: shown first, round the largest displacement or force
 _MM = 1e3
 _LOOPS = 4  # periods drawn
 _PERIODS = 32  # evaluated
@@ -48,12 +50,13 @@ _HIGHEST = 60.0  # Hz, of a spectrum
 def traces(subjects: Sequence[Subject]) -> Section:
     """Return displacement with the levels of its policy above current, over time, as in Fig. 15.
 
-    Where two recordings are compared, the second less the first stands below each.
+    With the displacement stands that of other mounts on the road of the first recording. Where two recordings
+    are compared, the second less the first stands below each.
     """
     first, last, several = subjects[0], subjects[-1], len(subjects) > 1
-    damping = _damping(subjects)
+    shade = next(filter(None, (each.shade for each in subjects)), None)
     levels: dict[str, float] = next((each.run.levels for each in subjects if each.run.levels), {})
-    words = [f'Shaded: damping on in {first.name}.'] if several and damping else []
+    words = [f'Shaded: the degree of damping in {first.name}.'] if several and shade else []
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
@@ -66,23 +69,36 @@ def traces(subjects: Sequence[Subject]) -> Section:
         if not signals:
             continue
         ends += [signal.time[place] for _, signal in signals for place in (0, -1)]
-        curves = [each.curve(what, signal.time, factor * signal.values) for each, signal in signals]
-        lines = level_lines(levels) if quantity == 'displacement' else []
-        if quantity == 'displacement' and not isinstance(calm := first.undamped, str):
-            grey = Curve('undamped', first.seconds(calm.stamps), _MM * calm.displacement, UNDAMPED_COLOUR)
-            curves.insert(0, grey)  # below the others
-        panels.append(Panel(f'{what} ({unit})', curves, levels=lines, share=share))
+        lines: list[Level] = []
+        name, beside = what, []
+        if quantity == 'displacement':
+            lines = level_lines(levels)
+            name = what if several else first.mount
+            beside = [
+                Curve(other, moved.time, _MM * moved.values, COLOUR_OF[other], DASH_OF[other])
+                for other, moved in first.displacements.items()
+                if other != first.mount
+            ]
+        curves = [each.curve(name, signal.time, factor * signal.values) for each, signal in signals]
+        panels.append(Panel(f'{what} ({unit})', [*beside, *curves], levels=lines, share=share))
         if last.comparison is not None and len(signals) > 1:
             panels.append(_difference(f'{what}, B - A ({unit})', signals[0][1], signals[-1][1], factor))
     if not panels:
         return Section('traces', 'Displacement and current', words)
-    if not isinstance(first.undamped, str):
+    if not isinstance(first.beside, str):
         of = f' of {first.name}' if several else ''
-        words.append(f'Grey: the undamped mount on the same excitation{of}, computed with 0 A.')
+        words.append(f'Computed on the same road{of}: {", ".join(first.beside.truths)}.')
     if last.comparison is not None:
         words.append(f'B - A: {last.name} less {first.name}.')
     title, limits = 'Displacement and current', (min(ends), max(ends))
-    chart = Chart('time_traces', title, TIME_LABEL, panels, damping, 'damping on', limits)
+    chart = Chart('time_traces', title, TIME_LABEL, panels, shade, limits)
+    peaks = {name: moved.peak() for name, moved in first.displacements.items()}
+    _, at = peaks.get(first.mount, (0.0, math.nan))
+    if not several and math.isfinite(at):
+        told = f'Largest displacement: {peaks_text({name: peak for name, (peak, _) in peaks.items()})}'
+        words.insert(0, f'{told}. One second round it is shown first.')
+        view = max(limits[0], at - BEFORE), min(limits[1], at + AFTER)
+        chart = replace(chart, title=told, view=view)
     return Section('traces', title, words, chart)
 
 
@@ -218,12 +234,6 @@ def peak_cell(signal: Signal | None, unit: str, begin: float = -math.inf, end: f
     return 'unknown' if math.isnan(value) else Link(quantity_text(value, unit), 'traces', time)
 
 
-def _damping(subjects: Sequence[Subject]) -> list[Span]:
-    """Return where damping was on in the first recording that tells."""
-    spans = (each.damping for each in subjects if not each.run.without_friction)
-    return [Span(begin, end) for begin, end in next(filter(None, spans), [])]
-
-
 def _difference(label: str, a: Signal, b: Signal, factor: float) -> Panel:
     y = b.values - np.interp(b.time, a.time, a.values, np.nan, np.nan)
     return Panel(label, [Curve('B - A', b.time, factor * y, DIFFERENCE_COLOUR)], share=0.7)
@@ -258,23 +268,10 @@ def _together(
     return x[both], y[both], time[both]
 
 
-_BEFORE, _AFTER = 0.4, 0.6  # s, chosen: shown in detail round the highest current
-_SHORTEST = 1.0  # s, chosen: a drive that never reached its excitation is shown from its end
-
-
-def draw_drive(subject: Subject, begin: float, title: str, *files: Path) -> None:
-    """Write the picture of a drive from `begin` (s) on to `files` (PNG, SVG), in the manner of Fig. 15.
-
-    Right, where there is a current, its highest moment in detail. Raises `ValueError` without any signal.
-    """
+def draw_drive(subject: Subject, *files: Path) -> None:
+    """Write the picture of a drive to `files` (PNG, SVG); raises `ValueError` without any signal."""
     from engine_mount.reports.drawing.picture import draw_chart  # what draws takes a second to load
 
-    chart, setpoint = traces([subject]).chart, subject['setpoint']
-    if chart is None or chart.limits is None:
+    if (chart := traces([subject]).chart) is None:
         raise ValueError('neither displacement nor current was recorded')
-    end = chart.limits[1]
-    views: dict[str, Limits | None] = {'': (min(begin, end - _SHORTEST), end)}
-    strongest, at = (0.0, 0.0) if setpoint is None else setpoint.peak(begin)
-    if strongest > 0.0:
-        views['where the current is highest'] = (at - _BEFORE, at + _AFTER)
-    draw_chart(replace(chart, title=title), *files, views=views)
+    draw_chart(chart, *files)

@@ -1,12 +1,13 @@
 """What a report begins with: the verdict, the figures that one wants to see first, and what is missing."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
+from engine_mount.reports.drive.evaluation import error_text
 from engine_mount.reports.sections.motion import peak_cell
 from engine_mount.reports.sections.run import HEAD_OF_SESSION
 from engine_mount.reports.sections.section import (
@@ -38,12 +39,7 @@ def overview(subjects: Sequence[Subject]) -> Section:
 
 def findings(subject: Subject) -> list[Finding]:
     """Return the four findings on a recording, with its name where there are several."""
-    parts = {
-        'Switching': _switching,
-        'Faults': _faults,
-        'Losses': _losses,
-        'Isolation': _isolation,
-    }
+    parts = {'Isolation': _isolation, 'Switching': _switching, 'Faults': _faults, 'Losses': _losses}
     of = f', {subject.name}' if subject.prefix else ''
     return [Finding(f'{what}{of}', *judge(subject)) for what, judge in parts.items()]
 
@@ -67,7 +63,7 @@ def _friction_cells(subject: Subject) -> dict[str, Cell]:
     for name, figure, section, text in (
         ('peak current', 'peak_current_a', 'traces', lambda value: quantity_text(value, 'A')),
         ('damping switched on', 'damping_switched_on', 'switching', _times),
-        ('friction force error', 'tracking_error_rms', 'tracking', _percent),
+        ('friction force error', 'tracking_error_rms', 'tracking', error_text),
     ):
         known: Cell = 'not known' if figures[figure] is None else Link(text(figures[figure]), section)
         reason = subject.run.without_friction
@@ -90,12 +86,12 @@ def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 
 def _faults(subject: Subject) -> tuple[str, Sequence[Cell]]:
-    faults = subject.losses.faults
-    if not faults:
-        return GOOD, [Link('none', 'losses')]
-    first = faults[0]
+    found = subject.losses
+    if not found.faults:
+        return UNKNOWN if found.unjudged else GOOD, [Link(found.faults_text(), 'losses')]
+    first = found.faults[0]
     sentence = f'{first.node}: {first.sentence}' if first.node else first.sentence
-    return BAD, [Link(f'{len(faults)}, the first', 'losses'), 'at', moment(first.time), sentence]
+    return BAD, [Link(f'{len(found.faults)}, the first', 'losses'), 'at', moment(first.time), sentence]
 
 
 def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
@@ -111,36 +107,36 @@ def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 
 def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
-    unknown = 'against the undamped run unknown:'
-    undamped, moved, shaken = subject.undamped, subject['displacement'], subject['acceleration']
-    if isinstance(undamped, str):
-        return UNKNOWN, [f'{unknown} {undamped}']
+    unknown = 'against other mounts unknown:'
+    beside, moved, shaken = subject.beside, subject['displacement'], subject['acceleration']
+    if isinstance(beside, str):
+        return UNKNOWN, [f'{unknown} {beside}']
     if moved is None:
         return UNKNOWN, [f'{unknown} no displacement was recorded']
-    time, begin = subject.seconds(undamped.stamps), (undamped.begin - subject.zero) / 1e9
-    calm = Signal(time, undamped.displacement)
-    (peak, at), (other, other_at) = moved.peak(begin), calm.peak(begin)
-    if math.isnan(peak) or math.isnan(other):
+    time, begin = subject.seconds(beside.stamps), (beside.begin - subject.zero) / 1e9
+    peak, at = moved.peak(begin)
+    if math.isnan(peak):
         return UNKNOWN, [f'{unknown} the recording ends before the excitation begins']
-    text: list[Cell] = [
-        'peak displacement',
-        Link(quantity_text(peak, 'm'), 'traces', at),
-        'against',
-        Link(quantity_text(other, 'm'), 'traces', other_at),
-        f'undamped ({_change(peak, other)})',
-        f'· rms {_rms_text(moved, calm, begin, "m")}',
-    ]
+
+    def against(signal: Signal, quantity: str, unit: str, figure: Callable[[Signal], float]) -> list[str]:
+        value, words = figure(signal), []
+        for name, truth in beside.truths.items():
+            other = figure(Signal(time, truth[quantity]))
+            words.append(f'{name} {quantity_text(other, unit)} ({_change(value, other)})')
+        return [quantity_text(value, unit), f'against {" and ".join(words)}']
+
+    def rms(signal: Signal) -> float:
+        known = signal.values[(signal.time >= begin) & np.isfinite(signal.values)]
+        return float(np.std(known)) if len(known) else math.nan
+
+    largest, *words = against(moved, 'displacement', 'm', lambda signal: signal.peak(begin)[0])
+    text: list[Cell] = ['peak displacement', Link(largest, 'traces', at), *words]
+    text += ['· rms', *against(moved, 'displacement', 'm', rms)]
     if shaken is not None:
-        rms = _rms_text(shaken, Signal(time, undamped.chassis_acceleration), begin, 'm/s²')
-        text += ['·', Link('acceleration of the chassis', 'spectra'), f'rms {rms}']
-    return (GOOD if peak <= other else LOOK), text
-
-
-def _rms_text(driven: Signal, undamped: Signal, begin: float, unit: str) -> str:
-    """Return the rms about the mean of drive and undamped run from `begin` (s) on, in words."""
-    known = (each.values[(each.time >= begin) & np.isfinite(each.values)] for each in (driven, undamped))
-    rms, other = (float(np.std(values)) if len(values) else math.nan for values in known)
-    return f'{quantity_text(rms, unit)} against {quantity_text(other, unit)} ({_change(rms, other)})'
+        text += ['·', Link('acceleration of the chassis', 'spectra'), 'rms']
+        text += against(shaken, 'chassis_acceleration', 'm/s²', rms)
+    least = min(each.peak(begin)[0] for each in subject.displacements.values())
+    return (GOOD if peak <= least else LOOK), text
 
 
 def _change(value: float, reference: float) -> str:
@@ -152,7 +148,3 @@ def _change(value: float, reference: float) -> str:
 
 def _times(count: int) -> str:
     return 'once' if count == 1 else f'{count} times'
-
-
-def _percent(share: float) -> str:
-    return f'{100.0 * share:.1f} % rms of the peak wanted force'

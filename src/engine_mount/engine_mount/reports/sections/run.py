@@ -11,14 +11,13 @@ from engine_mount.recordings.losses import as_table
 from engine_mount.recordings.losses import sentences as audit_sentences
 from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, DASHED, Array, Chart, Curve, Panel, Span
-from engine_mount.reports.sections.motion import TIME_LABEL
+from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, DASHED, Array, Chart, Curve, Panel
+from engine_mount.reports.sections.motion import AFTER, BEFORE, TIME_LABEL
 from engine_mount.reports.sections.section import Section, Table, moment
 from engine_mount.reports.sections.subject import Signal, Subject, Tracking, shared_sentences
 
 _COVERING = 0.95  # chosen: this share of the longest counts as all
 _FOLDED = 20  # parameters, chosen: more are shown on demand
-_BEFORE, _AFTER = 0.4, 0.6  # s, chosen: shown round the largest force
 HEAD_OF_SESSION = ('scenario', 'mode', 'started')
 _CURRENTS = {
     'true current': 'the true coil current',
@@ -90,7 +89,7 @@ def tracking(subjects: Sequence[Subject]) -> Section:
     said: list[tuple[Subject, str]] = []
     wanted: list[Curve] = []
     forces, errors = [], []
-    damping: list[tuple[float, float]] = []
+    shade = None
     view = (0.0, 0.0)
     for subject in subjects:
         found = subject.tracking
@@ -103,8 +102,8 @@ def tracking(subjects: Sequence[Subject]) -> Section:
         said += [(subject, error), (subject, found.remark)]
         if not wanted:
             strongest = found.time[np.nanargmax(np.abs(found.wanted))]
-            view = (strongest - _BEFORE, strongest + _AFTER)
-        damping = damping or subject.damping or []
+            view = strongest - BEFORE, strongest + AFTER
+        shade = shade or subject.shade
         place = len(wanted)
         colour = COLOURS[(place + 1) % len(COLOURS)] if place else COLOUR_OF['desired_force']
         force = subject.curve('true', found.time, found.actual)
@@ -113,11 +112,11 @@ def tracking(subjects: Sequence[Subject]) -> Section:
         wanted.append(Curve(name, found.time, found.wanted, colour, DASHED))
         errors.append(subject.curve('error', found.time, found.actual - found.wanted))
     chart = None
-    if wanted and damping:
+    if wanted and shade:
         panels = [Panel('friction force (N)', [*forces, *wanted], share=1.6)]
         panels.append(Panel('true minus wanted (N)', errors))
-        title, spans = 'Friction force against the wanted one', [Span(*span) for span in damping]
-        chart = Chart('tracking', title, TIME_LABEL, panels, spans, 'damping on', view=view)
+        title = 'Friction force against the wanted one'
+        chart = Chart('tracking', title, TIME_LABEL, panels, shade, view=view)
     return Section('tracking', 'Tracking error against the truth', shared_sentences(subjects, said), chart)
 
 

@@ -23,10 +23,18 @@ from engine_mount.recordings.session import (
     session_parameters,
 )
 from engine_mount.recordings.times import Times, each_once
-from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, Array, Curve
+from engine_mount.reports.drawing.chart import (
+    COLOUR_OF,
+    COLOURS,
+    DASH_OF,
+    SOLID,
+    SPAN_COLOUR,
+    Array,
+    Curve,
+)
+from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
-from engine_mount.reports.drive.undamped import Undamped, UndampedError, undamped_of
 from engine_mount.reports.sections.periodic import Sine, dominant_sine
 from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy import switched_viscous
@@ -149,10 +157,31 @@ class Subject:
 
     def curve(self, what: str, x: Array, y: Array) -> Curve:
         """Return a curve in the colour of this recording, with its name where there are several."""
-        mount = self.run.mount
-        own = '' if mount.startswith('friction') and mount != 'friction_off' else COLOUR_OF.get(mount, '')
         label = f'{what}, {self.name}' if self._several else what
-        return Curve(label, x, y, own or COLOURS[self._place % len(COLOURS)])
+        colour = COLOUR_OF.get(self.mount, COLOURS[self._place % len(COLOURS)])
+        return Curve(label, x, y, colour, DASH_OF.get(self.mount, SOLID))
+
+    @property
+    def mount(self) -> str:
+        """The name of its own mount among those beside it."""
+        return name_of(self.run.mount)
+
+    @functools.cached_property
+    def shade(self) -> Curve | None:
+        """The degree of damping, None where it does not apply or was never above 0."""
+        degree = self['damping']
+        if self.run.without_friction or degree is None or not self.damping:
+            return None
+        return Curve('degree of damping', degree.time, degree.values, SPAN_COLOUR)
+
+    @functools.cached_property
+    def displacements(self) -> dict[str, Signal]:
+        """{name: displacement} of its own mount and, where they can be computed, of those beside it."""
+        found = {} if (own := self['displacement']) is None else {self.mount: own}
+        if not isinstance(beside := self.beside, str):
+            time = self.seconds(beside.stamps)
+            found |= {name: Signal(time, truth['displacement']) for name, truth in beside.truths.items()}
+        return found
 
     @functools.cached_property
     def session(self) -> str:
@@ -231,13 +260,13 @@ class Subject:
             return []
 
     @functools.cached_property
-    def undamped(self) -> Undamped | str:
-        """The same drive without current, or why there is none."""
+    def beside(self) -> Beside | str:
+        """What other mounts do on its road, or why that is not known."""
         if self.run.unknown:
             return self.run.unknown
         try:
-            return undamped_of(self.recording, self.run.parameters)
-        except UndampedError as reason:
+            return mounts_beside(self.recording, self.run.parameters)
+        except BesideError as reason:
             return str(reason)
 
     @functools.cached_property

@@ -7,7 +7,7 @@ window.addEventListener('error', (event) => { root.dataset.error = event.message
 
 const LEFT = 58, RIGHT = 8, TOP = 6, BOTTOM = 36; // pixels round the drawing area, BOTTOM of the last panel
 const NARROW = 620, HEIGHT = 190, LOW_HEIGHT = 150; // pixels: a panel of share 1, and where the page is narrow
-const UNKNOWN = -32768;
+const UNKNOWN = -32768, DASHES = { solid: [], dashed: [6, 4], dotted: [2, 3] };
 const charts = [];
 
 function add(parent, kind, name, text = '') {
@@ -62,7 +62,10 @@ function build(place, spec) {
   place.replaceChildren();
   chart.reading = add(place, 'p', 'reading');
   chart.panels = spec.panels.map((panel) => builtPanel(chart, panel));
-  if (spec.spans.length) add(place, 'p', 'key', `▒ ${spec.span_name}`);
+  if (spec.shade) {
+    chart.shade = withNumbers(spec.shade);
+    add(place, 'p', 'key', `▒ ${spec.shade.name}`);
+  }
   chart.whole = wholeOf(chart);
   chart.shown = spec.view || chart.whole;
   charts.push(chart);
@@ -87,10 +90,12 @@ function builtPanel(chart, spec) {
       draw(chart);
     };
   }
+  const levels = spec.levels.map((level) => ({ ...level, chip: add(legend, 'span', '') }));
+  for (const { name, dash, chip } of levels) { add(chip, 'i', `stroke ${dash}`); chip.append(name); }
   const canvas = add(chart.place, 'canvas', '');
   canvas.setAttribute('role', 'img');
   canvas.setAttribute('aria-label', `${spec.label} over ${chart.spec.x_label}`);
-  return { spec, canvas, lines, unit: unitOf(spec.label) };
+  return { spec, canvas, lines, levels, unit: unitOf(spec.label) };
 }
 
 function wholeOf({ spec, panels }) {
@@ -142,7 +147,7 @@ function verticalOf({ spec, lines }, from, to) {
 }
 
 function paintPanel(chart, panel, width, ink) {
-  const { spec, canvas, lines } = panel, last = panel === chart.panels[chart.panels.length - 1];
+  const { spec, canvas, lines, levels } = panel, last = panel === chart.panels[chart.panels.length - 1];
   const ratio = devicePixelRatio || 1, below = last ? BOTTOM : 6;
   const height = Math.round((width < NARROW ? LOW_HEIGHT : HEIGHT) * spec.share) + below;
   canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
@@ -160,7 +165,7 @@ function paintPanel(chart, panel, width, ink) {
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
   const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
   for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
-  paintLevels(paint, spec.levels, area);
+  paintLevels(paint, levels, area);
   if (chart.spike !== null) {
     const at = Math.round(x(chart.spike)) + 0.5;
     paint.strokeStyle = ink('--ink'); stroke(paint, at, 0, at, bottom);
@@ -170,8 +175,8 @@ function paintPanel(chart, panel, width, ink) {
     paint.globalAlpha = 0.2; paint.fillStyle = ink('--ink'); paint.fillRect(begin, 0, end - begin, bottom); paint.globalAlpha = 1;
   }
   paint.restore();
+  for (const { chip, colour } of [...lines, ...levels]) chip.style.color = colourOf(colour);
   for (const line of lines) {
-    line.chip.style.color = colourOf(line.colour);
     const found = chart.live ? [line.latest] : chart.spike === null ? [] : valuesAt(line, chart.spike);
     const texts = new Set(found.map((value) => written(value, high - low, spec.log)));
     line.number.textContent = texts.size ? ` ${[...texts].join(' … ')} ${panel.unit}` : '';
@@ -180,11 +185,11 @@ function paintPanel(chart, panel, width, ink) {
 
 function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, last, ink }) {
   const [from, to] = chart.shown, width = right + RIGHT;
-  paint.fillStyle = colourOf(chart.spec.span_colour);
-  paint.globalAlpha = 0.15;
-  for (const { begin, end } of chart.spec.spans) {
-    const first = Math.max(LEFT, x(begin)), wide = Math.min(right, x(end)) - first;
-    if (wide > 0) paint.fillRect(first, TOP, wide, bottom - TOP);
+  for (let across = LEFT; chart.shade && across < right; across += 1) {
+    const share = valuesAt(chart.shade, from + ((across - LEFT) * (to - from)) / (right - LEFT)).pop();
+    paint.fillStyle = colourOf(chart.shade.colour);
+    paint.globalAlpha = chart.spec.shading * (share || 0);
+    paint.fillRect(across, TOP, 1, bottom - TOP);
   }
   paint.globalAlpha = 1;
   paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
@@ -214,24 +219,19 @@ function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, las
 
 function stroke(paint, x0, y0, x1, y1) { paint.beginPath(); paint.moveTo(x0, y0); paint.lineTo(x1, y1); paint.stroke(); }
 
-function paintLevels(paint, levels, { y, right, ink }) {
-  paint.textAlign = 'left'; paint.textBaseline = 'bottom';
-  for (const { name, value, dash, colour } of levels) {
-    paint.strokeStyle = paint.fillStyle = colourOf(colour);
-    paint.setLineDash(dash === 'dot' ? [2, 3] : [7, 4]);
+function paintLevels(paint, levels, { y, right }) {
+  for (const { value, dash, colour } of levels) {
+    paint.strokeStyle = colourOf(colour); paint.lineWidth = 1;
+    paint.setLineDash(DASHES[dash]);
     for (const each of [value, -value]) stroke(paint, LEFT, y(each), right, y(each));
     paint.setLineDash([]);
-    paint.strokeStyle = ink('--paper'); paint.lineWidth = 3; paint.globalAlpha = 0.8;
-    paint.strokeText(name, LEFT + 4, y(value) - 1);
-    paint.lineWidth = 1; paint.globalAlpha = 1;
-    paint.fillText(name, LEFT + 4, y(value) - 1);
   }
 }
 
 function paintCurve(paint, curve, area, [from, to]) {
   paint.strokeStyle = colourOf(curve.colour);
   paint.lineWidth = curve.width; paint.lineJoin = 'round';
-  paint.setLineDash(curve.dash === 'dash' ? [6, 4] : []);
+  paint.setLineDash(DASHES[curve.dash]);
   paint.beginPath();
   const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
   const end = rising ? Math.min(x.length, placeOf(x, to) + 2) : x.length;
