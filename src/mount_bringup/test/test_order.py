@@ -143,7 +143,7 @@ def test_what_cannot_be_is_refused_before_a_process_starts(order, given, words):
 @pytest.mark.parametrize(
     ('command', 'words'),
     [
-        (['car'], 'the first word must be one of vehicle, sim'),
+        (['car'], "graph 'car' is unknown; known are vehicle, sim"),
         (['sim', 'bench'], "'bench' is no parameter of sim.launch.py"),
     ],
 )

@@ -19,7 +19,7 @@ def test_figures_are_told_as_ratios_and_written(tmp_path, monkeypatch):
         'y': Comparison('growth', 1.0, 'none', 0.0, 'B'),
     }
     monkeypatch.setattr(bench, 'import_module', lambda name: type('Module', (), {'calls': lambda *_: rows}))
-    printed = command('bench', '--only', 'calls', '--json', tmp_path / 'figures.json')
+    printed = command('dev', 'bench', '--only', 'calls', '--json', tmp_path / 'figures.json')
     figures = json.loads((tmp_path / 'figures.json').read_text())
     assert figures['x'] == {
         'what': 'a thing', 'ours': 2e-6, 'other': 8e-6, 'beside': 'another', 'unit': 's', 'ratio': 0.25,
@@ -40,7 +40,7 @@ def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain, tmp_path
 
 @pytest.mark.slow
 def test_one_sample_is_measured_beside_real_time():
-    assert 'ratio' in command('bench', '--only', 'calls')
+    assert 'ratio' in command('dev', 'bench', '--only', 'calls')
 
 
 def test_an_import_is_measured_in_a_process_of_its_own():

@@ -30,7 +30,7 @@ from mount_bringup.settings import (
 )
 from mount_control.policy.registry import DEFAULT, POLICIES
 from mount_driver.parameters import DriverParameters
-from mount_models.quantity import check_name
+from mount_models.quantity import check_name, nearest
 from mount_ros.nodes.real_time import HIGHEST
 
 _CAN_OF_VEHICLE = {'interface': 'socketcan', 'channel': 'can0'}
@@ -158,7 +158,7 @@ def launch_order(command: Sequence[str]) -> LaunchOrder:
     """
     graph, *words = command or ['']
     if graph not in GRAPHS:
-        raise SettingError(f'graph {graph!r} is unknown; the first word must be one of {", ".join(GRAPHS)}')
+        raise SettingError(f'graph {graph!r} is unknown; {nearest(graph, GRAPHS)}')
     given = texts_of(words, graph)
     nodes = SIMULATED if graph == 'sim' else VEHICLE
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)

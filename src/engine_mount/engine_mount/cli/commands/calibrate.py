@@ -107,9 +107,7 @@ def actuator(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
     from engine_mount.identification.rack import FileValues
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
@@ -160,9 +158,7 @@ def inductance(
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
