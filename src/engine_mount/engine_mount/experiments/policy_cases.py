@@ -15,11 +15,10 @@ from engine_mount.experiments.harness.measures import (
     BELOW_ISOLATION,
     first_extremum,
     peak_and_rms,
-    rms_in_bands,
     sweep_parameters,
 )
 from engine_mount.reports.drive.signals import Truth
-from engine_mount.reports.sections.periodic import distortion, harmonics, whole_periods
+from engine_mount.reports.sections.periodic import distortion, harmonics, rms_in_bands, whole_periods
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME

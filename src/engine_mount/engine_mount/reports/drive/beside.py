@@ -75,15 +75,6 @@ def peaks_text(peaks: Mapping[str, float]) -> str:
     return '; '.join(f'{name} {1e3 * peak:.2f} mm'.removeprefix(f'{THIS} ') for name, peak in peaks.items())
 
 
-def peaks_beside(recording: Recording, parameters: Parameters) -> dict[str, float]:
-    """Return the largest displacements (m) of `mounts_beside`, none where they cannot be computed."""
-    try:
-        truths = mounts_beside(recording, parameters).truths
-    except BesideError:
-        return {}
-    return {name: float(np.max(np.abs(truth['displacement']))) for name, truth in truths.items()}
-
-
 def mounts_beside(recording: Recording, parameters: Parameters) -> Beside:
     """Return what the other `MOUNTS` do on the excitation of a simulated drive, or raise `BesideError`.
 

@@ -1,11 +1,15 @@
 """Signals by frequency: sines and their harmonics, the work of a closed loop, spectra, sweeps."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from engine_mount.reports.drawing.chart import Array
+from mount_models.sampling import SAMPLE_RATE
+
+Band = tuple[float, float]
 
 _SEGMENT = 2.048  # s, chosen: lines 0.5 Hz apart tell the modes of the car apart
 
@@ -99,6 +103,36 @@ def amplitude_density(values: Array, rate: float) -> tuple[Array, Array]:
     length = min(len(values), round(_SEGMENT * rate))
     frequency, power = welch(values, rate, 'hann', length)
     return frequency, np.sqrt(power)
+
+
+def rms_in_bands(
+    values: Array,
+    bands: Sequence[Band],
+    rate: float = SAMPLE_RATE,
+    weighting: Callable[[Array], Array] = np.ones_like,
+) -> list[float]:
+    """Return the rms of what `values` (n,) at `rate` (Hz) hold in each band (Hz), in their unit.
+
+    From one spectrum of all of it: every moment counts the same, as it does not with windows. `weighting`
+    returns a gain for each frequency (Hz).
+    """
+    frequency = np.fft.rfftfreq(len(values), 1.0 / rate)
+    amplitude = weighting(frequency) * np.abs(np.fft.rfft(values)) / len(values)
+    inside = [(frequency >= low) & (frequency < high) for low, high in bands]
+    return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
+
+
+def vertical_weighting(frequency: Array) -> Array:
+    """Return the gain of W_k at each frequency (Hz): what people who sit feel of a vertical acceleration.
+
+    ISO 2631-1:1997, Annex A: limits of the band, transition from acceleration to velocity, upward step.
+    """
+    s = 1j * frequency  # over 2 pi, as all corners are in Hz
+    low, high = (frequency / 0.4) ** 4, (frequency / 100.0) ** 4
+    limits = np.sqrt(low / (1.0 + low) / (1.0 + high))
+    transition = (1.0 + s / 12.5) / (1.0 + s / (0.63 * 12.5) + (s / 12.5) ** 2)
+    step = (1.0 + s / (0.91 * 2.37) + (s / 2.37) ** 2) / (1.0 + s / (0.91 * 3.35) + (s / 3.35) ** 2)
+    return limits * np.abs(transition * step) * (2.37 / 3.35) ** 2
 
 
 def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
