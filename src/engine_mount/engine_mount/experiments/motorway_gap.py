@@ -15,6 +15,8 @@ from engine_mount.experiments.harness.drawing import (
     shade_damping,
 )
 from engine_mount.experiments.harness.experiment import (
+    OURS,
+    PAPER,
     PARTLY,
     Experiment,
     Findings,
@@ -231,4 +233,5 @@ EXPERIMENT = Experiment(
     GapParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER, OURS),
 )

@@ -9,23 +9,25 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.experiments.harness.closed_loop import PAPER, Case, settings_of_run
-from engine_mount.experiments.harness.experiment import Order, Values, Workers
+from engine_mount.experiments.harness.closed_loop import Case, at_each_step, settings_of_run
+from engine_mount.experiments.harness.experiment import OURS as CONTINUOUS
+from engine_mount.experiments.harness.experiment import PAPER, Order, Values, Workers
 from engine_mount.experiments.harness.measures import (
     BELOW_ISOLATION,
     first_extremum,
     peak_and_rms,
     sweep_parameters,
 )
+from engine_mount.reports.drive.felt import BANDS
 from engine_mount.reports.drive.signals import Truth
 from engine_mount.reports.sections.periodic import distortion, harmonics, rms_in_bands, whole_periods
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.vehicle import Elastomer, Vehicle
 
-CONTINUOUS = 'continuous_viscous'
 POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
@@ -38,12 +40,17 @@ NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
 """{point of the front: the name it is worth}."""
 IDLE_ROADS = (2e-6, 16e-6)
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
+HIGH_BANDS = ((20.0, 60.0), (60.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 500.0), (500.0, 1e4))
+"""Hz: `felt.BANDS` in parts, and what a record at 1 kHz cannot hold."""
+SAMPLED, STEPPED, STRAIGHT = 'sampled at 1 kHz', 'each step of the plant', 'current in straight lines'
+QUIET = 'no noise of the sensor'
+_HELD = 0.8  # A, chosen: presses the pads on without a pause
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 """Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
 GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
-_TIP_IN = 400.0  # N, chosen
+PULLS = {'tip-in': 400.0, 'lift-off': -400.0}  # N, chosen: sudden acceleration; what shifting begins with
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
@@ -113,10 +120,14 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
     for idle, who in product(idles, COMPARED):
         for road, roughness in ROADS.items():
             add(('road', who, road, idle), _road(roughness, _ROAD_SECONDS, idle), of_road)
-    for who in COMPARED:
-        add(('tip-in', who), _road(2e-6, 4.0) | {'tip_in.force': _TIP_IN}, of_road)
+    for who, (name, force) in product(COMPARED, PULLS.items()):
+        add((name, who), _road(2e-6, 4.0) | {'tip_in.force': force}, of_road)
     if not own.thorough:
         return cases
+    for who in COMPARED:
+        add(('high', who, 'as driven'), {}, of_high_bands)
+    for name, changes in _CASES['high frequencies'].items():
+        add(('high', CONTINUOUS, name), changes, of_high_bands)
     for plant, level in product(axes.plants, axes.engine_levels):
         sim = sweep_parameters(level, 14.0) | _engine(*plant)
         for name, changes in DISTURBANCES.items():
@@ -177,7 +188,28 @@ def with_displacement(figures: Callable[..., Values], truth: Truth, sim: SimPara
 def of_gap(truth: Truth, sim: SimParameters) -> Values:
     """Return largest displacement and first extremum (m) over a gap."""
     behind = truth.displacement[round(sim.motorway.gap_time / SAMPLE_TIME) :]
-    return {'peak_m': float(np.max(np.abs(behind))), 'first_m': first_extremum(behind)}
+    shaken = truth.chassis_acceleration[-len(behind) :]
+    return {
+        'peak_m': float(np.max(np.abs(behind))),
+        'first_m': first_extremum(behind),
+        'shock': float(np.max(np.abs(shaken))),
+    }
+
+
+def of_high_bands(truth: Truth, sim: SimParameters) -> Values:
+    """Return the rms of the chassis acceleration (m/s^2) in `HIGH_BANDS` by what was changed in the plant.
+
+    The plant alone goes the way of the drive again, so that it can be seen at each of its steps.
+    """
+    held = np.full(len(truth.time), _HELD)
+    found = {
+        STEPPED: at_each_step(truth.current_setpoint, sim),
+        STRAIGHT: at_each_step(truth.current_setpoint, sim, straight=True),
+        f'current held at {_HELD:g} A': at_each_step(held, sim),
+    }
+    rate = 1.0 / STEP_TIME
+    recorded = rms_in_bands(truth.chassis_acceleration, HIGH_BANDS)
+    return {SAMPLED: recorded} | {name: rms_in_bands(each, HIGH_BANDS, rate) for name, each in found.items()}
 
 
 def of_rack(truth: Truth, sim: SimParameters) -> Values:
@@ -194,6 +226,7 @@ def of_road(truth: Truth, sim: SimParameters) -> Values:
     acceleration = acceleration - acceleration.mean()
     return {
         'acceleration': rms_in_bands(acceleration, [ACOUSTIC])[0],
+        'bands': rms_in_bands(acceleration, BANDS),
         'peak_m': float(np.abs(displacement).max()),
         'rms_m': rms_in_bands(displacement, [BELOW_ISOLATION])[0],
         'power_w': float(np.mean(np.abs(truth.friction_force[part] * truth.velocity[part]))),

@@ -5,9 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.experiments.harness.closed_loop import PAPER
-from engine_mount.experiments.harness.experiment import Values, table, table_rows
-from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
+from engine_mount.experiments.harness.experiment import PAPER, Values, table, table_rows
+from engine_mount.experiments.policy_cases import (
+    CONTINUOUS,
+    HIGH_BANDS,
+    HYDRO,
+    OFF,
+    POLICIES,
+    QUIET,
+    SAMPLED,
+    STEPPED,
+    STRAIGHT,
+)
 
 
 def page_of(figures: Values, pictures: Collection[str]) -> str:
@@ -16,7 +25,7 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
     def picture(name: str, title: str) -> str:
         return f'![{title}](figures/{name}.png)\n\n' if name in pictures else ''
 
-    roads, limits, tips = figures['roads'], figures['limits'], figures['tip_in']
+    roads, limits = figures['roads'], figures['limits']
     high = ''
     for kind, told in (('', 'road alone'), ('_idling', 'engine idling')):
         ratios = figures[f'high_frequency_ratio{kind}']
@@ -35,7 +44,14 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
         for road, each in roads.items()
         for who, values in each.items()
     ]
-    tip_ins = '; '.join(f'{who} {v["peak"]:.2f} and {v["acceleration"]:.2f}' for who, v in tips.items())
+    pulls = {
+        name: {who: f'{v["peak"]:.2f}, {v["acceleration"]:.2f}' for who, v in each.items()}
+        for name, each in figures['pulls'].items()
+    }
+    felt = ''.join(
+        f'\nAcceleration of the chassis, mm/s^2, {road} road:\n\n{by_name("", in_mm(each))}'
+        for road, each in figures['bands'].items()
+    )
     delays = ', '.join(f'{value:.2f} at {delay} ms' for delay, value in limits['gap_after_delay'].items())
     beaten = f"""## Limits of any policy
 
@@ -95,8 +111,11 @@ the chassis from 20 to 200 Hz; largest displacement:
 | road | | acceleration | engine idling | displacement | J/km | coil, W |
 |---|---|---|---|---|---|---|
 {table_rows(road_rows)}
-Tip-in of 400 N within 50 ms, displacement over the hydromount, acceleration over no current: {tip_ins}.
+{felt}
+A force of 400 N on the engine within 50 ms, up and down: displacement over the hydromount, acceleration \
+over no current.
 
+{by_name('', pulls)}
 {beaten}"""
 
 
@@ -122,13 +141,26 @@ def in_short(figures: Values) -> str:
 
 def lost(figures: Values) -> str:
     """Return what the continuous law costs."""
-    road, tip = figures['roads']['random'], figures['tip_in'][CONTINUOUS]
+    road, tip = figures['roads']['random'], figures['pulls']['tip-in'][CONTINUOUS]
     paper, ours = road[PAPER], road[CONTINUOUS]
+    smooth = figures['roads']['smooth']
     wear = ours['j_per_km'] / max(paper['j_per_km'], 1e-9)
     text = f"""- The pads wear {wear:.1f} times as fast as with `{PAPER}` (random road), \
 and the coil takes {ours['heat_w']:.2f} W instead of {paper['heat_w']:.2f} W.
 - On a tip-in the chassis gets {tip['acceleration']:.2f} times the acceleration of the mount without \
 current, the engine moves {tip['peak']:.2f} times as far as on the hydromount.
+- From 20 to 200 Hz on a smooth road it gets {smooth[CONTINUOUS]['acceleration']:.2f} times that \
+acceleration, with the hydromount {smooth[HYDRO]['acceleration']:.2f}.
+"""
+    for road, each in figures['bands'].items():
+        ratios = (
+            f'{band} {value / each[OFF][band]:.2f} and {value / each[HYDRO][band]:.2f}'
+            for band, value in each[CONTINUOUS].items()
+        )
+        text += f'- On the {road} road over no current and over the hydromount: {", ".join(ratios)}.\n'
+    if high := figures['high_frequency_ratio'][CONTINUOUS]:
+        text += f"""- On the sweep, road alone, 14 to 50 Hz: up to {max(high.values()):.3f} of no current, \
+with the hydromount {max(figures['high_frequency_ratio'][HYDRO].values()):.3f}.
 """
     if 'idling' in figures:
         cases = [values for each in figures['idling'].values() for values in each[CONTINUOUS].values()]
@@ -174,7 +206,8 @@ def thorough(figures: Values, beaten: str, picture: str) -> str:
         'idling',
         'J/km',
     )
-    return f"""## Other engines, pads, sensors, temperatures
+    return f"""{above(figures['high_bands'])}
+## Other engines, pads, sensors, temperatures
 
 Largest displacement on the sweep, worst road level; the continuous law, and in the last column the paper's \
 policy undisturbed:
@@ -219,6 +252,46 @@ least squares over the ringing behind a gap cannot separate it from the elastome
 acceleration of the chassis, which no sensor measures, enters both. Another sensor, of chassis acceleration \
 or of mount force, would be needed.
 """
+
+
+def above(high: Values) -> str:
+    """Return the part on high frequencies: how much there is, and where it comes from."""
+    names = [f'{low:g}-{high:g} Hz' for low, high in HIGH_BANDS]
+    first = f'{CONTINUOUS}, as driven'
+    driven, quiet = high[first], high[f'{CONTINUOUS}, {QUIET}']
+    rows = {
+        f'{case}, {record}': dict(zip(names, values, strict=True))
+        for case, each in high.items()
+        for record, values in each.items()
+        if record == STEPPED or case == first
+    }
+
+    def less(part: list[float], whole: list[float], place: int) -> str:
+        return f'{100.0 * (1.0 - part[place] * part[place] / (whole[place] * whole[place])):.0f} %'
+
+    shares = [
+        f"""- Of the mean square from {names[place]} {less(driven[STEPPED], driven[SAMPLED], place)} of the \
+record is folded there from above 500 Hz. Of the plant's own {less(quiet[STEPPED], driven[STEPPED], place)} \
+goes without the noise of the displacement sensor, {less(driven[STRAIGHT], driven[STEPPED], place)} where \
+the current follows straight lines between its setpoints instead of steps.
+"""
+        for place in (2, 3)
+    ]
+    return f"""## High frequencies
+
+The drive of `engine-mount drive --core`, rms of the chassis acceleration in mm/s^2. `sim/truth` samples \
+it at 1 kHz without a filter; the plant was driven once more by the same setpoints, and looked at in each \
+of its steps of 50 us.
+
+{by_name('drive', in_mm(rows))}
+Of `{CONTINUOUS}`:
+
+{''.join(shares)}"""
+
+
+def in_mm(rows: Values) -> Values:
+    """Return {name: {column: value}} in thousandths of the unit."""
+    return {name: {key: 1e3 * value for key, value in each.items()} for name, each in rows.items()}
 
 
 def by_name(corner: str, rows: Values, form: str = '.2f') -> str:

@@ -16,6 +16,7 @@ from engine_mount.experiments.harness.drawing import (
     shade_damping,
 )
 from engine_mount.experiments.harness.experiment import (
+    PAPER,
     Experiment,
     ExperimentError,
     Findings,
@@ -308,5 +309,6 @@ EXPERIMENT = Experiment(
     RecordedDriveParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER,),
     needs='file',
 )

@@ -8,6 +8,8 @@ from engine_mount.experiments.harness.closed_loop import drive_cases, paper_poli
 from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, OFF_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
     NOT_COMPARABLE,
+    OURS,
+    PAPER,
     PARTLY,
     Experiment,
     Findings,
@@ -206,4 +208,5 @@ EXPERIMENT = Experiment(
     SweepParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER, OURS),
 )
