@@ -18,9 +18,9 @@ from engine_mount.experiments.harness.measures import (
     peak_and_rms,
     sweep_parameters,
 )
-from engine_mount.reports.drive.felt import BANDS
+from engine_mount.reports.drive.felt import felt
 from engine_mount.reports.drive.signals import Truth
-from engine_mount.reports.sections.periodic import distortion, harmonics, rms_in_bands, whole_periods
+from engine_mount.reports.sections.periodic import distortion, faded, harmonics, rms_in_bands, whole_periods
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
@@ -208,8 +208,9 @@ def of_high_bands(truth: Truth, sim: SimParameters) -> Values:
         f'current held at {_HELD:g} A': at_each_step(held, sim),
     }
     rate = 1.0 / STEP_TIME
-    recorded = rms_in_bands(truth.chassis_acceleration, HIGH_BANDS)
-    return {SAMPLED: recorded} | {name: rms_in_bands(each, HIGH_BANDS, rate) for name, each in found.items()}
+    recorded = rms_in_bands(faded(truth.chassis_acceleration), HIGH_BANDS[:-1])
+    others = {name: rms_in_bands(faded(each, rate), HIGH_BANDS, rate) for name, each in found.items()}
+    return {SAMPLED: recorded} | others
 
 
 def of_rack(truth: Truth, sim: SimParameters) -> Values:
@@ -220,15 +221,11 @@ def of_rack(truth: Truth, sim: SimParameters) -> Values:
 
 
 def of_road(truth: Truth, sim: SimParameters) -> Values:
-    """Return displacement (m), chassis acceleration (m/s^2), power of pads and coil (W)."""
+    """Return what is felt, and the largest displacement (m)."""
     part = slice(round(_SETTLING / SAMPLE_TIME), None)
     displacement, acceleration = truth.displacement[part], truth.chassis_acceleration[part]
-    acceleration = acceleration - acceleration.mean()
-    return {
-        'acceleration': rms_in_bands(acceleration, [ACOUSTIC])[0],
-        'bands': rms_in_bands(acceleration, BANDS),
+    return felt({name: values[part] for name, values in vars(truth).items()}, sim) | {
+        'acceleration': rms_in_bands(acceleration - acceleration.mean(), [ACOUSTIC])[0],
         'peak_m': float(np.abs(displacement).max()),
         'rms_m': rms_in_bands(displacement, [BELOW_ISOLATION])[0],
-        'power_w': float(np.mean(np.abs(truth.friction_force[part] * truth.velocity[part]))),
-        'heat_w': sim.coil.resistance * float(np.mean(truth.coil_current[part] ** 2)),
     }

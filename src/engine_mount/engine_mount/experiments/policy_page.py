@@ -1,7 +1,6 @@
 """The page about the policies, written from the numbers."""
 
 from collections.abc import Collection
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from engine_mount.experiments.policy_cases import (
     STEPPED,
     STRAIGHT,
 )
+from engine_mount.reports.drive.felt import FIGURES
 
 
 def page_of(figures: Values, pictures: Collection[str]) -> str:
@@ -126,17 +126,23 @@ def in_short(figures: Values) -> str:
     def worst(ratios: Values, who: str) -> float:
         return max(value for values in ratios[who].values() for value in values)
 
-    rows: dict[str, Any] = {
-        'sweep, lightest road': lambda who: next(iter(figures['sweep_ratio'][who].values())),
-        'sweep, worst road': lambda who: max(figures['sweep_ratio'][who].values()),
-        'gap, worst': lambda who: worst(figures['gap_peak_ratio'], who),
-        'first extremum of a gap, worst': lambda who: worst(figures['gap_first_extremum_ratio'], who),
-        'acceleration 20 to 200 Hz, random road': lambda who: road[who]['acceleration'],
-        'the same, engine idling': lambda who: road[who]['acceleration_idling'],
-        'energy in the pads, J/km': lambda who: road[who]['j_per_km'],
-        'heat of the coil, W': lambda who: road[who]['heat_w'],
-    }
-    return table_rows((name, *(f'{value(who):.2f}' for who in POLICIES)) for name, value in rows.items())
+    def column(who: str) -> list[float]:
+        swept, of = [*figures['sweep_ratio'][who].values()], road[who]
+        gaps = (worst(figures[f'gap_{what}_ratio'], who) for what in ('peak', 'first_extremum'))
+        return [swept[0], max(swept), *gaps, *(of[key] for key in of if key != 'displacement')]
+
+    names = (
+        'sweep, lightest road',
+        'sweep, worst road',
+        'gap, worst',
+        'first extremum of a gap, worst',
+        'acceleration 20 to 200 Hz, random road',
+        'the same, engine idling',
+        'energy in the pads, J/km',
+        'heat of the coil, W',
+    )
+    rows = zip(names, *map(column, POLICIES), strict=True)
+    return table_rows((name, *map('{:.2f}'.format, values)) for name, *values in rows)
 
 
 def lost(figures: Values) -> str:
@@ -154,10 +160,12 @@ acceleration, with the hydromount {smooth[HYDRO]['acceleration']:.2f}.
 """
     for road, each in figures['bands'].items():
         ratios = (
-            f'{band} {value / each[OFF][band]:.2f} and {value / each[HYDRO][band]:.2f}'
-            for band, value in each[CONTINUOUS].items()
+            f'{FIGURES[band]} {value / each[HYDRO][band]:.2f}' for band, value in each[CONTINUOUS].items()
         )
-        text += f'- On the {road} road over no current and over the hydromount: {", ".join(ratios)}.\n'
+        told, lowest = ', '.join(ratios).replace(' (mm/s²)', ''), next(iter(each[OFF]))
+        text += f"""- On the {road} road the chassis gets, over that of the hydromount: {told}. From 5 to \
+12 Hz it is {each[CONTINUOUS][lowest] / each[OFF][lowest]:.2f} of no current.
+"""
     if high := figures['high_frequency_ratio'][CONTINUOUS]:
         text += f"""- On the sweep, road alone, 14 to 50 Hz: up to {max(high.values()):.3f} of no current, \
 with the hydromount {max(figures['high_frequency_ratio'][HYDRO].values()):.3f}.
@@ -196,16 +204,6 @@ def thorough(figures: Values, beaten: str, picture: str) -> str:
         for point in figures['front']
         if point['on_front'] or point['name']
     ]
-    heads = (
-        'name',
-        'lowest, full amplitude (mm)',
-        'c (N s/m)',
-        'light road',
-        'strong road',
-        'acceleration',
-        'idling',
-        'J/km',
-    )
     return f"""{above(figures['high_bands'])}
 ## Other engines, pads, sensors, temperatures
 
@@ -237,7 +235,9 @@ The continuous law, one part changed at a time:
 {picture}No other point is better than these in all of ratio on a light road, both accelerations and wear \
 (random road). Choose one by its three parameters:
 
-{table(heads, front)}
+| name | lowest, full amplitude (mm) | c (N s/m) | light road | strong road | acceleration | idling | J/km |
+|---|---|---|---|---|---|---|---|
+{table_rows(front)}
 The default was chosen so that engines from 6 to 11 Hz stay at or below 0.8 of the hydromount with worn \
 pads too: see the table of engines.
 
@@ -291,7 +291,10 @@ Of `{CONTINUOUS}`:
 
 def in_mm(rows: Values) -> Values:
     """Return {name: {column: value}} in thousandths of the unit."""
-    return {name: {key: 1e3 * value for key, value in each.items()} for name, each in rows.items()}
+    return {
+        name: {FIGURES.get(key, key): 1e3 * value for key, value in each.items()}
+        for name, each in rows.items()
+    }
 
 
 def by_name(corner: str, rows: Values, form: str = '.2f') -> str:

@@ -24,6 +24,7 @@ from engine_mount.experiments.harness.experiment import (
     Values,
     claim,
     holds_if_lower,
+    in_one_line,
     table,
 )
 from engine_mount.experiments.harness.measures import rms
@@ -187,6 +188,8 @@ def page_of(figures: Values, rate: float) -> str:
     bands = ', '.join(f'{value:.3f} m/s^2 from {band}' for band, value in levels)
     column = f', `{figures["column"]}`' if figures['column'] else ''
     peaks = ', '.join(f'{name} {1e3 * each["displacement_peak_m"]:.2f} mm' for name, each in runs.items())
+    said = {'Away from damping': _on_isolation, 'Damping on': _on_displacement}
+    in_short = ''.join(f'- **{name}.** {in_one_line(judge(figures)[1])}\n' for name, judge in said.items())
     return f"""# A recorded drive: friction mount, hydromount, elastomer alone
 
 `engine-mount experiment recorded_drive` writes this page from its numbers; do not edit it. `make
@@ -204,7 +207,7 @@ Driven: `{figures['source']}`{column}, times {figures['scale']:g}, {figures['dur
 
 ## In short
 
-{_in_short(figures)}- **Largest displacement**: {peaks}.
+{in_short}- **Largest displacement**: {peaks}.
 
 ## Bands
 
@@ -249,21 +252,6 @@ period.** Such events are few in one drive:
   a figure over the whole drive mostly compares a soft spring with a hydromount, and figures of the events
   rest on a handful of them.
 """
-
-
-def _in_short(figures: Values) -> str:
-    lines = []
-    for where, part in (('At the moments of damping', 'at_events'), ('Else', 'else')):
-        for what, unit in (('displacement', 'm'), ('force', 'n')):
-            key = f'{what}_band_rms_{part}_{unit}'
-            both = zip(_BAND_NAMES, ratios(figures, key), ratios(figures, key, ELASTOMER), strict=False)
-            told = [
-                f'{band} {hydro:.2f} of the hydromount, {soft:.2f} of the elastomer alone'
-                for band, hydro, soft in both
-            ]
-            if told:
-                lines.append(f'- **{where}, {what}** with the friction mount, rms: {"; ".join(told)}.\n')
-    return ''.join(lines)
 
 
 def _bands(runs: Values, what: str, unit: str, scale: float) -> str:

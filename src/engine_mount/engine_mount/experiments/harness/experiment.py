@@ -198,16 +198,17 @@ class Outcome(NamedTuple):
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         """Return heads and rows about the claims; our policy has columns of its own."""
-        heads = ('paper', 'statement', 'here', 'holds')
-        rows: list[tuple[str, ...]] = [
-            (each.reference, each.paper, each.found, each.holds.value) for each in self.claims
+        answers = [[each, *([each.ours] if each.ours else [])] for each in self.claims]
+        rows = [
+            (
+                each[0].reference,
+                each[0].paper,
+                *(text for one in each for text in (one.found, one.holds.value)),
+            )
+            for each in answers
         ]
-        if not any(each.ours for each in self.claims):
-            return heads, rows
-        pairs = zip(rows, self.claims, strict=True)
-        return (*heads[:2], f'`{PAPER}`', 'holds', f'`{OURS}`', 'holds'), [
-            (*row, each.ours.found, each.ours.holds.value) for row, each in pairs
-        ]
+        heads = ('paper', 'statement', 'here', 'holds', f'with `{OURS}`', 'holds')
+        return heads[: len(rows[0])], rows
 
     def page(self) -> str:
         """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`.

@@ -1,6 +1,7 @@
 """What chassis and people feel of a drive by frequency, and what that costs; of the mounts beside it too."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,10 @@ import numpy as np
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.session import recorded_sample_rate
 from engine_mount.reports.drive.beside import Beside, BesideError, name_of
-from engine_mount.reports.sections.periodic import evenly, rms_in_bands, vertical_weighting
+from engine_mount.reports.sections.periodic import evenly, faded, rms_in_bands, vertical_weighting
 from engine_mount.settings.chosen import Parameters
 from mount_models.quantity import with_flattened
+from mount_models.sampling import SAMPLE_RATE
 from mount_ros.topics import SIM_TRUTH
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import seat_of
@@ -25,8 +27,27 @@ FIGURES = {
     'coil_w': 'heat of the coil (W)',
 }
 """{figure in SI units: its name and unit for people}; rms of the acceleration of the chassis, and so on."""
+ACCELERATIONS = [figure for figure in FIGURES if figure.startswith('acceleration')]
+_OF_TRUTH = ('chassis_acceleration', 'displacement', 'friction_force', 'velocity', 'coil_current')
 _WEIGHTED = (0.4, 100.0)  # Hz: ISO 2631-1
-_FADED = 0.25  # s, chosen: at both ends, else a jump from the end to the begin adds to all bands
+_SHORTEST = 1.0  # s of excitation, chosen: what is faded at both ends is half of it
+
+
+def felt(truth: Mapping[str, Any], sim: SimParameters, rate: float = SAMPLE_RATE) -> dict[str, float]:
+    """Return `FIGURES` of columns of `sim/truth`, at `rate` (Hz).
+
+    NaN is unknown: bands above half the rate, and wear where the road has no speed.
+    """
+    shaken = faded(truth['chassis_acceleration'], rate)
+    per_km = 1e3 / sim.motorway.speed if sim.scenario == 'motorway' else math.nan
+    figures = (
+        *rms_in_bands(shaken, BANDS, rate),
+        *rms_in_bands(shaken, [_WEIGHTED], rate, vertical_weighting),
+        float(np.std(truth['displacement'])),
+        per_km * float(np.mean(np.abs(truth['friction_force'] * truth['velocity']))),
+        sim.coil.resistance * float(np.mean(np.square(truth['coil_current']))),
+    )
+    return dict(zip(FIGURES, figures, strict=True))
 
 
 def felt_beside(
@@ -34,39 +55,24 @@ def felt_beside(
 ) -> dict[str, dict[str, float]]:
     """Return {name: `FIGURES`} of a drive's own mount and of those beside it, while it is excited.
 
-    NaN is unknown: bands above half the sample rate, wear on a road without a speed. Raises
-    `BesideError` where `beside` is the reason why nothing stands there, and for too short a recording.
+    Raises `BesideError` where `beside` is the reason why nothing stands there, and for too short a recording.
     """
     if isinstance(beside, str):
         raise BesideError(beside)
     sim = with_flattened(SimParameters(), parameters['mount_sim'])
     rate, kept = recorded_sample_rate(recording), beside.stamps >= beside.begin
-    if np.count_nonzero(kept) < 2.0 * _FADED * rate:
-        raise BesideError('hardly anything of the excitation was recorded')
-
-    def felt(truth: Any, wear: float, heat: float) -> dict[str, float]:
-        shaken, moved = (
-            evenly(beside.stamps[kept] / 1e9, truth[name][kept], rate)[1]
-            for name in ('chassis_acceleration', 'displacement')
-        )
-        to_end = np.arange(0.5, len(shaken)) / (_FADED * rate)
-        shaken = shaken * np.sin(0.5 * np.pi * np.minimum(1.0, np.minimum(to_end, to_end[::-1])))
-        bands = zip(rms_in_bands(shaken, BANDS, rate), BANDS, strict=True)
-        figures = (
-            *(each if high <= 0.5 * rate else math.nan for each, (_, high) in bands),
-            *rms_in_bands(shaken, [_WEIGHTED], rate, vertical_weighting),
-            float(np.std(moved)),
-        )
-        return dict(zip(FIGURES, (*figures, wear, heat), strict=True))
-
+    if np.count_nonzero(kept) < _SHORTEST * rate:
+        raise BesideError(f'less than {_SHORTEST:g} s of excitation were recorded')
     truth = recording[SIM_TRUTH.name]
     places = np.unique(truth.stamps, return_index=True)[1][: len(kept)]
-    own = {name: np.asarray(truth[name], np.float64)[places] for name in truth.columns}
-    power = np.abs(own['friction_force'] * own['velocity'])[kept]
-    per_km = 1e3 / sim.motorway.speed if sim.scenario == 'motorway' else math.nan  # no other names a speed
-    heat = sim.coil.resistance * float(np.mean(np.square(own['coil_current'][kept])))
-    found = {name_of(seat_of(parameters)): felt(own, per_km * float(np.mean(power)), heat)}
-    return found | {name: felt(truth, 0.0, 0.0) for name, truth in beside.truths.items()}
+    truths = {name_of(seat_of(parameters)): {name: truth[name][places] for name in _OF_TRUTH}}
+    still = dict.fromkeys(_OF_TRUTH, np.zeros(len(kept)))
+    truths |= {name: still | {of: each[of] for of in _OF_TRUTH[:2]} for name, each in beside.truths.items()}
+    time = beside.stamps[kept] / 1e9
+    return {
+        name: felt({of: evenly(time, each[of][kept], rate)[1] for of in _OF_TRUTH}, sim, rate)
+        for name, each in truths.items()
+    }
 
 
 def value_text(figure: str, value: float | None) -> str:

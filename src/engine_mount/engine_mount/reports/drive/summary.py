@@ -15,7 +15,7 @@ from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
 from engine_mount.reports.drive.beside import BesideError, mounts_beside, name_of, peaks_text
 from engine_mount.reports.drive.evaluation import tracking_error
-from engine_mount.reports.drive.felt import BANDS, FIGURES, felt_beside, value_text
+from engine_mount.reports.drive.felt import ACCELERATIONS, BANDS, felt_beside, value_text
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
@@ -142,7 +142,7 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     rows += [('latency', latency), ('speed', f'{figures["real_time_factor"]:.2f} x real time')]
     unit = f' mm/s² ({"-".join(f"{low:g}" for low, _ in BANDS)}-{BANDS[-1][1]:g} Hz)'
     for place, (name, felt) in enumerate((figures['felt'] or {}).items()):
-        values = ', '.join(value_text(figure, felt[figure]) for figure in list(FIGURES)[: len(BANDS)])
+        values = ', '.join(value_text(figure, felt[figure]) for figure in ACCELERATIONS[:-1])
         rows.append((f'  {name}', values) if place else ('chassis acceleration', values + unit))
     return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
