@@ -113,6 +113,16 @@ def test_the_page_puts_pictures_beside_claims_counts_the_answers_and_leads_to_an
     assert (docs / 'figures' / 'a.png').exists()
 
 
+def test_an_answer_with_our_policy_stands_in_columns_of_its_own():
+    ours = Claim('Fig. 1', 'it is so', 'it was', Holds.YES)
+    known = Experiment('bench', 'How.', FrictionContact(), lambda order: None)
+    outcome = Outcome(known, {}, [ours._replace(found='it was not', holds=Holds.NO, ours=ours)], [], [], [])
+    heads, (row,) = outcome.table()
+    assert heads[3:] == ('holds', 'with `continuous_viscous`', 'holds')
+    assert row == ('Fig. 1', 'it is so', 'it was not', 'no', 'it was', 'yes')
+    assert 'Policy: none takes part.' in outcome.page()
+
+
 @pytest.mark.parametrize(
     ('answers', 'holds'),
     [([True], Holds.YES), ([True, False], Holds.PARTLY), ([False], Holds.NO), ([], Holds.NOT_COMPARABLE)],

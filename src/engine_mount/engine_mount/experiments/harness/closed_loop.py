@@ -9,7 +9,7 @@ import numpy as np
 from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
-from engine_mount.experiments.harness.experiment import ExperimentError, Order, Settings, Values
+from engine_mount.experiments.harness.experiment import PAPER, ExperimentError, Order, Settings, Values
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.recording import open_recording
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth, load_drive
@@ -22,7 +22,7 @@ from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Noise
 from mount_sim.excitation.excitation import Shaking
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import with_control_of_mount
+from mount_sim.plant.mounts import ALWAYS_ON, with_control_of_mount
 from mount_sim.plant.plant import TRUTH, PlantSimulation
 
 K = TypeVar('K')
@@ -43,7 +43,7 @@ def settings_of_run(order: Order, sim: Values, control: Values) -> dict[str, Val
 
 
 def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSignals]:
-    """Drive {name: parameters of the simulator} with the policy of the order.
+    """Drive {name: parameters of the simulator} with the policy of the order, always on with the paper's.
 
     Each is recorded in a folder of its name and read back. The damper is `damper` of the case, else that of
     the order. Time and truth begin with the excitation; what rack and chassis measure is from the truth.
@@ -52,7 +52,9 @@ def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSig
     for number, (name, case) in enumerate(cases.items()):
         order.progress(0.95 * number / len(cases), name)
         sim = {'damper': order.parameters.damper, **case}
-        control = {'policy': order.policy, 'damper': sim.pop('damper')}
+        control = {'policy': PAPER, 'damper': sim.pop('damper')}
+        if sim['mount'] != ALWAYS_ON and order.policy != PAPER:
+            control = {'policy': order.policy}
         drives[name] = _drive(order, name, settings_of_run(order, sim, control))
     return drives
 

@@ -170,7 +170,9 @@ class Experiment:
         order.out.mkdir(parents=True, exist_ok=True)
         judged, ours = found.figures if found.judged is None else found.judged, found.ours
         if OURS in self.policies and ours is None:
-            ours = self.procedure(replace(order, policy=OURS, out=order.out / OURS)).figures
+            others = {node: values for node, values in order.settings.items() if node != 'mount_control'}
+            again = replace(order, policy=OURS, out=order.out / OURS, settings=others)
+            ours = self.procedure(again).figures
         claims = [
             judge(judged)._replace(ours=None if ours is None else judge(ours))
             for judge in _CLAIMS[self.procedure.__module__].values()
