@@ -260,7 +260,7 @@ def above(high: Values) -> str:
     first = f'{CONTINUOUS}, as driven'
     driven, quiet = high[first], high[f'{CONTINUOUS}, {QUIET}']
     rows = {
-        f'{case}, {record}': dict(zip(names, values, strict=True))
+        f'{case}, {record}': dict(zip(names, values, strict=False))
         for case, each in high.items()
         for record, values in each.items()
         if record == STEPPED or case == first
