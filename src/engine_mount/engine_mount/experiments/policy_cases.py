@@ -50,6 +50,7 @@ ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
+SHOCKS = (0.06, 0.1)  # m, chosen: depths of gaps beyond any in a road
 PULLS = {'tip-in': 400.0, 'lift-off': -400.0}  # N, chosen: sudden acceleration; what shifting begins with
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
@@ -115,6 +116,8 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         shown = seed == 1 and depth == _SHOWN_DEPTH
         figures = partial(with_displacement, of_gap) if shown else of_gap
         add(('gap', who, depth, seed), _gap(depth, 2e-6, seed), figures)
+    for depth, who in product(SHOCKS, POLICIES):
+        add(('shock', who, depth), _gap(depth, 2e-6, 1), of_gap)
     for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
         add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, of_rack)
     for idle, who in product(idles, COMPARED):
@@ -186,13 +189,12 @@ def with_displacement(figures: Callable[..., Values], truth: Truth, sim: SimPara
 
 
 def of_gap(truth: Truth, sim: SimParameters) -> Values:
-    """Return largest displacement and first extremum (m) over a gap."""
+    """Return largest displacement and first extremum (m) over a gap, and the largest friction (N)."""
     behind = truth.displacement[round(sim.motorway.gap_time / SAMPLE_TIME) :]
-    shaken = truth.chassis_acceleration[-len(behind) :]
     return {
         'peak_m': float(np.max(np.abs(behind))),
         'first_m': first_extremum(behind),
-        'shock': float(np.max(np.abs(shaken))),
+        'force_n': float(np.max(np.abs(truth.friction_force))),
     }
 
 

@@ -49,7 +49,7 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
         for name, each in figures['pulls'].items()
     }
     felt = ''.join(
-        f'\nAcceleration of the chassis, mm/s^2, {road} road:\n\n{by_name("", in_mm(each))}'
+        f'\nAcceleration of the chassis, {road} road:\n\n{by_name("", in_mm(each))}'
         for road, each in figures['bands'].items()
     )
     delays = ', '.join(f'{value:.2f} at {delay} ms' for delay, value in limits['gap_after_delay'].items())

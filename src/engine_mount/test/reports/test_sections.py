@@ -95,7 +95,7 @@ def test_the_rms_of_a_band_is_that_of_its_sine_and_people_feel_it_as_the_standar
     values = np.sqrt(2.0) * 3.0 * np.sin(2 * np.pi * 20.0 * np.arange(20_000) / rate)
     bands = [(12.0, 20.0), (20.0, 60.0), (60.0, 1000.0)]
     assert rms_in_bands(values, bands, rate) == pytest.approx([0.0, 3.0, 0.0], abs=1e-6)
-    known = {0.0: 0.0, 0.5: 0.418, 1.0: 0.482, 4.0: 0.967, 8.0: 1.036, 16.0: 0.768, 31.5: 0.405, 80.0: 0.132}
+    known = {0.5: 0.418, 2.0: 0.531, 8.0: 1.036, 16.0: 0.768, 80.0: 0.132}
     # ISO 2631-1:1997, Table 3
     assert vertical_weighting(np.array([*known])) == pytest.approx([*known.values()], abs=1e-3)
     felt = rms_in_bands(values, [(0.4, 100.0)], rate, vertical_weighting)

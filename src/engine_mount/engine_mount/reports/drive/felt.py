@@ -63,12 +63,9 @@ def felt_beside(
     rate, kept = recorded_sample_rate(recording), beside.stamps >= beside.begin
     if np.count_nonzero(kept) < _SHORTEST * rate:
         raise BesideError(f'less than {_SHORTEST:g} s of excitation were recorded')
-    truth = recording[SIM_TRUTH.name]
+    truth, time = recording[SIM_TRUTH.name], beside.stamps[kept] / 1e9
     places = np.unique(truth.stamps, return_index=True)[1][: len(kept)]
-    truths = {name_of(seat_of(parameters)): {name: truth[name][places] for name in _OF_TRUTH}}
-    still = dict.fromkeys(_OF_TRUTH, np.zeros(len(kept)))
-    truths |= {name: still | {of: each[of] for of in _OF_TRUTH[:2]} for name, each in beside.truths.items()}
-    time = beside.stamps[kept] / 1e9
+    truths = {name_of(seat_of(parameters)): {of: truth[of][places] for of in _OF_TRUTH}, **beside.truths}
     return {
         name: felt({of: evenly(time, each[of][kept], rate)[1] for of in _OF_TRUTH}, sim, rate)
         for name, each in truths.items()
