@@ -21,7 +21,8 @@ drove too, its answer stands in columns of its own; the first table counts those
 def print_outcome(outcome: Outcome, screen: Screen) -> None:
     """Print the claims of an experiment and the places of what it made."""
     known = outcome.experiment
-    heads, rows = outcome.table()
+    every, found = outcome.table()
+    heads, *rows = ((*row[:4], *row[5:]) for row in (every, *found))  # six columns would be too narrow
     screen.table(Table(f'{known.title} ({known.reference})', 'l' * len(heads), rows, heads, ruled=True))
     made = {'figure': outcome.pictures, 'recording': outcome.recordings, 'page': outcome.pages}
     for kind, places in made.items():

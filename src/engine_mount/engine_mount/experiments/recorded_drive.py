@@ -203,7 +203,8 @@ engine-mount experiment recorded_drive --set recorded_drive.file=drive.csv --set
 ```
 
 Driven: `{figures['source']}`{column}, times {figures['scale']:g}, {figures['duration_s']:.1f} s at \
-{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. Damper {figures['damper']}.
+{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. \
+Policy `{PAPER}`, damper {figures['damper']}.
 
 ## In short
 

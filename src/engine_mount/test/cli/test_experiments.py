@@ -94,7 +94,7 @@ def test_the_command_writes_figures_page_and_pictures(tmp_path):
     assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
 
 
-def test_the_page_puts_pictures_beside_claims_counts_the_answers_of_both_policies_and_leads_to_an_own_page(
+def test_the_page_puts_pictures_beside_claims_counts_answers_and_leads_to_an_own_page(
     tmp_path,
 ):
     picture, own = tmp_path / 'a.png', tmp_path / 'own.md'
@@ -107,7 +107,7 @@ def test_the_page_puts_pictures_beside_claims_counts_the_answers_of_both_policie
     page.write_page([Outcome(known, {}, claims, [picture], [], [own])], docs / 'page.md')
     text = (docs / 'page.md').read_text()
     assert f'| [{known.title}](#bench) | Fig. 13 | 1 |  | 1 |  |' in text
-    assert '| paper | statement | here | holds | with `continuous_viscous` | holds |' in text
+    assert '| paper | statement | here | holds | with `continuous_viscous` | holds with it |' in text
     assert '| Fig. 1 | it is so | it was not | no | it was | yes |' in text
     assert '[own.md](own.md)' in text
     assert (docs / 'own.md').read_text() == 'own'

@@ -209,7 +209,7 @@ class Outcome(NamedTuple):
             )
             for each in answers
         ]
-        heads = ('paper', 'statement', 'here', 'holds', f'with `{OURS}`', 'holds')
+        heads = ('paper', 'statement', 'here', 'holds', f'with `{OURS}`', 'holds with it')
         return heads[: len(rows[0])], rows
 
     def page(self) -> str:
