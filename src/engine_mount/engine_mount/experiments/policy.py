@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from engine_mount.experiments.harness.closed_loop import run_cases
-from engine_mount.experiments.harness.drawing import BLUE, GREY, HYDRO_LINE, OFF_LINE, new_panels
+from engine_mount.experiments.harness.drawing import HYDRO_LINE, OFF_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
     EVEN,
     PAPER,
@@ -96,8 +96,6 @@ def run(order: Order) -> Findings:
         pictures['policy_sweep'] = draw_sweeps(found, [level for level, _ in shown['sweep']])
     if shown['gap']:
         pictures['policy_gap'] = draw_gap(found, *shown['gap'][0])
-    if 'front' in figures:
-        pictures['policy_front'] = draw_front(figures['front'])
     pages = {f'{NAME}.md': page_of(figures, pictures.keys())}
     judged = [figures | {'who': who} for who in POLICIES]
     return Findings(figures, pictures, (), pages, *judged)
@@ -412,25 +410,6 @@ def draw_gap(found: Found, depth: float, seed: int) -> Any:
         panel.plot(time[shown], 1e3 * displacement[shown], linewidth=width, label=who, **_LINES[who])
     panel.set(xlabel='time from the gap on (s)', ylabel='displacement (mm)')
     panel.legend()
-    return figure
-
-
-def draw_front(points: list[Values]) -> Any:
-    """Draw the ratio on a light road over wear and over the acceleration with an idling engine."""
-    figure, panels = new_panels(
-        'What damping on light roads costs: lowest amplitude and damping varied', 1, 2, sharey=True
-    )
-    for panel, what, label in (
-        (panels[0], 'j_per_km', 'energy in the pads (J/km)'),
-        (panels[1], 'acceleration_idling', 'acceleration, engine idling, over no current'),
-    ):
-        for point in points:
-            place = point[what], point['light_road']
-            panel.plot(*place, 'o', color=BLUE if point['on_front'] else GREY, markersize=5)
-            if point['name']:
-                panel.annotate(point['name'], place, xytext=(5, 5), textcoords='offset points')
-        panel.set_xlabel(label)
-    panels[0].set_ylabel('largest displacement, V0 = 0.04 m/s, over hydromount')
     return figure
 
 
