@@ -1,5 +1,6 @@
 """Other mounts beside a drive: what they do on the same road, to the bit."""
 
+import json
 import re
 from pathlib import Path
 
@@ -46,6 +47,12 @@ def test_each_is_the_drive_of_that_mount_which_has_the_other_one_beside_it(name,
     others = mounts_beside(recording, parameters_of(recording)).truths
     assert {name, *others} == {'hydromount', 'no current'}
     assert len(others) == 1
+    ours, own = (
+        json.loads((each.path.parent / 'summary.json').read_text())['felt'] for each in (drive, recording)
+    )
+    assert own[name] | {'coil_w': 0.0} == ours[name]  # its driver opens when the road begins
+    assert ours['this mount']['coil_w'] > 0.1
+    assert 0.5 < ours['this mount']['wear_j_per_km'] < 50.0
 
 
 def test_the_report_on_a_drive_in_real_time_has_the_other_mounts_and_the_isolation(drive, tmp_path):

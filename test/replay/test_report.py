@@ -72,7 +72,7 @@ def page(bench) -> Page:
 
 def test_the_page_of_a_drive_shows_all_that_was_recorded(page, bench):
     assert page.sections == [
-        'overview', 'traces', 'switching', 'hysteresis', 'harmonics', 'spectra', 'coil', 'tracking',
+        'overview', 'traces', 'felt', 'switching', 'hysteresis', 'harmonics', 'spectra', 'coil', 'tracking',
         'losses', 'parameters',
     ]  # fmt: skip
     assert len(page.figures) == 5
@@ -80,6 +80,7 @@ def test_the_page_of_a_drive_shows_all_that_was_recorded(page, bench):
     labels |= {panel['label'] for figure in page.figures for panel in figure['panels']}
     assert all(label.endswith(')') for label in labels - {'harmonic'})  # each axis has its unit
     assert 'damping switched on once' in page.text
+    assert 'Not measured: a rack imposes the displacement' in page.text
     assert 'mount_sim.scenario bench' in page.text
     error = json.loads((bench / 'summary.json').read_text())['tracking_error_rms']
     assert f'friction force error {100 * error:.1f} % rms' in page.text

@@ -10,6 +10,7 @@ from engine_mount.experiments.harness.closed_loop import drive_cases
 from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, OFF_LINE, family, new_panels
 from engine_mount.experiments.harness.experiment import (
     NOT_COMPARABLE,
+    PAPER,
     PARTLY,
     Experiment,
     Findings,
@@ -241,4 +242,5 @@ EXPERIMENT = Experiment(
     BenchParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER,),
 )

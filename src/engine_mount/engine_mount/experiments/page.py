@@ -13,16 +13,17 @@ Lorenz, Heimann, Härtel: *A novel engine mount with semi-active dry friction da
 (2006) 559-571. `make experiments` writes this page and its pictures; do not edit it. The statements of the
 paper stand in our words. All measurements are simulated: an agreement confirms method and laws of the paper,
 not its hardware. *partly* and *no* are results like others. *not comparable* means that the paper gives too
-little, or that this project compared something else.
+little, or that this project compared something else. Each experiment names the policy that drove. Where ours
+drove too, its answer stands in columns of its own; the first table counts those of the paper's policy.
 """
 
 
 def print_outcome(outcome: Outcome, screen: Screen) -> None:
     """Print the claims of an experiment and the places of what it made."""
     known = outcome.experiment
-    rows = [(each.reference, each.paper, each.found, each.holds.value) for each in outcome.claims]
-    heads = ('paper', 'statement', 'here', 'holds')
-    screen.table(Table(f'{known.title} ({known.reference})', 'llll', rows, heads, ruled=True))
+    every, found = outcome.table()
+    heads, *rows = ((*row[:4], *row[5:]) for row in (every, *found))  # six columns would be too narrow
+    screen.table(Table(f'{known.title} ({known.reference})', 'l' * len(heads), rows, heads, ruled=True))
     made = {'figure': outcome.pictures, 'recording': outcome.recordings, 'page': outcome.pages}
     for kind, places in made.items():
         for place in places:

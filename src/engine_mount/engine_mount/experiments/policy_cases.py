@@ -9,42 +9,50 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.experiments.harness.closed_loop import PAPER, Case, settings_of_run
-from engine_mount.experiments.harness.experiment import Order, Values, Workers
+from engine_mount.experiments.harness.closed_loop import Case, at_each_step, settings_of_run
+from engine_mount.experiments.harness.experiment import OURS as CONTINUOUS
+from engine_mount.experiments.harness.experiment import PAPER, Order, Values, Workers
 from engine_mount.experiments.harness.measures import (
     BELOW_ISOLATION,
     first_extremum,
     peak_and_rms,
-    rms_in_bands,
     sweep_parameters,
 )
+from engine_mount.reports.drive.felt import felt
 from engine_mount.reports.drive.signals import Truth
-from engine_mount.reports.sections.periodic import distortion, harmonics, whole_periods
+from engine_mount.reports.sections.periodic import distortion, faded, harmonics, rms_in_bands, whole_periods
 from mount_models.plain_yaml import plain_yaml
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
+from mount_sim.excitation.scenario import STEP_TIME
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.vehicle import Elastomer, Vehicle
 
-CONTINUOUS = 'continuous_viscous'
 POLICIES = (PAPER, CONTINUOUS)
 OFF, HYDRO = 'no current', 'hydromount'
 COMPARED = (*POLICIES, OFF, HYDRO)
 NOMINAL = 8.0  # Hz
 _CASES = plain_yaml(importlib.resources.files(__package__).joinpath('policy_cases.yaml').read_text('utf-8'))
 DISTURBANCES, ABLATIONS = _CASES['disturbances'], _CASES['ablations']
-FRONT = [(*amplitudes, damping) for amplitudes, damping in product(_CASES['amplitudes'], _CASES['dampings'])]
-"""Lowest and full amplitude (m), and damping coefficient (N s/m), that are run."""
+FRONT = list(product(_CASES['amplitudes'], _CASES['dampings']))
+"""Half amplitudes (m) and damping coefficients (N s/m) that are run."""
 NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
 """{point of the front: the name it is worth}."""
-IDLE_ROADS = (2e-6, 16e-6)
+ENGINE_ROADS = (5e-7, 2e-6, 16e-6, 64e-6, 256e-6)
+"""m^3: a very smooth road, a good motorway, classes A, B and C of ISO 8608."""
 _ROUGH, _HELD_OUT_SEED = 16e-6, 101  # m^3: class A of ISO 8608; a road that nothing was tuned on
+HIGH_BANDS = ((20.0, 60.0), (60.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 500.0), (500.0, 1e4))
+"""Hz: `felt.BANDS` in parts, and what a record at 1 kHz cannot hold."""
+SAMPLED, STEPPED, STRAIGHT = 'sampled at 1 kHz', 'each step of the plant', 'current in straight lines'
+QUIET = 'no noise of the sensor'
+_HELD = 0.8  # A, chosen: presses the pads on without a pause
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 """Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
 GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
-_TIP_IN = 400.0  # N, chosen
+SHOCKS = (0.06, 0.1)  # m, chosen: depths of gaps beyond any in a road
+PULLS = {'tip-in': 400.0, 'lift-off': -400.0}  # N, chosen: sudden acceleration; what shifting begins with
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 ACOUSTIC = (20.0, 200.0)  # Hz: what the chassis passes on
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
@@ -65,8 +73,9 @@ class PolicyParameters(NamedTuple):
     rack_frequencies: str = '5, 6, 7, 8, 9, 10, 11, 12'
     engines: str = '6, 7, 9.5, 11'
     engine_levels: str = '0.04, 0.06, 0.12'
-    idle_frequencies: str = '20, 23, 26.7, 30, 33'
-    idle_forces: str = '80, 200, 400'
+    engine_frequencies: str = '20, 26.7, 36, 45, 60, 90, 130, 190'
+    engine_forces: str = '60, 100, 300'
+    noise: str = '2, 5, 10, 20'
     thorough: Annotated[int, Quantity('1', '1: robustness, idle, ablation, front too', 0, 1)] = 1
     workers: Workers = 0
 
@@ -79,8 +88,9 @@ class Axes(NamedTuple):
     frequencies: list[float]
     engines: list[float]
     engine_levels: list[float]
-    idle_frequencies: list[float]
-    idle_forces: list[float]
+    engine_frequencies: list[float]
+    engine_forces: list[float]
+    noise: list[float]
 
     @property
     def plants(self) -> list[tuple[str, float]]:
@@ -109,15 +119,21 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         shown = seed == 1 and depth == _SHOWN_DEPTH
         figures = partial(with_displacement, of_gap) if shown else of_gap
         add(('gap', who, depth, seed), _gap(depth, 2e-6, seed), figures)
+    for depth, who in product(SHOCKS, POLICIES):
+        add(('shock', who, depth), _gap(depth, 2e-6, 1), of_gap)
     for frequency, who in product(axes.frequencies, (*POLICIES, HYDRO)):
         add(('rack', who, frequency), {**_RACK, 'bench.frequency': frequency}, of_rack)
     for idle, who in product(idles, COMPARED):
         for road, roughness in ROADS.items():
             add(('road', who, road, idle), _road(roughness, _ROAD_SECONDS, idle), of_road)
-    for who in COMPARED:
-        add(('tip-in', who), _road(2e-6, 4.0) | {'tip_in.force': _TIP_IN}, of_road)
+    for who, (name, force) in product(COMPARED, PULLS.items()):
+        add((name, who), _road(2e-6, 4.0) | {'tip_in.force': force}, of_road)
     if not own.thorough:
         return cases
+    for who in COMPARED:
+        add(('high', who, 'as driven'), {}, of_high_bands)
+    for name, changes in _CASES['high frequencies'].items():
+        add(('high', CONTINUOUS, name), changes, of_high_bands)
     for plant, level in product(axes.plants, axes.engine_levels):
         sim = sweep_parameters(level, 14.0) | _engine(*plant)
         for name, changes in DISTURBANCES.items():
@@ -125,14 +141,16 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         for who in (PAPER, HYDRO):
             add(('robust', who, *plant, 'nominal', level), sim, peak_and_rms)
     for roughness, frequency, force, who in product(
-        IDLE_ROADS, axes.idle_frequencies, axes.idle_forces, COMPARED
+        ENGINE_ROADS, axes.engine_frequencies, axes.engine_forces, COMPARED
     ):
         sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
-        add(('idle', who, roughness, frequency, force), sim, of_road)
+        add(('engine', who, roughness, frequency, force), sim, of_road)
+    for (road, roughness), noise, who in product(ROADS.items(), axes.noise, COMPARED):
+        sim = _road(roughness, 6.0) | {'electronics.displacement_noise': 1e-6 * noise}
+        add(('noise', who, road, noise), sim, of_road)
     variants: dict[Key, Values] = {('ablation', name): changes for name, changes in ABLATIONS.items()}
     for point in FRONT:
-        names = ('lowest_amplitude', 'full_amplitude', 'damping_coefficient')
-        variants['front', *point] = dict(zip(names, point, strict=True))
+        variants['front', *point] = dict(zip(('half_amplitude', 'damping_coefficient'), point, strict=True))
     for key, changes in variants.items():
         for level in (axes.levels[0], axes.levels[-1]):
             add((*key, CONTINUOUS, level), sweep_parameters(level, 14.0), peak_and_rms, changes)
@@ -176,9 +194,30 @@ def with_displacement(figures: Callable[..., Values], truth: Truth, sim: SimPara
 
 
 def of_gap(truth: Truth, sim: SimParameters) -> Values:
-    """Return largest displacement and first extremum (m) over a gap."""
+    """Return largest displacement and first extremum (m) over a gap, and the largest friction (N)."""
     behind = truth.displacement[round(sim.motorway.gap_time / SAMPLE_TIME) :]
-    return {'peak_m': float(np.max(np.abs(behind))), 'first_m': first_extremum(behind)}
+    return {
+        'peak_m': float(np.max(np.abs(behind))),
+        'first_m': first_extremum(behind),
+        'force_n': float(np.max(np.abs(truth.friction_force))),
+    }
+
+
+def of_high_bands(truth: Truth, sim: SimParameters) -> Values:
+    """Return the rms of the chassis acceleration (m/s^2) in `HIGH_BANDS` by what was changed in the plant.
+
+    The plant alone goes the way of the drive again, so that it can be seen at each of its steps.
+    """
+    held = np.full(len(truth.time), _HELD)
+    found = {
+        STEPPED: at_each_step(truth.current_setpoint, sim),
+        STRAIGHT: at_each_step(truth.current_setpoint, sim, straight=True),
+        f'current held at {_HELD:g} A': at_each_step(held, sim),
+    }
+    rate = 1.0 / STEP_TIME
+    recorded = rms_in_bands(faded(truth.chassis_acceleration), HIGH_BANDS[:-1])
+    others = {name: rms_in_bands(faded(each, rate), HIGH_BANDS, rate) for name, each in found.items()}
+    return {SAMPLED: recorded} | others
 
 
 def of_rack(truth: Truth, sim: SimParameters) -> Values:
@@ -189,14 +228,11 @@ def of_rack(truth: Truth, sim: SimParameters) -> Values:
 
 
 def of_road(truth: Truth, sim: SimParameters) -> Values:
-    """Return displacement (m), chassis acceleration (m/s^2), power of pads and coil (W)."""
+    """Return what is felt, and the largest displacement (m)."""
     part = slice(round(_SETTLING / SAMPLE_TIME), None)
     displacement, acceleration = truth.displacement[part], truth.chassis_acceleration[part]
-    acceleration = acceleration - acceleration.mean()
-    return {
-        'acceleration': rms_in_bands(acceleration, [ACOUSTIC])[0],
+    return felt({name: values[part] for name, values in vars(truth).items()}, sim) | {
+        'acceleration': rms_in_bands(acceleration - acceleration.mean(), [ACOUSTIC])[0],
         'peak_m': float(np.abs(displacement).max()),
         'rms_m': rms_in_bands(displacement, [BELOW_ISOLATION])[0],
-        'power_w': float(np.mean(np.abs(truth.friction_force[part] * truth.velocity[part]))),
-        'heat_w': sim.coil.resistance * float(np.mean(truth.coil_current[part] ** 2)),
     }

@@ -16,6 +16,7 @@ from engine_mount.experiments.harness.drawing import (
     shade_damping,
 )
 from engine_mount.experiments.harness.experiment import (
+    PAPER,
     Experiment,
     ExperimentError,
     Findings,
@@ -23,11 +24,13 @@ from engine_mount.experiments.harness.experiment import (
     Values,
     claim,
     holds_if_lower,
+    in_one_line,
     table,
 )
-from engine_mount.experiments.harness.measures import rms, rms_in_bands
+from engine_mount.experiments.harness.measures import rms
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
+from engine_mount.reports.sections.periodic import rms_in_bands
 from engine_mount.signals.excitation import recorded_signal
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.quantity import Quantity
@@ -185,6 +188,8 @@ def page_of(figures: Values, rate: float) -> str:
     bands = ', '.join(f'{value:.3f} m/s^2 from {band}' for band, value in levels)
     column = f', `{figures["column"]}`' if figures['column'] else ''
     peaks = ', '.join(f'{name} {1e3 * each["displacement_peak_m"]:.2f} mm' for name, each in runs.items())
+    said = {'Away from damping': _on_isolation, 'Damping on': _on_displacement}
+    in_short = ''.join(f'- **{name}.** {in_one_line(judge(figures)[1])}\n' for name, judge in said.items())
     return f"""# A recorded drive: friction mount, hydromount, elastomer alone
 
 `engine-mount experiment recorded_drive` writes this page from its numbers; do not edit it. `make
@@ -198,11 +203,12 @@ engine-mount experiment recorded_drive --set recorded_drive.file=drive.csv --set
 ```
 
 Driven: `{figures['source']}`{column}, times {figures['scale']:g}, {figures['duration_s']:.1f} s at \
-{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. Damper {figures['damper']}.
+{rate:.0f} samples per second, without its mean. Acceleration, rms: {bands}. \
+Policy `{PAPER}`, damper {figures['damper']}.
 
 ## In short
 
-{_in_short(figures)}- **Largest displacement**: {peaks}.
+{in_short}- **Largest displacement**: {peaks}.
 
 ## Bands
 
@@ -249,21 +255,6 @@ period.** Such events are few in one drive:
 """
 
 
-def _in_short(figures: Values) -> str:
-    lines = []
-    for where, part in (('At the moments of damping', 'at_events'), ('Else', 'else')):
-        for what, unit in (('displacement', 'm'), ('force', 'n')):
-            key = f'{what}_band_rms_{part}_{unit}'
-            both = zip(_BAND_NAMES, ratios(figures, key), ratios(figures, key, ELASTOMER), strict=False)
-            told = [
-                f'{band} {hydro:.2f} of the hydromount, {soft:.2f} of the elastomer alone'
-                for band, hydro, soft in both
-            ]
-            if told:
-                lines.append(f'- **{where}, {what}** with the friction mount, rms: {"; ".join(told)}.\n')
-    return ''.join(lines)
-
-
 def _bands(runs: Values, what: str, unit: str, scale: float) -> str:
     rows = []
     for part, key in (('whole', ''), ('moments of damping', 'at_events_'), ('the rest', 'else_')):
@@ -307,5 +298,6 @@ EXPERIMENT = Experiment(
     RecordedDriveParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER,),
     needs='file',
 )

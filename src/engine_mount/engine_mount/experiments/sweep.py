@@ -5,9 +5,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from engine_mount.experiments.harness.closed_loop import drive_cases, paper_policy
-from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, OFF_LINE, new_panels
+from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
     NOT_COMPARABLE,
+    OURS,
+    PAPER,
     PARTLY,
     Experiment,
     Findings,
@@ -27,7 +29,6 @@ from engine_mount.experiments.harness.measures import (
     rms_in,
     sweep_parameters,
 )
-from engine_mount.reports.drawing.chart import COLOURS
 from engine_mount.reports.drive.evaluation import switching
 from engine_mount.reports.drive.signals import DriveSignals, FloatArray
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
@@ -67,7 +68,7 @@ def run(order: Order) -> Findings:
         'switch_on_level_m': level,
         'runs': runs,
     }
-    pictures = {'sweep': draw_sweep(drives), 'sweep_peaks': draw_peaks(drives)}
+    pictures = {'sweep': draw_sweep(drives)}
     return Findings(figures, pictures, [each.recording for each in drives.values()])
 
 
@@ -178,24 +179,6 @@ def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
     return figure
 
 
-def draw_peaks(drives: dict[str, DriveSignals]) -> Any:
-    """Draw the largest displacement in each band of 1 Hz, for all mounts on the road alone."""
-    figure, axes = new_panels('Front wheels on a sweep: largest displacement of the mount over frequency')
-    for name, style in (
-        (FRICTION, {'color': BLUE}),
-        (ALWAYS, {'color': COLOURS[1]}),
-        (OFF, OFF_LINE),
-        (HYDRO, HYDRO_LINE),
-    ):
-        drive = drives[name]
-        middle, highest = highest_per_band(_frequency(drive), 1e3 * drive.truth.displacement, 0.5)
-        shown = middle <= 20.0
-        axes.semilogy(middle[shown], highest[shown], label=name, **style)
-    axes.set(xlabel='frequency of the road (Hz)', ylabel='largest displacement (mm)')
-    axes.legend()
-    return figure
-
-
 EXPERIMENT = Experiment(
     NAME,
     """The road under the wheel is a sine whose frequency rises by 1 Hz per second at a constant amplitude
@@ -206,4 +189,5 @@ EXPERIMENT = Experiment(
     SweepParameters(),
     run,
     closed_loop=True,
+    policies=(PAPER, OURS),
 )

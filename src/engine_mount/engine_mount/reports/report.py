@@ -18,6 +18,7 @@ OnStep = Callable[[float, str], None]
 
 SECTIONS: tuple[Callable[[Sequence[Subject]], Section | None], ...] = (
     motion.traces,
+    motion.felt,
     motion.switching,
     motion.hysteresis,
     motion.harmonics,

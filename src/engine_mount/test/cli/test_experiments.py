@@ -94,20 +94,21 @@ def test_the_command_writes_figures_page_and_pictures(tmp_path):
     assert (tmp_path / 'docs' / 'figures' / 'ramp_and_hold.png').read_bytes().startswith(PNG)
 
 
-def test_the_page_puts_pictures_beside_claims_counts_the_answers_and_leads_to_an_own_page(tmp_path):
+def test_the_page_puts_pictures_beside_claims_counts_answers_and_leads_to_an_own_page(
+    tmp_path,
+):
     picture, own = tmp_path / 'a.png', tmp_path / 'own.md'
     picture.write_bytes(PNG)
     own.write_text('own')
-    claims = [
-        Claim('Fig. 1', 'it is so', 'it was not', Holds.NO),
-        Claim('Fig. 2', 'so too', 'it was', Holds.YES),
-    ]
+    ours = Claim('Fig. 2', 'so too', 'it was', Holds.YES)
+    claims = [Claim('Fig. 1', 'it is so', 'it was not', Holds.NO, ours), ours]
     known = Experiment('bench', 'How.', FrictionContact(), lambda order: None)
     docs = tmp_path / 'docs'
     page.write_page([Outcome(known, {}, claims, [picture], [], [own])], docs / 'page.md')
     text = (docs / 'page.md').read_text()
     assert f'| [{known.title}](#bench) | Fig. 13 | 1 |  | 1 |  |' in text
-    assert '| Fig. 1 | it is so | it was not | no |' in text
+    assert '| paper | statement | here | holds | with `continuous_viscous` | holds with it |' in text
+    assert '| Fig. 1 | it is so | it was not | no | it was | yes |' in text
     assert '[own.md](own.md)' in text
     assert (docs / 'own.md').read_text() == 'own'
     assert (docs / 'figures' / 'a.png').exists()

@@ -157,6 +157,8 @@ def test_damping_comes_one_period_after_the_level_is_exceeded_and_leaves_less_ri
         assert 0.125 <= found['on_delay_s'] <= 0.200
         assert found['off_delay_in_band_s'] == pytest.approx(0.126, abs=0.002)
         assert found['rms_m'][motorway_gap.FRICTION] < 0.6 * found['rms_m'][motorway_gap.OFF]
+    on_hydro = gaps.claims[-1]
+    assert [on_hydro.holds, on_hydro.ours.holds] == [Holds.PARTLY, Holds.YES]
 
 
 # Sensitivity.

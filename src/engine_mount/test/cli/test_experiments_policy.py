@@ -7,9 +7,13 @@ import pytest
 
 from engine_mount.experiments import policy
 from engine_mount.experiments.harness import measures
+from engine_mount.experiments.harness.closed_loop import at_each_step, truth_of_run
+from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
 from engine_mount.experiments.registry import experiment
+from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
+from mount_sim.parameters import SimParameters
 
 SHORT = {
     'road_levels': '0.06,',
@@ -45,6 +49,16 @@ def test_page_and_pictures_are_written_from_the_numbers(compared):
     text = page.read_text(encoding='utf-8')
     assert f'{compared.figures["sweep_ratio"][CONTINUOUS]["0.06"]:.2f}' in text
     assert all(f'figures/{picture.name}' in text for picture in compared.pictures)
+    assert [compared.claims[0].holds, compared.claims[0].ours.holds] == [Holds.NO, Holds.YES]
+
+
+def test_the_plant_that_its_setpoints_drive_again_goes_the_way_of_the_run():
+    values = {'timeline.start': 2.9, 'timeline.duration': 0.7, 'motorway.gap_time': 0.3}
+    truth = truth_of_run({'mount_sim': values, 'mount_control': {}})
+    sim = with_flattened(SimParameters(), values)
+    again = at_each_step(truth.current_setpoint, sim)
+    np.testing.assert_array_equal(again[::20], truth.chassis_acceleration[:-1])
+    assert not np.array_equal(at_each_step(truth.current_setpoint, sim, straight=True), again)
 
 
 def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():

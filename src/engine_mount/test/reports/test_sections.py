@@ -16,6 +16,8 @@ from engine_mount.reports.sections.periodic import (
     dominant_sine,
     evenly,
     harmonics,
+    rms_in_bands,
+    vertical_weighting,
     whole_periods,
 )
 from engine_mount.reports.sections.run import coil_load
@@ -86,6 +88,17 @@ def test_a_spectrum_holds_the_variance_where_it_is():
     power = density**2 * (frequency[1] - frequency[0])
     assert np.sum(power[np.abs(frequency - 20.0) < 2.0]) == pytest.approx(9.0, rel=2e-3)
     assert np.sum(power[(frequency >= 30.0) & (frequency < 100.0)]) < 1e-6
+
+
+def test_the_rms_of_a_band_is_that_of_its_sine_weighted_as_people_feel_it():
+    values = np.sqrt(2.0) * 3.0 * np.sin(2 * np.pi * 16.0 * np.arange(20_000) / 2000.0)
+    found = rms_in_bands(values, [(12.0, 20.0), (20.0, 60.0), (20.0, 1001.0)], 2000.0)
+    assert found == pytest.approx([3.0, 0.0, np.nan], abs=1e-6, nan_ok=True)
+    known = {0.5: 0.418, 2.0: 0.531, 8.0: 1.036, 80.0: 0.132}  # ISO 2631-1:1997, Table 3
+    assert vertical_weighting(np.array([*known])) == pytest.approx([*known.values()], abs=1e-3)
+    assert rms_in_bands(values, [(12.0, 20.0)], 2000.0, vertical_weighting) == pytest.approx(
+        [2.306], abs=1e-3
+    )
 
 
 def test_missing_and_unknown_samples_are_bridged_and_counted():

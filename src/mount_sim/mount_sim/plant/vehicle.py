@@ -142,17 +142,20 @@ def engine_step(vehicle, state, chassis_acceleration, engine_force, friction_for
 
 
 @compiled
-def ride_without_friction(vehicle, state, road_height, engine_force, dt):
+def ride_without_friction(vehicle, state, road_height, engine_force, dt, damping=0.0, first=0):
     """Return (mount displacement, chassis acceleration), each (n,), for road heights and engine forces (n,).
 
-    Friction is off; `state` (1,) of `VEHICLE_STATE` is advanced in place. SI units, steps of `dt` seconds.
+    Friction is off; a viscous damper (N s/m) acts from the step `first` on. `state` (1,) of `VEHICLE_STATE`
+    is advanced in place. SI units, steps of `dt` seconds.
     """
     displacement = np.zeros(road_height.size)
     acceleration = np.zeros(road_height.size)
+    force = 0.0
     for k in range(road_height.size):
-        motion = vehicle_step(vehicle, state[0], road_height[k], engine_force[k], 0.0, dt)
+        motion = vehicle_step(vehicle, state[0], road_height[k], engine_force[k], force, dt)
         displacement[k] = motion.displacement
         acceleration[k] = motion.chassis_acceleration
+        force = damping * motion.velocity if k + 1 >= first else 0.0
     return displacement, acceleration
 
 

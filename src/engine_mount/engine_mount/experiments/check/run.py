@@ -11,7 +11,7 @@ from engine_mount.drives.drive import Drive, check_drive, drive
 from engine_mount.experiments.check.suite import BANDS, RACK, Manoeuvre, Result
 from engine_mount.experiments.harness.closed_loop import truth_of_run
 from engine_mount.experiments.harness.experiment import Settings, Values
-from engine_mount.experiments.harness.measures import first_extremum, rms, rms_in_bands
+from engine_mount.experiments.harness.measures import first_extremum, rms
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
@@ -19,7 +19,13 @@ from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
-from engine_mount.reports.sections.periodic import cycle_work, distortion, harmonics, whole_periods
+from engine_mount.reports.sections.periodic import (
+    cycle_work,
+    distortion,
+    harmonics,
+    rms_in_bands,
+    whole_periods,
+)
 from engine_mount.settings.chosen import policy_of
 from engine_mount.settings.options import mounts_of
 from mount_bringup.settings import checked_settings

@@ -9,22 +9,23 @@ import numpy as np
 from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.messages import Samples
 from engine_mount.drives.loop.run import run_core_into
-from engine_mount.experiments.harness.experiment import ExperimentError, Order, Settings, Values
+from engine_mount.experiments.harness.experiment import PAPER, ExperimentError, Order, Settings, Values
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.recordings.recording import open_recording
-from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
+from engine_mount.reports.drive.signals import DriveSignals, FloatArray, Truth, load_drive
+from engine_mount.signals.excitation import build_excitation
 from mount_bringup.settings import defaults_of_nodes
 from mount_control.policy import switched_viscous
 from mount_init.initialisation import InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
+from mount_sim.electronics.electronics import Noise
+from mount_sim.excitation.excitation import Shaking
 from mount_sim.parameters import SimParameters
-from mount_sim.plant.mounts import with_control_of_mount
-from mount_sim.plant.plant import TRUTH
+from mount_sim.plant.mounts import ALWAYS_ON, with_control_of_mount
+from mount_sim.plant.plant import TRUTH, PlantSimulation
 
 K = TypeVar('K')
-PAPER = 'switched_viscous'
-"""The policy of the paper, with which its scenes are driven."""
 
 
 def settings_of_run(order: Order, sim: Values, control: Values) -> dict[str, Values]:
@@ -42,7 +43,7 @@ def settings_of_run(order: Order, sim: Values, control: Values) -> dict[str, Val
 
 
 def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSignals]:
-    """Drive {name: parameters of the simulator} with the paper's policy.
+    """Drive {name: parameters of the simulator} with the policy of the order, always on with the paper's.
 
     Each is recorded in a folder of its name and read back. The damper is `damper` of the case, else that of
     the order. Time and truth begin with the excitation; what rack and chassis measure is from the truth.
@@ -52,6 +53,8 @@ def drive_cases(order: Order, cases: Mapping[str, Values]) -> dict[str, DriveSig
         order.progress(0.95 * number / len(cases), name)
         sim = {'damper': order.parameters.damper, **case}
         control = {'policy': PAPER, 'damper': sim.pop('damper')}
+        if sim['mount'] != ALWAYS_ON and order.policy != PAPER:
+            control = {'policy': order.policy}
         drives[name] = _drive(order, name, settings_of_run(order, sim, control))
     return drives
 
@@ -103,6 +106,27 @@ def truth_of_run(parameters: Settings) -> Truth:
     records = np.concatenate(sink.blocks).view(TRUTH)[round(outcome.excitation_start / SAMPLE_TIME) :, 0]
     columns = {each.name: records[each.name].copy() for each in fields(Truth) if each.name != 'time'}
     return Truth(time=SAMPLE_TIME * np.arange(len(records)), **columns)
+
+
+def at_each_step(setpoints: FloatArray, sim: SimParameters, *, straight: bool = False) -> FloatArray:
+    """Return the chassis acceleration (m/s^2) at each step of the plant, driven by `setpoints` (A, (n,)).
+
+    These are the true ones at the samples of a run. With `straight` the current wanted goes to each of them
+    in a straight line.
+    """
+    excitation = build_excitation(sim)
+    plant = PlantSimulation(sim.plant, excitation.seat, excitation.step_time)
+    shaking, quiet, before, found = Shaking(excitation, sim.sample_rate), np.zeros(Noise.NUMBERS), 0.0, []
+    for sample, wanted in enumerate(setpoints[1:].tolist()):  # a sample knows the one that led to it
+        values, forces = shaking.at(shaking.start + sample)
+        for step in range(len(values)):
+            plant.read(quiet)
+            found.append(plant.truth['chassis_acceleration'])
+            share = (step + 1) / len(values) if straight else 1.0
+            part = slice(step, step + 1)
+            plant.advance(values[part], forces[part], before + share * (wanted - before))
+        before = wanted
+    return np.array(found)
 
 
 class _TruthSink:

@@ -29,10 +29,14 @@ NAMES = {
     'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
     'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
     'sensitivity': ('Influences on the comparison with the hydromount', 'Figs. 13, 14'),
-    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 6, 7'),
+    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 1, 5 to 7'),
     'recorded_drive': ('A recorded drive', 'Sec. 7'),
 }
 """{name of the experiment and its file: (title, section or figure of the paper)}."""
+
+
+PAPER, OURS = 'switched_viscous', 'continuous_viscous'
+"""The policy of the paper, with which its scenes are driven; ours, with which some are driven too."""
 
 
 class ExperimentError(ValueError):
@@ -60,6 +64,7 @@ class Claim(NamedTuple):
     paper: str
     found: str
     holds: Holds
+    ours: Any = None  # the same `Claim` with our policy, where that was run too
 
 
 Judge = Callable[[Any], Verdict]
@@ -90,13 +95,14 @@ def in_one_line(text: str) -> str:
 class Order:
     """What is wanted: a folder, the experiment's parameters and those of the nodes.
 
-    `progress` takes the share that is done, 0 .. 1, and what is being done.
+    `policy` is the one that drives; `progress` takes the share that is done, 0 .. 1, and what is being done.
     """
 
     experiment: str
     out: Path
     parameters: Any
     settings: Settings = field(default_factory=dict)
+    policy: str = PAPER
     progress: Callable[[float, str], None] = lambda share, what: None
 
     def shown_on(self, bar: Callable[[float, str], None]) -> 'Order':
@@ -108,7 +114,8 @@ class Findings(NamedTuple):
     """What a procedure returns; `figures` is what `--json` writes: plain numbers, texts, lists, mappings.
 
     `pictures` are {name: figure of matplotlib, or the file where one is written}; `pages` are {file name:
-    Markdown}, which find the pictures in `figures/`. Claims are judged from `judged`, by default the figures.
+    Markdown}, which find the pictures in `figures/`. Claims are judged from `judged`, by default the figures,
+    and for our policy from `ours`.
     """
 
     figures: Values
@@ -116,6 +123,7 @@ class Findings(NamedTuple):
     recordings: Sequence[Path] = ()
     pages: Mapping[str, str] = MappingProxyType({})
     judged: Any = None
+    ours: Any = None
 
 
 @dataclass(frozen=True)
@@ -123,8 +131,9 @@ class Experiment:
     """One experiment; `defaults` is the parameter set that `--set NAME.PARAMETER=VALUE` changes.
 
     `summary` is one paragraph on how it repeats what `NAMES` says. `closed_loop`: it drives through
-    controller and plant, so parameters of the nodes can be set too. `needs`: the parameter that only the user
-    can give; such an experiment is not among `all`.
+    controller and plant, so parameters of the nodes can be set too. `policies` are those that drive; where
+    ours is one and `Findings` say nothing of it, the procedure runs again with it. `needs`: the parameter
+    that only the user can give; such an experiment is not among `all`.
     """
 
     name: str
@@ -132,6 +141,7 @@ class Experiment:
     defaults: NamedTuple
     procedure: Callable[[Order], Findings]
     closed_loop: bool = False
+    policies: Sequence[str] = ()
     needs: str = ''
 
     @property
@@ -158,8 +168,15 @@ class Experiment:
 
         found = self.procedure(order)
         order.out.mkdir(parents=True, exist_ok=True)
-        judged = found.figures if found.judged is None else found.judged
-        claims = [judge(judged) for judge in _CLAIMS[self.procedure.__module__].values()]
+        judged, ours = found.figures if found.judged is None else found.judged, found.ours
+        if OURS in self.policies and ours is None:
+            others = {node: values for node, values in order.settings.items() if node != 'mount_control'}
+            again = replace(order, policy=OURS, out=order.out / OURS, settings=others)
+            ours = self.procedure(again).figures
+        claims = [
+            judge(judged)._replace(ours=None if ours is None else judge(ours))
+            for judge in _CLAIMS[self.procedure.__module__].values()
+        ]
         folder = order.out / 'figures' if found.pages else order.out
         pictures = [
             figure if isinstance(figure, Path) else finish(figure, folder / f'{name}.png')
@@ -181,6 +198,20 @@ class Outcome(NamedTuple):
     recordings: list[Path]
     pages: list[Path]
 
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Return heads and rows about the claims; our policy has columns of its own."""
+        answers = [[each, *([each.ours] if each.ours else [])] for each in self.claims]
+        rows = [
+            (
+                each[0].reference,
+                each[0].paper,
+                *(text for one in each for text in (one.found, one.holds.value)),
+            )
+            for each in answers
+        ]
+        heads = ('paper', 'statement', 'here', 'holds', f'with `{OURS}`', 'holds with it')
+        return heads[: len(rows[0])], rows
+
     def page(self) -> str:
         """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`.
 
@@ -190,13 +221,14 @@ class Outcome(NamedTuple):
         if known.needs:
             return self.pages[0].read_text(encoding='utf-8')
         pictures = ''.join(f'![{known.title}](figures/{each.name})\n\n' for each in self.pictures)
-        rows = [(each.reference, each.paper, each.found, each.holds.value) for each in self.claims]
         pages = ''.join(f'\nThe whole page: [{each.name}]({each.name})\n' for each in self.pages)
         return f"""## {known.name}
 
 **{known.title}**, {known.reference}. {in_one_line(known.summary)}
 
-{pictures}{table(('paper', 'statement', 'here', 'holds'), rows)}{pages}
+Policy: {', '.join(f'`{each}`' for each in known.policies) or 'none takes part'}.
+
+{pictures}{table(*self.table())}{pages}
 `engine-mount experiment {known.name}`
 """
 
@@ -211,7 +243,7 @@ def table_rows(rows: Iterable[Sequence[str]]) -> str:
     return ''.join(f'| {" | ".join(row)} |\n' for row in rows)
 
 
-_EVEN = 0.02  # chosen: two rms count as even within so much of each other
+EVEN = 0.02  # chosen: two rms count as even within so much of each other
 
 
 def holds_if(answers: Collection[bool]) -> Holds:
@@ -223,7 +255,7 @@ def holds_if(answers: Collection[bool]) -> Holds:
 
 def holds_if_lower(ratios: Sequence[float]) -> Holds:
     """Return whether it holds that all values are lower than those that they are ratios to (1)."""
-    return holds_if([ratio < 1.0 - _EVEN for ratio in ratios])
+    return holds_if([ratio < 1.0 - EVEN for ratio in ratios])
 
 
 def numbers_of(order: Order, name: str, low: float, high: float) -> list[float]:

@@ -1,15 +1,14 @@
 """Figures of a displacement or an acceleration at 1 kHz that several experiments share."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from engine_mount.experiments.harness.experiment import Values
 from engine_mount.reports.drive.signals import FloatArray, Truth
+from engine_mount.reports.sections.periodic import Band
 from mount_models.sampling import SAMPLE_TIME
 
-Band = tuple[float, float]
 FIRST_FREQUENCY, RATE = 1.0, 1.0  # Hz, Hz/s: Sec. 6
 _CLEAR = 0.3  # chosen: a turning point of so much of the largest one counts as the first
 _FIRST_WITHIN = 0.3  # s
@@ -62,17 +61,6 @@ def peak_and_rms(truth: Truth, *_: Any) -> Values:
 def rms(values: Any) -> float:
     """Return the rms about 0, NaN of nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float('nan')
-
-
-def rms_in_bands(values: FloatArray, bands: Sequence[Band]) -> list[float]:
-    """Return the rms of what `values` (n,) at 1 kHz hold in each band (Hz), in their unit.
-
-    From one spectrum of all of it: every moment counts the same, as it does not with windows.
-    """
-    amplitude = np.abs(np.fft.rfft(values)) / len(values)
-    frequency = np.fft.rfftfreq(len(values), SAMPLE_TIME)
-    inside = [(frequency >= low) & (frequency < high) for low, high in bands]
-    return [float(np.sqrt(2.0 * np.sum(amplitude[band] ** 2))) for band in inside]
 
 
 def highest_per_band(

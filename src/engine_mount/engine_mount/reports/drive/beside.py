@@ -30,7 +30,7 @@ THIS = 'this mount'
 _OWN = {'hydro': 'hydromount', 'friction_off': 'no current', 'elastomer': 'no current'}
 LONGEST = 300.0  # s of a run, chosen: 3 s of computing
 EXCITED = ('road_height', 'chassis_acceleration')  # of sim/truth; the first that is not 0 throughout
-_KEPT = ('displacement', *EXCITED)
+_KEPT = ('displacement', *EXCITED, 'velocity', 'friction_force', 'coil_current')
 _QUIET = np.zeros(5)  # no noise of the sensors
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class BesideError(ValueError):
 class Beside(NamedTuple):
     """{name: truth} of the other mounts at the recorded stamps (ns) within the run.
 
-    A truth has `displacement` (m) and `EXCITED` (m, m/s^2). `begin` (ns): where the excitation begins.
+    A truth has the columns `_KEPT` of sim/truth (SI). `begin` (ns): where the excitation begins.
     """
 
     stamps: NDArray[np.int64]
@@ -73,15 +73,6 @@ def name_of(mount: str) -> str:
 def peaks_text(peaks: Mapping[str, float]) -> str:
     """Return the largest displacements (m) of mounts, as in `1.30 mm; hydromount 1.74 mm`."""
     return '; '.join(f'{name} {1e3 * peak:.2f} mm'.removeprefix(f'{THIS} ') for name, peak in peaks.items())
-
-
-def peaks_beside(recording: Recording, parameters: Parameters) -> dict[str, float]:
-    """Return the largest displacements (m) of `mounts_beside`, none where they cannot be computed."""
-    try:
-        truths = mounts_beside(recording, parameters).truths
-    except BesideError:
-        return {}
-    return {name: float(np.max(np.abs(truth['displacement']))) for name, truth in truths.items()}
 
 
 def mounts_beside(recording: Recording, parameters: Parameters) -> Beside:

@@ -45,6 +45,7 @@ class Truth:
     displacement: FloatArray
     velocity: FloatArray
     coil_current: FloatArray
+    current_setpoint: FloatArray
     friction_force: FloatArray
     mount_force: FloatArray
     chassis_acceleration: FloatArray

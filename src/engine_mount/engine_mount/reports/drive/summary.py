@@ -1,5 +1,6 @@
 """The figures of a drive: those of `--json`, and the same for people."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,8 +13,9 @@ from engine_mount.recordings.events import Switching, switching_times
 from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
-from engine_mount.reports.drive.beside import name_of, peaks_beside, peaks_text
+from engine_mount.reports.drive.beside import BesideError, mounts_beside, name_of, peaks_text
 from engine_mount.reports.drive.evaluation import error_text, tracking_error
+from engine_mount.reports.drive.felt import ACCELERATIONS, BANDS, felt_beside, value_text
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
@@ -52,6 +54,12 @@ def summarise(
         switched_on, switched_off = on.tolist(), off.tolist()
         peak = known(peak_current(recording, control_spans(audits)))
         error = known(tracking_error(drive, *policy_of(parameters)))
+    peaks = felt = None
+    with contextlib.suppress(BesideError):
+        beside = mounts_beside(recording, parameters)
+        peaks = {name: float(np.max(np.abs(each['displacement']))) for name, each in beside.truths.items()}
+        figures = felt_beside(recording, parameters, beside)
+        felt = {name: {key: known(value) for key, value in each.items()} for name, each in figures.items()}
     return {
         'recording': str(recording.path),
         'recordings': run['recordings'],
@@ -70,7 +78,8 @@ def summarise(
         'switch_on_s': switched_on,
         'switch_off_s': switched_off,
         'peak_displacement_m': float(np.nanmax(np.abs(drive.seen.displacement))),
-        'beside': peaks_beside(recording, parameters) or None,
+        'beside': peaks,
+        'felt': felt,
         'peak_current_a': peak,
         'tracking_error_rms': error,
         **{name: known(run[name]) for name in ('latency_median_s', 'latency_p99_s')},
@@ -128,6 +137,10 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
             f'{1e6 * median:.0f} µs median, {1e6 * p99:.0f} µs in 99 of 100 (sample sent to setpoint back)'
         )
     rows += [('latency', latency), ('speed', f'{figures["real_time_factor"]:.2f} x real time')]
+    unit = f' mm/s² ({"-".join(f"{low:g}" for low, _ in BANDS)}-{BANDS[-1][1]:g} Hz)'
+    for place, (name, felt) in enumerate((figures['felt'] or {}).items()):
+        values = ', '.join(value_text(figure, felt[figure]) for figure in ACCELERATIONS[:-1])
+        rows.append((f'  {name}', values) if place else ('chassis acceleration', values + unit))
     return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
 

@@ -20,7 +20,8 @@ from engine_mount.reports.drawing.chart import (
     Panel,
     level_lines,
 )
-from engine_mount.reports.drive.beside import peaks_text
+from engine_mount.reports.drive.beside import BesideError, peaks_text
+from engine_mount.reports.drive.felt import FIGURES, felt_beside, value_text
 from engine_mount.reports.sections.periodic import (
     amplitude_density,
     cycle_work,
@@ -266,6 +267,25 @@ def _together(
     x = np.interp(time, moved.time[known], moved.values[known]) if known.any() else np.full(len(time), np.nan)
     both = np.isfinite(x) & np.isfinite(y)
     return x[both], y[both], time[both]
+
+
+def felt(subjects: Sequence[Subject]) -> Section:
+    """Return what chassis and people feel by frequency, and what it costs, of all mounts on the same road."""
+    said, tables = [], []
+    for subject in subjects:
+        try:
+            mounts = felt_beside(subject.recording, subject.run.parameters, subject.beside)
+        except BesideError as reason:
+            said.append((subject, f'not measured: {reason}'))
+            continue
+        rows = [
+            (what, *(value_text(key, each[key]) for each in mounts.values())) for key, what in FIGURES.items()
+        ]
+        tables.append(Table(('', *mounts), rows, subject.prefix.removesuffix(': ')))
+    words = (
+        ['Rms from the begin of the excitation on; vertical acceleration of the chassis.'] if tables else []
+    )
+    return Section('felt', 'By frequency', words + shared_sentences(subjects, said), None, tables)
 
 
 def draw_drive(subject: Subject, *files: Path) -> None:

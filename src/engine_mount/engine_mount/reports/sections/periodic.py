@@ -1,12 +1,17 @@
 """Signals by frequency: sines and their harmonics, the work of a closed loop, spectra, sweeps."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine_mount.reports.drawing.chart import Array
+from mount_models.sampling import SAMPLE_RATE
 
+Band = tuple[float, float]
+
+_FADED = 0.25  # s, chosen
 _SEGMENT = 2.048  # s, chosen: lines 0.5 Hz apart tell the modes of the car apart
 
 
@@ -99,6 +104,53 @@ def amplitude_density(values: Array, rate: float) -> tuple[Array, Array]:
     length = min(len(values), round(_SEGMENT * rate))
     frequency, power = welch(values, rate, 'hann', length)
     return frequency, np.sqrt(power)
+
+
+def rms_in_bands(
+    values: Array,
+    bands: Sequence[Band],
+    rate: float = SAMPLE_RATE,
+    weighting: Callable[[Array], Array] = np.ones_like,
+) -> list[float]:
+    """Return the rms of what `values` (n,) at `rate` (Hz) hold in each band (Hz), in their unit.
+
+    From one spectrum of all of it: every moment counts the same, as it does not with windows. `weighting`
+    returns a gain for each frequency (Hz). NaN of a band that reaches beyond half the rate.
+    """
+    frequency = np.fft.rfftfreq(len(values), 1.0 / rate)
+    amplitude = weighting(frequency) * np.abs(np.fft.rfft(values)) / len(values)
+    found = []
+    for low, high in bands:
+        inside = amplitude[(frequency >= low) & (frequency < high)]
+        found.append(float(np.sqrt(2.0 * np.sum(inside**2))) if high <= 0.5 * rate else math.nan)
+    return found
+
+
+def faded(values: Array, rate: float = SAMPLE_RATE) -> Array:
+    """Return `values` (n,) at `rate` (Hz) without their mean, faded at both ends.
+
+    A jump from the last to the first would add to all bands.
+    """
+    from scipy.signal.windows import tukey  # loads long
+
+    window: Array = tukey(len(values), 2.0 * _FADED * rate / len(values))
+    return window * (values - values.mean())
+
+
+def vertical_weighting(frequency: Array) -> Array:
+    """Return the gain of W_k at each frequency (Hz): what people who sit feel of a vertical acceleration.
+
+    ISO 2631-1:1997, Annex A: limits of the band, transition from acceleration to velocity, upward step.
+    """
+
+    def second_order(corner: float, quality: float) -> Any:
+        return 1.0 + s / (quality * corner) + (s / corner) ** 2
+
+    s = 1j * frequency  # over 2 pi, as the corners are in Hz
+    limits = (s / 0.4) ** 2 / second_order(0.4, math.sqrt(0.5)) / second_order(100.0, math.sqrt(0.5))
+    transition = (1.0 + s / 12.5) / second_order(12.5, 0.63)
+    step = (2.37 / 3.35) ** 2 * second_order(2.37, 0.91) / second_order(3.35, 0.91)
+    return np.abs(limits * transition * step)
 
 
 def evenly(time: Array, values: Array, rate: float) -> tuple[Array, Array, int]:
