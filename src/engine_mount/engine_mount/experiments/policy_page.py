@@ -177,8 +177,8 @@ with the hydromount {max(figures['high_frequency_ratio'][HYDRO].values()):.3f}.
     if 'engine' in figures:
         cases = [values for each in figures['engine'].values() for values in each[CONTINUOUS].values()]
         shaken, moved = np.transpose(cases)
-        text += f"""- With a running engine on a road, 20 to 190 Hz, the acceleration rises up to {shaken.max():.2f} \
-times ({100.0 * np.mean(shaken > 1.05):.0f} % of the cases above 1.05), and the engine moves up to \
+        text += f"""- With a running engine on a road, 20 to 190 Hz, the acceleration rises up to \
+{shaken.max():.2f} times ({100.0 * np.mean(shaken > 1.05):.0f} % of the cases above 1.05), and the engine moves up to \
 {moved.max():.2f} times as far as on the hydromount.
 """
     return text
@@ -196,7 +196,8 @@ def thorough(figures: Values, beaten: str) -> str:
 """
     for point in figures['front']:
         if point['on_front'] or point['name']:
-            front += f"""| {point['name']} | {1e3 * point['half_amplitude_m']:g} | {point['damping_coefficient']:g} | {point['light_road']:.2f} | \
+            front += f"""| {point['name']} | {1e3 * point['half_amplitude_m']:g} | \
+{point['damping_coefficient']:g} | {point['light_road']:.2f} | \
 {point['strong_road']:.2f} | {point['acceleration']:.2f} | {point['acceleration_idling']:.2f} | \
 {point['j_per_km']:.2f} |
 """
@@ -222,7 +223,8 @@ against the other. Speed of the engine is not measured; a bank of resonators fin
 
 ## Noise
 
-Acceleration from 20 to 200 Hz over that without current, by the standard deviation of the displacement's noise:
+Acceleration from 20 to 200 Hz over that without current, by the standard deviation of the noise in the \
+displacement:
 
 {by_name('road', figures['noise'])}
 

@@ -65,7 +65,7 @@ class Parameters(NamedTuple):
     ] = 0.58
     damping_coefficient: Annotated[
         float, Quantity('N s/m', 'c: force over velocity, fully engaged', 1.0, 1e4)
-    ] = 2900.0
+    ] = 3200.0
     rounding_velocity: Annotated[
         float,
         Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
@@ -75,7 +75,7 @@ class Parameters(NamedTuple):
     ] = 0.00013
     engaging_time: Annotated[
         float, Quantity('s', 'time constant by which the degree of damping rises', 0.001, 1.0)
-    ] = 0.016
+    ] = 0.008
     releasing_time: Annotated[float, Quantity('s', 'and by which it falls', 0.001, 10.0)] = 0.14
     line_weight: Annotated[
         float, Quantity('1', 'how much a line of the engine releases the damper; 0: not at all', 0.0, 100.0)
