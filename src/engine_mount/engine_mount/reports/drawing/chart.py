@@ -42,6 +42,11 @@ DASH_OF = {'hydromount': DASHED, 'no current': DOTTED}
 """Of the mounts that are not solid: with their colours, their look everywhere."""
 
 
+def look_of(mount: str, colour: str = COLOURS[0]) -> tuple[str, str]:
+    """Return colour and dash of a mount, `colour` where it has none of its own."""
+    return COLOUR_OF.get(mount, colour), DASH_OF.get(mount, SOLID)
+
+
 @dataclass(frozen=True)
 class Curve:
     """A line through points; NaN interrupts it."""
@@ -72,7 +77,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; `label` holds the unit, as in `displacement (mm)`."""
+    """One pair of axes; `label` holds the unit, as in `displacement (mm)`. The last curve lies on top."""
 
     label: str
     curves: Sequence[Curve] = ()
@@ -80,7 +85,7 @@ class Panel:
     levels: Sequence[Level] = ()
     log: bool = False
     share: float = 1.0  # of the height, against the other panels
-    least: Sequence[float] = ()  # values that the page always shows
+    least: Sequence[float] = ()  # values that are always shown
 
 
 @dataclass(frozen=True)

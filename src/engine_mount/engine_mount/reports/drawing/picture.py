@@ -64,6 +64,8 @@ def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | 
         for value in (level.value, -level.value):
             style = {'linestyle': level.dash, 'linewidth': 1.0}
             axes.axhline(value, color=level.colour, label=level.name, **style)
+    for value in panel.least:
+        axes.axhline(value, linewidth=0.0)
     if limits is not None:
         axes.set_xlim(*limits)
     if panel.log:

@@ -30,7 +30,7 @@ THIS = 'this mount'
 _OWN = {'hydro': 'hydromount', 'friction_off': 'no current', 'elastomer': 'no current'}
 LONGEST = 300.0  # s of a run, chosen: 3 s of computing
 EXCITED = ('road_height', 'chassis_acceleration')  # of sim/truth; the first that is not 0 throughout
-_KEPT = ('displacement', *EXCITED)
+_KEPT = ('displacement', 'mount_force', *EXCITED)
 _QUIET = np.zeros(5)  # no noise of the sensors
 
 Array = NDArray[np.float64]
@@ -43,7 +43,8 @@ class BesideError(ValueError):
 class Beside(NamedTuple):
     """{name: truth} of the other mounts at the recorded stamps (ns) within the run.
 
-    A truth has `displacement` (m) and `EXCITED` (m, m/s^2). `begin` (ns): where the excitation begins.
+    A truth has `displacement` (m), `mount_force` (N) and `EXCITED` (m, m/s^2). `begin` (ns): where the
+    excitation begins.
     """
 
     stamps: NDArray[np.int64]

@@ -7,6 +7,7 @@ from engine_mount.recordings.difference import time_text
 from engine_mount.reports.drawing.chart import Chart
 
 GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
+NOT_APPLICABLE = 'not applicable'
 
 
 class Link(NamedTuple):

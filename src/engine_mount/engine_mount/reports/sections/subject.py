@@ -24,15 +24,12 @@ from engine_mount.recordings.session import (
 )
 from engine_mount.recordings.times import Times, each_once
 from engine_mount.reports.drawing.chart import (
-    COLOUR_OF,
-    COLOURS,
-    DASH_OF,
-    SOLID,
     SPAN_COLOUR,
     Array,
     Curve,
+    look_of,
 )
-from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
+from engine_mount.reports.drive.beside import EXCITED, Beside, BesideError, mounts_beside, name_of
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
 from engine_mount.reports.sections.periodic import Sine, dominant_sine
@@ -68,6 +65,13 @@ QUANTITIES = {
     'damping': ((CONTROL_TRACE.name, 'damping_active'),),
 }
 """Topic and column of what a report shows, in SI units; of several the first that was recorded."""
+_BESIDE = {
+    'displacement': 'displacement',
+    'true displacement': 'displacement',
+    'mount force': 'mount_force',
+    'acceleration': 'chassis_acceleration',
+}
+"""{quantity: its name in the truth of a mount beside the drive}."""
 _NEEDED: dict[str, set[str]] = {topic: set(columns) for topic, columns in DRIVE_COLUMNS.items()}
 """{topic: columns}, read in one pass."""
 for _places in QUANTITIES.values():
@@ -124,17 +128,16 @@ class Subject:
         recording: Recording,
         name: str = '',
         *,
-        place: int = 0,
         several: bool = False,
         zero: int | None = None,
     ):
-        """Take what the report calls a recording, its place among `several`, and the stamp (ns) of time 0."""
+        """Take the name of a recording, whether there are `several`, and the stamp (ns) of time 0."""
         self.recording = recording
         self.name = name or recording.short_name
         self.prefix = f'{self.name}: ' if several else ''
         self.missing: list[str] = []
         self.comparison: Comparison | None = None  # of the first recording with this one
-        self._place, self._several = place, several
+        self._several = several
         self._signals: dict[tuple[str, str], Signal | None] = {}
         recording.load_columns({topic: names for topic, names in _NEEDED.items() if topic in recording})
         self.zero = recording.time_axis.zero if zero is None else zero
@@ -156,10 +159,14 @@ class Subject:
         return (stamps - self.zero) / 1e9
 
     def curve(self, what: str, x: Array, y: Array) -> Curve:
-        """Return a curve in the colour of this recording, with its name where there are several."""
+        """Return a curve in the look of this recording, with its name where there are several."""
         label = f'{what}, {self.name}' if self._several else what
-        colour = COLOUR_OF.get(self.mount, COLOURS[self._place % len(COLOURS)])
-        return Curve(label, x, y, colour, DASH_OF.get(self.mount, SOLID))
+        return Curve(label, x, y, *self.look)
+
+    @functools.cached_property
+    def look(self) -> tuple[str, str]:
+        """Colour and dash of its curves."""
+        return look_of(self.mount)
 
     @property
     def mount(self) -> str:
@@ -174,14 +181,21 @@ class Subject:
             return None
         return Curve('degree of damping', degree.time, degree.values, SPAN_COLOUR)
 
+    def others(self, quantity: str) -> dict[str, Signal]:
+        """Return {name: signal} of the mounts beside it, none where they cannot be computed."""
+        if isinstance(beside := self.beside, str) or quantity not in _BESIDE:
+            return {}
+        time = self.seconds(beside.stamps)
+        return {name: Signal(time, truth[_BESIDE[quantity]]) for name, truth in beside.truths.items()}
+
     @functools.cached_property
-    def displacements(self) -> dict[str, Signal]:
-        """{name: displacement} of its own mount and, where they can be computed, of those beside it."""
-        found = {} if (own := self['displacement']) is None else {self.mount: own}
-        if not isinstance(beside := self.beside, str):
-            time = self.seconds(beside.stamps)
-            found |= {name: Signal(time, truth['displacement']) for name, truth in beside.truths.items()}
-        return found
+    def road(self) -> Signal | None:
+        """What excites it, from the beginning of that on, None where it is not known."""
+        if isinstance(beside := self.beside, str):
+            return None
+        truth = next(iter(beside.truths.values()))[(since := beside.stamps >= beside.begin)]
+        found = next((truth[name] for name in EXCITED if truth[name].any()), None)
+        return None if found is None else Signal(self.seconds(beside.stamps[since]), found)
 
     @functools.cached_property
     def session(self) -> str:
@@ -208,13 +222,14 @@ class Subject:
         try:
             parameters = with_recorded_policy(parameters)
             mount = seat_of(parameters)
+            reason = without_friction(mount)
             return Run(
                 parameters=parameters,
-                levels=levels_of(*policy_of(parameters)),
+                levels={} if reason else levels_of(*policy_of(parameters)),
                 current_limit=control_parameters(parameters).highest_current,
                 resistance=with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil').resistance,
                 mount=mount,
-                without_friction=without_friction(mount),
+                without_friction=reason,
             )
         except (ValueError, TypeError, AttributeError) as error:
             return Run(f'the parameters of the session cannot be used: {error}')
@@ -352,6 +367,30 @@ class Subject:
         if lack not in self.missing:
             self.missing.append(lack)
         return None
+
+
+def drives_apart(subjects: Sequence[Subject]) -> list[float] | None:
+    """Return how much later (s) the road of each begins than that of the first, None for other roads."""
+    if len(subjects) == 1:
+        return [0.0]
+    roads = [each.road for each in subjects]
+    first, found = roads[0], []
+    for road in roads:
+        if road is None or first is None:
+            return None
+        count = min(len(road.values), len(first.values))
+        if not count or not np.array_equal(road.values[:count], first.values[:count]):
+            return None
+        found.append(float(road.time[0] - first.time[0]))
+    return found
+
+
+def other_mounts(subjects: Sequence[Subject], quantity: str) -> dict[str, Signal]:
+    """Return {name: signal} of the computed mounts on the road of all recordings that none of these has."""
+    if drives_apart(subjects) is None:
+        return {}
+    recorded = {each.mount for each in subjects}
+    return {name: each for name, each in subjects[0].others(quantity).items() if name not in recorded}
 
 
 def shared_sentences(subjects: Sequence[Subject], remarks: Sequence[tuple[Subject, str]]) -> list[str]:

@@ -47,6 +47,16 @@ function niceStep(span, count) {
   return power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
 }
 
+function ticksOf(low, high, count, log) { // at least three; of logarithms those of 1, 2, 5, or of decades
+  const factors = high - low > 2.5 ? [1] : [1, 2, 5], logs = [];
+  for (let decade = Math.floor(low); log && decade <= high; decade += 1) logs.push(...factors.map((factor) => decade + Math.log10(factor)));
+  const inside = logs.filter((place) => place >= low && place <= high);
+  if (inside.length > 1) return inside;
+  const few = niceStep(high - low, count), step = Math.floor(high / few) - Math.ceil(low / few) < 2 ? niceStep(few / 2.5, 1) : few;
+  const first = Math.ceil(low / step);
+  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, place) => (first + place) * step);
+}
+
 function written(value, span, log) { // digits that tell apart a two-thousandth of what is shown
   if (!isFinite(value)) return '–';
   if (log) return value.toPrecision(3);
@@ -163,8 +173,7 @@ function paintPanel(chart, panel, width, ink) {
   paintFrame(paint, chart, spec, area);
   paint.save();
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
-  const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
-  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
+  for (const line of lines) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
   paintLevels(paint, levels, area);
   if (chart.spike !== null) {
     const at = Math.round(x(chart.spike)) + 0.5;
@@ -194,17 +203,12 @@ function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, las
   paint.globalAlpha = 1;
   paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
   paint.textAlign = 'right'; paint.textBaseline = 'middle';
-  const step = spec.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
-  for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
-    const value = place * step, y = Math.round(down(value)) + 0.5;
+  for (const value of ticksOf(low, high, Math.max(3, (bottom - TOP) / 42), spec.log)) {
+    const y = Math.round(down(value)) + 0.5;
     stroke(paint, LEFT, y, right, y);
     paint.fillText(Number(spec.log ? (10 ** value).toPrecision(2) : value.toPrecision(6)), LEFT - 6, y);
   }
-  const stepX = niceStep(to - from, width / 90), ticks = [...chart.spec.ticks];
-  if (!ticks.length || ticks.length > width / 40) {
-    ticks.length = 0;
-    for (let place = Math.ceil(from / stepX); place * stepX <= to; place += 1) ticks.push(place * stepX);
-  }
+  const given = chart.spec.ticks, ticks = given.length && given.length <= width / 40 ? given : ticksOf(from, to, width / 90);
   paint.textBaseline = 'top';
   for (const tick of ticks) {
     const at = Math.round(x(tick)) + 0.5, edge = at > right - 8; // of the page, where the number is whole too
