@@ -38,6 +38,8 @@ class Feed(Protocol):
 
     topics: Mapping[str, Topic]
     title: str
+    zero: int | None  # the stamp (ns) at which time begins; None: the first that comes
+    ended: bool  # nothing comes any more
 
     def start(self, receive: Receive, on_failure: Fail) -> None:
         """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
@@ -64,6 +66,8 @@ class RecordedFeed:
         self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
         self.title = f'{recording.short_name} at {rate:g} x'
         part.load(self.topics)
+        self.zero: int | None = part.time_axis.zero
+        self.ended = False
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
         times = [series.receive_times for _, series in self._series]
         if not sum(map(len, times)):
@@ -122,3 +126,4 @@ class RecordedFeed:
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1
+        self.ended = due == len(self)

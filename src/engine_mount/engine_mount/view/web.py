@@ -109,7 +109,7 @@ class Web:
         """Take an interval from the thread of the model."""
         if not self._viewers:
             return
-        content: dict[str, Any] = {'intervals': [interval.as_json()]}
+        content: dict[str, Any] = {'intervals': [interval.as_json()] if interval.extents else []}
         if interval.number % _STATE_EVERY == 0:
             content |= {'state': self._model.state_json(), 'chart': self._model.chart()}
         text = json.dumps(content)

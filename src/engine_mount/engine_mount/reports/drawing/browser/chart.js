@@ -212,7 +212,7 @@ function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, las
   paint.textBaseline = 'top';
   for (const tick of ticks) {
     const at = Math.round(x(tick)) + 0.5, edge = at > right - 8; // of the page, where the number is whole too
-    if (at < LEFT || at > right + 1 || (chart.live && tick < 0)) continue;
+    if (at < LEFT || at > right + 1) continue;
     stroke(paint, at, TOP, at, bottom);
     paint.textAlign = edge ? 'right' : 'center';
     if (last) paint.fillText(Number(tick.toPrecision(8)), edge ? width : at, bottom + 4);
