@@ -180,7 +180,7 @@ class Model:
         found, still = self.state.as_json(self._newest), time.monotonic() - self._sampled
         motion = [
             {'name': f'{name}: peak, rms', 'value': f'{peak:.2f}, {math.sqrt(squares / count):.3f} mm'}
-            for name, (peak, squares, count) in list(self._motion.items())
+            for name, (peak, squares, count) in reversed(list(self._motion.items()))
         ]
         waiting = f'no sample for {still:.0f} s' if still > _STILL else ''
         return {**found, 'values': motion + found['values'], 'end': 'ended' if self._feed.ended else waiting}
