@@ -160,7 +160,7 @@ def _on_noise(figures):
 
 
 def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
-    """Draw displacement and chassis acceleration over frequency, as envelopes, logarithmic, Fig. 14."""
+    """Draw displacement and chassis acceleration over frequency, as envelopes, Fig. 14."""
     figure, panels = new_panels(
         'Front wheels on a sweep of 1 Hz per second (Fig. 14)', 2, height=6.5, sharex=True
     )
@@ -171,7 +171,7 @@ def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
         for mount, colour in ((HYDRO, HYDRO_LINE['color']), (FRICTION, BLUE)):
             drive = drives[mount]
             envelope = highest_per_band(_frequency(drive), scale * getattr(drive.truth, name), 0.25)
-            axes.semilogy(*envelope, color=colour, linewidth=1.2, label=mount)
+            axes.plot(*envelope, color=colour, linewidth=1.2, label=mount)
         axes.set_ylabel(label)
     panels[1].set_xlabel('frequency of the road (Hz)')
     panels[0].legend(loc='upper right')
@@ -182,15 +182,15 @@ def draw_peaks(drives: dict[str, DriveSignals]) -> Any:
     """Draw the largest displacement in each band of 1 Hz, for all mounts on the road alone."""
     figure, axes = new_panels('Front wheels on a sweep: largest displacement of the mount over frequency')
     for name, style in (
-        (FRICTION, {'color': BLUE}),
-        (ALWAYS, {'color': COLOURS[1]}),
         (OFF, OFF_LINE),
         (HYDRO, HYDRO_LINE),
+        (ALWAYS, {'color': COLOURS[1]}),
+        (FRICTION, {'color': BLUE}),
     ):
         drive = drives[name]
         middle, highest = highest_per_band(_frequency(drive), 1e3 * drive.truth.displacement, 0.5)
         shown = middle <= 20.0
-        axes.semilogy(middle[shown], highest[shown], label=name, **style)
+        axes.plot(middle[shown], highest[shown], label=name, **style)
     axes.set(xlabel='frequency of the road (Hz)', ylabel='largest displacement (mm)')
     axes.legend()
     return figure

@@ -92,6 +92,8 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
     away = Look({'recording': 'b', 'mount': '', 'asked': 'setpoints', 'peak_current_a': 2.0}, reason='away')
     page = fleet_report(result(), [look(peak_current_a=1.0), away], 'peak_current_a', 'tuned')
     assert page.title == 'Fleet tuned: setpoints for the recorded displacement'
+    renamed = result().rename_columns([each.replace('peak', 'mean') for each in result().column_names])
+    assert fleet_report(renamed, [], 'mean_current_a', 'tuned').title == 'Fleet tuned: mean current +17 %'
     sections = sections_of(page)
     assert list(sections) == ['overview', 'worst', 'peak_current_a', 'look_1', 'look_2', 'failures']
     assert 'is another question' in sections['overview'].words[0]

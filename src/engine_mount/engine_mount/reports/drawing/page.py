@@ -65,7 +65,8 @@ def _table(table: Table) -> str:
     head = ''.join(f'<th>{escape(name)}</th>' for name in table.head)
     rows = [f'<tr>{head}</tr>\n']
     for place, row in enumerate(table.rows):
-        cells = ''.join(f'<td>{_cell(cell)}</td>' for cell in row)
+        named = zip(table.head, row, strict=True)
+        cells = ''.join(f'<td data-head="{escape(head)}">{_cell(cell)}</td>' for head, cell in named)
         rows.append(f'<tr{" class=marked" if place in table.marked else ""}>{cells}</tr>\n')
     title = escape(table.title)
     caption = f'<caption>{title}</caption>' if title and not table.folded else ''

@@ -158,12 +158,12 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
             *_compared('simulated displacement', 'mm', _MM, time, moved, part, largest),
             setpoints[0],
         ]
-    origin = 'first displacement sample' if moved is None else 'beginning of the recorded acceleration'
+    origin = 'sample' if moved is None else 'acceleration'
     # at first what is around the difference is seen, and nothing beyond the ends of the recording
     begin = min(time[place] - AT_FIRST, time[-1] - 2.0 * AT_FIRST)
     begin = max(begin, time[0])
     view = begin, min(begin + 2.0 * AT_FIRST, time[-1])
-    return Chart(name, title, f'seconds from the {origin}', panels, view=view)
+    return Chart(name, title, f'time from the first {origin} (s)', panels, view=view)
 
 
 def _compared(

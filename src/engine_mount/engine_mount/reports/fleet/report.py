@@ -43,6 +43,12 @@ _ASKED = {
         'the real mount did is not in these figures.',
     ),
 }
+_ANSWERS = {
+    'rms_displacement_m': 'rms displacement',
+    'mean_current_a': 'mean current',
+    'pad_energy_j': 'wear',
+}
+"""{figure: its word}; their sums over all rows are the answer above the page. Wear: the work in the pads."""
 _OF_MOTION = ('displacement', 'mount_force')  # in names of figures: what is looked for in a closed loop
 _LISTED = 20  # recordings that are named beside their reason, chosen
 
@@ -58,8 +64,14 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: 
     others = [row for row in rows if row.get('outcome') == _ANOTHER_POLICY]
     failed = [row for row in rows if row['reason'] and row.get('outcome') != _ANOTHER_POLICY]
     done = [row for row in rows if not row['reason']]
+    known = {pair.name: pair for pair in pairs_of(result)}
+    answers = [
+        f'{word} {100.0 * (pair.after.sum() / pair.before.sum() - 1.0):+.0f} %'
+        for name, word in _ANSWERS.items()
+        if (pair := known.get(name)) and pair.before.any()
+    ]
     pairs = sorted(
-        (pair for pair in pairs_of(result) if pair.moved),
+        (pair for pair in known.values() if pair.moved),
         key=lambda pair: not any(word in pair.name for word in _OF_MOTION),
     )
     sections = [
@@ -73,7 +85,7 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: 
         sections.append(Section('another_policy', 'Another policy', [words], tables=[_reasons(others)]))
     tables = [_reasons(failed)] if failed else []
     sections.append(Section('failures', 'Failed', [] if failed else ['Nothing failed.'], tables=tables))
-    return Report(f'Fleet {name}: {question}', sections)
+    return Report(f'Fleet {name}: {", ".join(answers) or question}', sections)
 
 
 def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Section:
