@@ -5,7 +5,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from engine_mount.reports.drive.beside import MOUNTS, THIS, name_of
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.view.alternatives import Alternatives
-from engine_mount.view.feed import Feed, Message
+from engine_mount.view.feed import Feed, Message, Receive
 from engine_mount.view.state import GraphState
 from mount_recorder.automatic_marks import PAUSE
 from mount_ros.messages.event import Mark
@@ -109,12 +109,12 @@ class Model:
         feed: Feed,
         *,
         beside: bool = True,
+        receivers: Sequence[Receive] = (),
         on_failure: Callable[[], None] = lambda: None,
-        on_beside: Callable[[Message], None] = lambda message: None,
     ):
         self.failure = ''
         self.state = GraphState(namespace_of(feed), zero=feed.zero)
-        self._feed, self._on_beside, self._beside_layout = feed, on_beside, ScalarsLayout(BESIDE)
+        self._feed, self._receivers, self._beside_layout = feed, receivers, ScalarsLayout(BESIDE)
         self._motion: dict[str, tuple[float, float, int]] = {}  # mm, mm^2 and samples by the mount
         self._damped: int | None = None  # stamp of the last sample with damping, until it is off
         self._sampled = time.monotonic()  # s, when the last samples came
@@ -133,8 +133,13 @@ class Model:
             Alternatives({}).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
 
     def take(self, message: Message) -> None:
-        """Take a message; cheap, from any thread."""
+        """Take a message, for the receivers too; cheap, from any thread."""
         self._arrived.append(message)
+        self._hand_on(message)
+
+    def _hand_on(self, message: Message) -> None:
+        for receive in self._receivers:
+            receive(message)
 
     def start(self) -> None:
         """Begin to make intervals."""
@@ -274,7 +279,7 @@ class Model:
         for raw, received, sent in zip(
             rows, shaken.receive_times.tolist(), shaken.stamps.tolist(), strict=False
         ):
-            self._on_beside(Message(BESIDE, raw.tobytes(), received, sent))
+            self._hand_on(Message(BESIDE, raw.tobytes(), received, sent))
         return moved
 
 

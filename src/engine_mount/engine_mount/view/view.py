@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine_mount.view.feed import Feed, FeedError, Message, Receive, RecordedFeed
+from engine_mount.view.feed import Feed, FeedError, Receive, RecordedFeed
 from engine_mount.view.model import BESIDE, Model, namespace_of
 from mount_bringup.graph.shutdown import ending_signals
 
@@ -51,17 +51,8 @@ def running_model(
 ) -> Iterator[Model]:
     """Give the model of a feed that has begun; `receivers` get every message too, and those of `BESIDE`."""
 
-    def on_beside(message: Message) -> None:
-        for take in receivers:
-            take(message)
-
-    model = Model(feed, beside=beside, on_failure=on_failure, on_beside=on_beside)
-
-    def receive(message: Message) -> None:
-        model.take(message)
-        on_beside(message)
-
-    feed.start(receive, model.fail)
+    model = Model(feed, beside=beside, receivers=receivers, on_failure=on_failure)
+    feed.start(model.take, model.fail)
     model.start()
     try:
         yield model

@@ -133,7 +133,6 @@ def test_the_picture_shows_the_stretch_around_the_largest_difference():
     assert section.commands == ['engine-mount report a']
     given, setpoints, _ = section.chart.panels
     assert given.label == 'recorded displacement (mm)'
-    assert abs(setpoints.dots[0].x[0] - 3.001) < 1e-9
     assert (setpoints.curves[0].x[0], setpoints.curves[0].x[-1]) == pytest.approx((2.001, 4.0))
 
 
@@ -159,7 +158,6 @@ def test_in_a_closed_loop_the_picture_shows_both_motions_over_the_acceleration()
     ]
     motion, difference = chart.panels[1:3]
     assert [curve.name for curve in motion.curves] == ['as recorded', 'changed']
-    assert motion.dots[0].x[0] > 4.0
     assert difference.curves[0].y.max() == pytest.approx(50.0)
 
 

@@ -20,7 +20,7 @@ def shown(drive):
     """Return the model behind the whole drive, in intervals of 250 messages."""
     feed, messages = messages_of(drive)
     beside = []
-    model = Model(feed, on_beside=beside.append)
+    model = Model(feed, receivers=[beside.append])
     for begin in range(0, len(messages), 250):
         model.interval(messages[begin : begin + 250])
     model.beside = ScalarsLayout(BESIDE), beside

@@ -44,12 +44,13 @@ class Beside(NamedTuple):
     """{name: truth} of the other mounts at the recorded stamps (ns) within the run.
 
     A truth has `displacement` (m), `mount_force` (N) and `EXCITED` (m, m/s^2). `begin` (ns): where the
-    excitation begins.
+    excitation begins. `road` (n,): the first of `EXCITED` that moves.
     """
 
     stamps: NDArray[np.int64]
     truths: dict[str, NDArray[np.void]]
     begin: int
+    road: Array
 
 
 class _Simulated(NamedTuple):
@@ -108,9 +109,10 @@ def mounts_beside(recording: Recording, parameters: Parameters) -> Beside:
     places = first + _samples(stamps, simulated.sample_time)
     within = places < simulated.truths.shape[1]  # electronics in real time go on behind the end of the run
     truths = dict(zip(MOUNTS, simulated.truths[:, places[within]], strict=True))
+    road = next(truths['hydromount'][name] for name in EXCITED if excited[name].any())
     truths.pop(name_of(seat_of(parameters)), None)
     begin = int(stamps[0]) + (simulated.start - first) * simulated.sample_time
-    return Beside(stamps[within], truths, begin)
+    return Beside(stamps[within], truths, begin, road)
 
 
 def _recorded(recording: Recording) -> tuple[NDArray[np.int64], dict[str, Array]]:

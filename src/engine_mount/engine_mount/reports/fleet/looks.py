@@ -12,11 +12,9 @@ from engine_mount.reports.drawing.chart import (
     COLOURS,
     DASHED,
     DIFFERENCE_COLOUR,
-    LEVEL_COLOUR,
     Array,
     Chart,
     Curve,
-    Dots,
     Panel,
 )
 from engine_mount.reports.sections.section import Cell, Link, Section, Table
@@ -142,20 +140,19 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
     size = np.abs(after - before)
     place = np.nanargmax(size) if np.isfinite(size).any() else 0
     part = slice(*np.searchsorted(time, [time[place] - AROUND, time[place] + AROUND]))
-    largest = slice(place, place + 1 if size[place] > 0.0 else place)
     x, given = time[part], signals.given[part]
     if moved is None:
         curve = Curve('displacement', x, _MM * given, COLOUR_OF['displacement'])
         panels = [
             Panel('recorded displacement (mm)', [curve]),
-            *_compared('setpoint', 'A', 1.0, time, signals.setpoints, part, largest),
+            *_compared('setpoint', 'A', 1.0, time, signals.setpoints, part),
         ]
     else:
         curve = Curve('acceleration', x, given, COLOURS[2])
         setpoints = _compared('setpoint in the simulation', 'A', 1.0, time, signals.setpoints, part)
         panels = [
             Panel('recorded acceleration of the chassis (m/s²)', [curve]),
-            *_compared('simulated displacement', 'mm', _MM, time, moved, part, largest),
+            *_compared('simulated displacement', 'mm', _MM, time, moved, part),
             setpoints[0],
         ]
     origin = 'sample' if moved is None else 'acceleration'
@@ -173,24 +170,20 @@ def _compared(
     time: Array,
     pair: tuple[Array, Array],
     part: slice,
-    largest: slice | None = None,
 ) -> list[Panel]:
-    """Return two panels of a part of two signals: both, with a dot at the `largest`, and the difference."""
+    """Return two panels of a part of two signals: both, and the difference."""
     x, before, after = time[part], factor * pair[0][part], factor * pair[1][part]
     curves = [
         Curve('as recorded', x, before, COLOURS[0]),
         Curve('changed', x, after, COLOURS[1], DASHED),
     ]
-    dots = []
-    if largest is not None and largest.start < largest.stop:
-        dots = [Dots('largest difference', time[largest], factor * pair[1][largest], LEVEL_COLOUR)]
     difference, scale, shown = after - before, 1.0, unit
     if unit == 'mm':
         scale, shown = handy_unit('m', difference / _MM)
         scale /= _MM
     curve = Curve('difference', x, scale * difference, DIFFERENCE_COLOUR)
     return [
-        Panel(f'{label} ({unit})', curves, dots),
+        Panel(f'{label} ({unit})', curves),
         Panel(f'{label}, changed minus as recorded ({shown})', [curve], share=0.7),
     ]
 

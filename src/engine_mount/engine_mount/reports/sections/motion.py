@@ -10,10 +10,10 @@ import numpy as np
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.reports.drawing.chart import (
     DIFFERENCE_COLOUR,
+    POINTS,
     Array,
     Chart,
     Curve,
-    Dots,
     Level,
     Panel,
     level_lines,
@@ -35,8 +35,8 @@ from engine_mount.reports.sections.section import Cell, Link, Section, Table
 from engine_mount.reports.sections.subject import (
     Signal,
     Subject,
-    drives_apart,
     other_mounts,
+    share_road,
     shared_sentences,
 )
 
@@ -68,7 +68,6 @@ def traces(subjects: Sequence[Subject]) -> Section:
         if (reason := each.run.without_friction)
     ]
     words += shared_sentences(subjects, without)
-    same_road = drives_apart(subjects) is not None
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
@@ -103,7 +102,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
     moved = {each.name if several else each.mount: each['displacement'] for each in subjects}
     peaks = {name: each.peak() for name, each in {**moved, **others}.items() if each is not None}
     _, at = next(iter(peaks.values()), (0.0, math.nan))
-    if same_road and math.isfinite(at):
+    if share_road(subjects) and math.isfinite(at):
         told = f'Largest displacement: {peaks_text({name: peak for name, (peak, _) in peaks.items()})}'
         words.insert(0, f'{told}. One second round it is shown first.')
         view = max(limits[0], at - BEFORE), min(limits[1], at + AFTER)
@@ -147,12 +146,9 @@ def hysteresis(subjects: Sequence[Subject]) -> Section:
     """Return mount force and friction force over displacement, as in Fig. 13 left."""
     groups: dict[str, list[Curve]] = {'mount force': [], 'friction force': []}
     said = []
-    event, later = _loop_stretch(subjects[0]), drives_apart(subjects) or []
-    for place, subject in enumerate(subjects):
-        stretch, how = _loop_stretch(subject)
-        if stretch and later and event[0]:  # of one road all show the same event
-            begin, end = (time + later[place] for time in event[0])
-            stretch, how = (begin, end), f'{event[1]} of {subjects[0].name}' if later[place] else event[1]
+    event, same_road = _loop_stretch(subjects[0]), share_road(subjects)
+    for subject in subjects:
+        stretch, how = event if same_road else _loop_stretch(subject)  # on one road the same event
         drawn = False
         for what, curves in groups.items():
             force = None if what == 'friction force' and subject.run.without_friction else subject[what]
@@ -163,7 +159,7 @@ def hysteresis(subjects: Sequence[Subject]) -> Section:
                 drawn = True
         said.append((subject, how if drawn else 'no force was recorded'))
     for force in _others(subjects, 'mount force'):
-        moved = subjects[0].others('displacement')[force.name]
+        moved = other_mounts(subjects, 'displacement')[force.name]
         x, y, _ = _together(moved, Signal(force.x, force.y), event[0])
         groups['mount force'].append(replace(force, x=_MM * x, y=y))
     panels = [Panel(f'{what} (N)', curves[::-1]) for what, curves in groups.items() if curves]
@@ -189,7 +185,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         amplitudes = harmonics_of(time[inside], y[inside], sine.frequency)
         numbers = np.arange(1.0, len(amplitudes) + 1.0)
         curve = subject.curve('mount force', numbers, decibels(amplitudes))
-        dots.append(Dots(curve.name, curve.x, curve.y, curve.colour))
+        dots.append(replace(curve, dash=POINTS))
         rows.append(
             (
                 subject.name,
@@ -208,8 +204,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
     title, words = 'Harmonics of the mount force', shared_sentences(subjects, said)
     if not rows:
         return Section('harmonics', title, words)
-    panels = [Panel('amplitude above 1 N (dB)', dots=dots)]
-    chart = Chart('harmonics', title, 'harmonic', panels, ticks=dots[0].x.tolist())
+    chart = Chart('harmonics', title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots)])
     return Section('harmonics', title, words, chart, [Table(head, rows)])
 
 

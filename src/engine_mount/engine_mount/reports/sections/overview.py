@@ -22,7 +22,7 @@ from engine_mount.reports.sections.section import (
     Table,
     moment,
 )
-from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
+from engine_mount.reports.sections.subject import Signal, Subject, other_mounts, shared_sentences
 
 
 def overview(subjects: Sequence[Subject]) -> Section:
@@ -123,7 +123,7 @@ def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
         return float(np.std(known)) if len(known) else math.nan
 
     def against(own: Signal, quantity: str, unit: str, figure: Callable[[Signal], float]) -> str:
-        others = {name: figure(signal) for name, signal in subject.others(quantity).items()}
+        others = {name: figure(signal) for name, signal in other_mounts([subject], quantity).items()}
         changes = (
             f'{_change(figure(own), other)} {name} ({quantity_text(other, unit)})'
             for name, other in others.items()

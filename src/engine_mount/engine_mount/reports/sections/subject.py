@@ -29,7 +29,7 @@ from engine_mount.reports.drawing.chart import (
     Curve,
     look_of,
 )
-from engine_mount.reports.drive.beside import EXCITED, Beside, BesideError, mounts_beside, name_of
+from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
 from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
 from engine_mount.reports.sections.periodic import Sine, dominant_sine
@@ -65,13 +65,6 @@ QUANTITIES = {
     'damping': ((CONTROL_TRACE.name, 'damping_active'),),
 }
 """Topic and column of what a report shows, in SI units; of several the first that was recorded."""
-_BESIDE = {
-    'displacement': 'displacement',
-    'true displacement': 'displacement',
-    'mount force': 'mount_force',
-    'acceleration': 'chassis_acceleration',
-}
-"""{quantity: its name in the truth of a mount beside the drive}."""
 _NEEDED: dict[str, set[str]] = {topic: set(columns) for topic, columns in DRIVE_COLUMNS.items()}
 """{topic: columns}, read in one pass."""
 for _places in QUANTITIES.values():
@@ -180,22 +173,6 @@ class Subject:
         if self.run.without_friction or degree is None or not self.damping:
             return None
         return Curve('degree of damping', degree.time, degree.values, SPAN_COLOUR)
-
-    def others(self, quantity: str) -> dict[str, Signal]:
-        """Return {name: signal} of the mounts beside it, none where they cannot be computed."""
-        if isinstance(beside := self.beside, str) or quantity not in _BESIDE:
-            return {}
-        time = self.seconds(beside.stamps)
-        return {name: Signal(time, truth[_BESIDE[quantity]]) for name, truth in beside.truths.items()}
-
-    @functools.cached_property
-    def road(self) -> Signal | None:
-        """What excites it, from the beginning of that on, None where it is not known."""
-        if isinstance(beside := self.beside, str):
-            return None
-        truth = next(iter(beside.truths.values()))[(since := beside.stamps >= beside.begin)]
-        found = next((truth[name] for name in EXCITED if truth[name].any()), None)
-        return None if found is None else Signal(self.seconds(beside.stamps[since]), found)
 
     @functools.cached_property
     def session(self) -> str:
@@ -369,28 +346,24 @@ class Subject:
         return None
 
 
-def drives_apart(subjects: Sequence[Subject]) -> list[float] | None:
-    """Return how much later (s) the road of each begins than that of the first, None for other roads."""
-    if len(subjects) == 1:
-        return [0.0]
-    roads = [each.road for each in subjects]
-    first, found = roads[0], []
-    for road in roads:
-        if road is None or first is None:
-            return None
-        count = min(len(road.values), len(first.values))
-        if not count or not np.array_equal(road.values[:count], first.values[:count]):
-            return None
-        found.append(float(road.time[0] - first.time[0]))
-    return found
+def share_road(subjects: Sequence[Subject]) -> bool:
+    """Return whether all are on one road, as far as each was recorded; one is on its own."""
+    roads = [each.beside.road for each in subjects if not isinstance(each.beside, str)]
+    count = min(map(len, roads), default=0)
+    same = len(roads) == len(subjects) and all(
+        np.array_equal(each[:count], roads[0][:count]) for each in roads
+    )
+    return same or len(subjects) == 1
 
 
 def other_mounts(subjects: Sequence[Subject], quantity: str) -> dict[str, Signal]:
     """Return {name: signal} of the computed mounts on the road of all recordings that none of these has."""
-    if drives_apart(subjects) is None:
+    beside, column = subjects[0].beside, dict(QUANTITIES[quantity]).get(_TRUTH)
+    if isinstance(beside, str) or column is None or not share_road(subjects):
         return {}
-    recorded = {each.mount for each in subjects}
-    return {name: each for name, each in subjects[0].others(quantity).items() if name not in recorded}
+    time, recorded = subjects[0].seconds(beside.stamps), {each.mount for each in subjects}
+    others = beside.truths.items()
+    return {name: Signal(time, truth[column]) for name, truth in others if name not in recorded}
 
 
 def shared_sentences(subjects: Sequence[Subject], remarks: Sequence[tuple[Subject, str]]) -> list[str]:

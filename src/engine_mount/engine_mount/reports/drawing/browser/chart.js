@@ -85,7 +85,7 @@ function build(place, spec) {
 function builtPanel(chart, spec) {
   const legend = add(chart.place, 'div', 'legend');
   add(legend, 'b', '', spec.label);
-  const lines = [...spec.curves.map(withNumbers), ...spec.dots.map((dots) => ({ ...withNumbers(dots), dash: 'point' }))];
+  const lines = spec.curves.map(withNumbers);
   for (const line of lines) {
     line.chip = add(legend, 'button', 'chip');
     line.chip.type = 'button';
@@ -113,7 +113,7 @@ function wholeOf({ spec, panels }) {
   let low = Infinity, high = -Infinity;
   for (const { lines } of panels) for (const { x } of lines) for (const value of x) { low = Math.min(low, value); high = Math.max(high, value); }
   if (!(low < high)) return isFinite(low) ? [low - 0.5, low + 0.5] : [0, 1];
-  const room = spec.panels.some(({ dots }) => dots.length) ? 0.02 * (high - low) : 0;
+  const room = panels.some(({ lines }) => lines.some(({ dash }) => dash === 'point')) ? 0.02 * (high - low) : 0;
   return [low - room, high + room];
 }
 
@@ -208,9 +208,8 @@ function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, las
     stroke(paint, LEFT, y, right, y);
     paint.fillText(Number(spec.log ? (10 ** value).toPrecision(2) : value.toPrecision(6)), LEFT - 6, y);
   }
-  const given = chart.spec.ticks, ticks = given.length && given.length <= width / 40 ? given : ticksOf(from, to, width / 90);
   paint.textBaseline = 'top';
-  for (const tick of ticks) {
+  for (const tick of ticksOf(from, to, width / 90)) {
     const at = Math.round(x(tick)) + 0.5, edge = at > right - 8; // of the page, where the number is whole too
     if (at < LEFT || at > right + 1) continue;
     stroke(paint, at, TOP, at, bottom);
@@ -234,7 +233,7 @@ function paintLevels(paint, levels, { y, right }) {
 
 function paintCurve(paint, curve, area, [from, to]) {
   paint.strokeStyle = colourOf(curve.colour);
-  paint.lineWidth = curve.width; paint.lineJoin = 'round';
+  paint.lineWidth = 1.6; paint.lineJoin = 'round';
   paint.setLineDash(DASHES[curve.dash]);
   paint.beginPath();
   const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
