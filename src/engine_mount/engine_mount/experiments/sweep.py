@@ -67,8 +67,7 @@ def run(order: Order) -> Findings:
         'switch_on_level_m': level,
         'runs': runs,
     }
-    pictures = {'sweep': draw_sweep(drives), 'sweep_peaks': draw_peaks(drives)}
-    return Findings(figures, pictures, [each.recording for each in drives.values()])
+    return Findings(figures, {'sweep': draw_sweep(drives)}, [each.recording for each in drives.values()])
 
 
 def _frequency(drive: DriveSignals) -> FloatArray:
@@ -168,31 +167,18 @@ def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
         (panels[0], 'displacement, envelope (mm)', 1e3, 'displacement'),
         (panels[1], 'chassis acceleration,\nenvelope (m/s$^2$)', 1.0, 'chassis_acceleration'),
     ):
-        for mount, colour in ((HYDRO, HYDRO_LINE['color']), (FRICTION, BLUE)):
+        for mount, style in (
+            (OFF, OFF_LINE),
+            (HYDRO, HYDRO_LINE),
+            (ALWAYS, {'color': COLOURS[1]}),
+            (FRICTION, {'color': BLUE}),
+        ):
             drive = drives[mount]
             envelope = highest_per_band(_frequency(drive), scale * getattr(drive.truth, name), 0.25)
-            axes.plot(*envelope, color=colour, linewidth=1.2, label=mount)
+            axes.plot(*envelope, label=mount, **style)
         axes.set_ylabel(label)
     panels[1].set_xlabel('frequency of the road (Hz)')
     panels[0].legend(loc='upper right')
-    return figure
-
-
-def draw_peaks(drives: dict[str, DriveSignals]) -> Any:
-    """Draw the largest displacement in each band of 1 Hz, for all mounts on the road alone."""
-    figure, axes = new_panels('Front wheels on a sweep: largest displacement of the mount over frequency')
-    for name, style in (
-        (OFF, OFF_LINE),
-        (HYDRO, HYDRO_LINE),
-        (ALWAYS, {'color': COLOURS[1]}),
-        (FRICTION, {'color': BLUE}),
-    ):
-        drive = drives[name]
-        middle, highest = highest_per_band(_frequency(drive), 1e3 * drive.truth.displacement, 0.5)
-        shown = middle <= 20.0
-        axes.plot(middle[shown], highest[shown], label=name, **style)
-    axes.set(xlabel='frequency of the road (Hz)', ylabel='largest displacement (mm)')
-    axes.legend()
     return figure
 
 

@@ -64,7 +64,7 @@ def test_a_picture_shows_the_first_view_the_whole_below_and_a_shade_by_its_degre
     x = np.arange(20_000.0)
     y = np.where(x == 7777.0, 50.0, np.sin(x))
     dots = Curve('largest', x[:1], y[:1], dash=POINTS)
-    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y, steps=True), dots], [Level('on', 40.0)])
+    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y), dots], [Level('on', 40.0)])
     shade = Curve('degree', x, np.where(x < 10_000.0, 0.5, 1.0), '#000000')
     chart = Chart('c', 'c', 'x (s)', [panel, Panel('z (N)', [Curve('z', x, y)])], shade, (0.0, 20_000.0))
     heights = []

@@ -56,7 +56,6 @@ class Curve:
     y: Array
     colour: str = COLOURS[0]
     dash: str = SOLID
-    steps: bool = False  # holds each value until the next point
     key: str = ''  # of the signal that the live view adds
 
 

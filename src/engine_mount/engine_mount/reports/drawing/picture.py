@@ -54,8 +54,7 @@ def draw_chart(chart: Chart, *files: Path) -> None:
 def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | None) -> None:
     for curve in panel.curves:
         x, y = _shown(curve, limits)
-        steps = 'steps-post' if curve.steps else 'default'
-        style: Any = {'linestyle': curve.dash, 'linewidth': _LINE, 'drawstyle': steps}
+        style: Any = {'linestyle': curve.dash, 'linewidth': _LINE}
         if curve.dash == POINTS:
             style = {'linestyle': 'none', 'marker': 'o', 'markersize': 5}
         axes.plot(x, y, color=curve.colour, label=curve.name, **style)

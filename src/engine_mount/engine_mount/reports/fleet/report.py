@@ -44,6 +44,7 @@ _ASKED = {
     ),
 }
 _ANSWERS = {
+    'peak_displacement_m': 'largest displacement',
     'rms_displacement_m': 'rms displacement',
     'mean_current_a': 'mean current',
     'pad_energy_j': 'wear',
@@ -99,7 +100,7 @@ def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Sec
     findings = [
         _recordings(rows, done, failed, 'simulated' if is_simulated else 'replayed'),
         _differing(done),
-        _motion(rows) if is_simulated else _trusted(rows),
+        *([] if is_simulated else [_trusted(rows)]),
     ]
     tables = [Table(('parameter', 'changed to'), parameters)] if parameters else []
     return Section('overview', 'Overview', words, findings=findings, tables=tables)
@@ -140,24 +141,6 @@ def _trusted(rows: Rows) -> Finding:
             f'{quantity(largest, "A")}: they were recorded with other parameters, another version, or losses',
         )
     return Finding('Replay without the change', judgement, [text])
-
-
-def _motion(rows: Rows) -> Finding:
-    """Tell in how many drives the change makes the largest displacement larger, and where most."""
-    grown = {
-        _name(row): after - before
-        for row in rows
-        if (before := row.get('peak_displacement_m')) is not None
-        and (after := row.get('peak_displacement_changed_m')) is not None
-    }
-    larger, smaller = (sum(sign * by > 0.0 for by in grown.values()) for sign in (1.0, -1.0))
-    judgement, text = GOOD, f'larger in {larger}, smaller in {smaller} of {len(grown)} rows'
-    if not grown:
-        judgement, text = UNKNOWN, 'no drive could be simulated'
-    elif larger:
-        most = max(grown, key=lambda name: grown[name])
-        judgement, text = LOOK, f'{text}; grows most in {most}: {quantity(grown[most], "m", signed=True)}'
-    return Finding('Largest displacement', judgement, [text])
 
 
 def _reasons(rows: Rows) -> Table:

@@ -238,16 +238,16 @@ function paintCurve(paint, curve, area, [from, to]) {
   paint.beginPath();
   const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
   const end = rising ? Math.min(x.length, placeOf(x, to) + 2) : x.length;
-  let drawn = false, before = 0, column = NaN, highest = 0, lowest = 0;
+  let drawn = false, column = NaN, highest = 0, lowest = 0;
   for (let place = begin; place < end; place += 1) {
     if (isNaN(y[place])) { drawn = false; continue; }
     const across = area.x(x[place]), down = area.y(y[place]);
     if (!drawn) paint.moveTo(across, down);
     else if (rising && Math.floor(across) === column && down >= highest && down <= lowest) continue; // covered in this column of pixels
-    else { if (curve.steps) paint.lineTo(across, before); paint.lineTo(across, down); }
+    else paint.lineTo(across, down);
     if (Math.floor(across) !== column || !drawn) { column = Math.floor(across); highest = lowest = down; }
     highest = Math.min(highest, down); lowest = Math.max(lowest, down);
-    before = down; drawn = true;
+    drawn = true;
   }
   paint.stroke();
   paint.setLineDash([]);
