@@ -39,7 +39,6 @@ class Feed(Protocol):
     topics: Mapping[str, Topic]
     title: str
     zero: int | None  # the stamp (ns) at which time begins; None: the first that comes
-    ended: bool  # nothing comes any more
 
     def start(self, receive: Receive, on_failure: Fail) -> None:
         """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
@@ -67,7 +66,6 @@ class RecordedFeed:
         self.title = f'{recording.short_name} at {rate:g} x'
         part.load(self.topics)
         self.zero: int | None = part.time_axis.zero
-        self.ended = False
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
         times = [series.receive_times for _, series in self._series]
         if not sum(map(len, times)):
@@ -126,4 +124,3 @@ class RecordedFeed:
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1
-        self.ended = due == len(self)

@@ -114,7 +114,7 @@ class Model:
     ):
         self.failure = ''
         self.state = GraphState(namespace_of(feed), zero=feed.zero)
-        self._feed, self._receivers, self._beside_layout = feed, receivers, ScalarsLayout(BESIDE)
+        self._receivers, self._beside_layout = receivers, ScalarsLayout(BESIDE)
         self._motion: dict[str, tuple[float, float, int]] = {}  # mm, mm^2 and samples by the mount
         self._damped: int | None = None  # stamp of the last sample with damping, until it is off
         self._sampled = time.monotonic()  # s, when the last samples came
@@ -187,8 +187,8 @@ class Model:
             {'name': f'{name}: peak, rms', 'value': f'{peak:.2f}, {math.sqrt(squares / count):.3f} mm'}
             for name, (peak, squares, count) in reversed(list(self._motion.items()))
         ]
-        waiting = f'no sample for {still:.0f} s' if still > _STILL else ''
-        return {**found, 'values': motion + found['values'], 'end': 'ended' if self._feed.ended else waiting}
+        end = f'ended: no sample for {still:.0f} s' if still > _STILL else ''
+        return {**found, 'values': motion + found['values'], 'end': end}
 
     def interval(self, messages: list[Message]) -> Interval:
         """Make an interval of what has arrived since the last one, and keep it if it shows anything."""
@@ -213,13 +213,10 @@ class Model:
         extents = {key: (float(v.min()), float(v.max())) for key, v in known.items() if v.size}
         for trace in self.traces:
             if trace.panel == 'displacement' and trace.key in extents:
-                values, (peak, squares, count) = (
-                    known[trace.key],
-                    self._motion.get(trace.label, (0.0, 0.0, 0)),
-                )
-                squares += float(np.sum(values * values))
-                peak = max(peak, -extents[trace.key][0], extents[trace.key][1])
-                self._motion[trace.label] = peak, squares, count + len(values)
+                moved = np.abs(known[trace.key])
+                peak, squares, count = self._motion.get(trace.label, (0.0, 0.0, 0))
+                squares += float(np.sum(moved * moved))
+                self._motion[trace.label] = max(peak, float(moved.max())), squares, count + len(moved)
         interval = Interval(self._number, self.state.time, extents)
         if extents:
             self.intervals.append(interval)
@@ -272,14 +269,11 @@ class Model:
                 return {}
         accelerations = _column(series, SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
         shaken = series[SIM_CHASSIS_ACCELERATION]
-        moved = self.alternatives.advance(shaken.stamps.tolist()[: len(accelerations)], accelerations)
-        rows = self._beside_layout.pack_rows(
-            shaken.stamps[: len(accelerations)], np.stack([*moved.values()], 1)
-        )
-        for raw, received, sent in zip(
-            rows, shaken.receive_times.tolist(), shaken.stamps.tolist(), strict=False
-        ):
-            self._hand_on(Message(BESIDE, raw.tobytes(), received, sent))
+        stamps = shaken.stamps.tolist()
+        moved = self.alternatives.advance(stamps[: len(accelerations)], accelerations)
+        columns = shaken.receive_times.tolist(), stamps, *(each.tolist() for each in moved.values())
+        for received, stamp, *row in zip(*columns, strict=False):
+            self._hand_on(Message(BESIDE, self._beside_layout.pack(stamp, row), received, stamp))
         return moved
 
 

@@ -33,7 +33,7 @@ class RunningGraph:
         self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
         self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
         self.zero: int | None = None
-        self.ended = self._stopped = False
+        self._stopped = False
 
     def start(self, receive: Receive, on_failure: Fail) -> None:
         """Begin to take messages."""

@@ -62,12 +62,6 @@ def traces(subjects: Sequence[Subject]) -> Section:
     shade = next(filter(None, (each.shade for each in subjects)), None)
     levels: dict[str, float] = next((each.run.levels for each in subjects if each.run.levels), {})
     words = [f'Shaded: the degree of damping in {first.name}.'] if several and shade else []
-    without = [
-        (each, f'current is not applicable: {reason}')
-        for each in subjects
-        if (reason := each.run.without_friction)
-    ]
-    words += shared_sentences(subjects, without)
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
