@@ -48,38 +48,25 @@ def quantity(value: float, unit: str, *, signed: bool = False) -> str:
     return ' '.join(filter(None, (number(factor * value, signed=signed), shown)))
 
 
-_AT = 'at'  # a time is told to 1 ms, as samples are
-_SWITCHINGS = ('switchings_appeared', 'switchings_vanished', 'switchings_moved')
-_DAMPING = (
-    ('switchings appeared, vanished, moved', '', _SWITCHINGS),
-    ('energy in the pads', 'J', ('pad_energy_j', 'pad_energy_changed_j')),
-)
-_SETPOINT, _MOTION = 'setpoint_difference', 'displacement_difference'
 _COLUMNS = {
-    'setpoints': (
-        ('largest difference of the setpoints', 'A', (f'{_SETPOINT}_largest_a',)),
-        (_AT, 's', (f'{_SETPOINT}_largest_at_s',)),
-        ('rms of it', 'A', (f'{_SETPOINT}_rms_a',)),
-        *_DAMPING,
-    ),
-    'displacement': (
-        ('largest difference of the displacements', 'm', (f'{_MOTION}_largest_m',)),
-        (_AT, 's', (f'{_MOTION}_largest_at_s',)),
-        ('rms of it', 'm', (f'{_MOTION}_rms_m',)),
-        ('largest displacement', 'm', ('peak_displacement_m', 'peak_displacement_changed_m')),
-        ('largest force', 'N', ('peak_mount_force_n', 'peak_mount_force_changed_n')),
-        *_DAMPING,
-    ),
+    'setpoints': {
+        'setpoint_difference_largest_a': ('largest difference of the setpoints', 'A'),
+        'setpoint_difference_largest_at_s': ('at', 's'),
+    },
+    'displacement': {
+        'displacement_difference_largest_m': ('largest difference of the displacements', 'm'),
+        'displacement_difference_largest_at_s': ('at', 's'),
+    },
 }
-"""What is told of a row, by what was asked: head, unit in the result, columns (two: before and after)."""
+"""{question: {column of the result: head, unit}} of the worst; few, so that they fit a narrow page."""
 
 
-def _text(value: float | int | None, factor: float, name: str, is_time: bool) -> str:
-    if value is None:
-        return ''
-    if isinstance(value, int):
-        return str(value)
-    return f'{value:.3f}' if is_time else number(factor * value, signed='difference_largest' in name)
+def _text(value: float | int | None, factor: float, name: str) -> str:
+    if value is None or isinstance(value, int):
+        return '' if value is None else str(value)
+    if name.endswith('_at_s'):  # to 1 ms, as samples are
+        return f'{value:.3f}'
+    return number(factor * value, signed='difference_largest' in name)
 
 
 AROUND = 1.0
@@ -198,23 +185,18 @@ def worst_section(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> S
         (str(place), Link(look.name, f'look_{place}'), *cells)
         for place, (look, *cells) in enumerate(zip(looks, *columns, strict=True), 1)
     ]
-    words = [f'The largest absolute values of {by}; a → b: as recorded and with the change.']
+    words = [f'The largest absolute values of {by}.']
     return Section('worst', 'Worst', words, tables=[Table(('', 'recording', *heads), rows)])
 
 
 def _columns(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> Iterator[tuple[str, list[str]]]:
     """Yield head and cells of each column, that by which the worst were chosen first."""
     rows = [look.row for look in looks]
-    columns = _COLUMNS.get(rows[0].get('asked', ''), _DAMPING)
-    if all(names != (by,) for _, _, names in columns):
-        columns = ((by, (schema.field(by).metadata or {}).get(b'unit', b'').decode(), (by,)), *columns)
-    for head, unit, names in columns:
-        values = [row[name] for row in rows for name in names if row.get(name) is not None]
-        if not values:
-            continue
-        factor, shown = handy_unit(unit, values)
-        between = ', ' if names is _SWITCHINGS else '\u00a0→\u00a0'
-        cells = [
-            between.join(_text(row.get(name), factor, name, head == _AT) for name in names) for row in rows
-        ]
-        yield f'{head} ({shown})' if shown else head, cells
+    unit = (schema.field(by).metadata or {}).get(b'unit', b'').decode()
+    columns = {by: (by, unit), **_COLUMNS.get(rows[0].get('asked', ''), {})}
+    for name, (head, unit) in columns.items():
+        values = [row[name] for row in rows if row.get(name) is not None]
+        if values:
+            factor, shown = handy_unit(unit, values)
+            cells = [_text(row.get(name), factor, name) for row in rows]
+            yield f'{head} ({shown})' if shown else head, cells

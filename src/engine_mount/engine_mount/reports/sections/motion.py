@@ -59,9 +59,9 @@ def traces(subjects: Sequence[Subject]) -> Section:
     second less the first stands below each.
     """
     first, last, several = subjects[0], subjects[-1], len(subjects) > 1
-    shade = next(filter(None, (each.shade for each in subjects)), None)
+    shaded = next((each for each in subjects if each.shade), first)
     levels: dict[str, float] = next((each.run.levels for each in subjects if each.run.levels), {})
-    words = [f'Shaded: the degree of damping in {first.name}.'] if several and shade else []
+    words = [f'Shaded: the degree of damping in {shaded.name}.'] if several and shaded.shade else []
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
@@ -92,7 +92,7 @@ def traces(subjects: Sequence[Subject]) -> Section:
     if last.comparison is not None:
         words.append(f'B - A: {last.name} less {first.name}.')
     title, limits = 'Displacement and current', (min(ends), max(ends))
-    chart = Chart('time_traces', title, TIME_LABEL, panels, shade, limits)
+    chart = Chart('time_traces', title, TIME_LABEL, panels, shaded.shade, limits)
     moved = {each.name if several else each.mount: each['displacement'] for each in subjects}
     peaks = {name: each.peak() for name, each in {**moved, **others}.items() if each is not None}
     _, at = next(iter(peaks.values()), (0.0, math.nan))
@@ -198,7 +198,8 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
     title, words = 'Harmonics of the mount force', shared_sentences(subjects, said)
     if not rows:
         return Section('harmonics', title, words)
-    chart = Chart('harmonics', title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots)])
+    limits = 0.9, len(dots[0].x) + 0.1
+    chart = Chart('harmonics', title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots)], limits=limits)
     return Section('harmonics', title, words, chart, [Table(head, rows)])
 
 

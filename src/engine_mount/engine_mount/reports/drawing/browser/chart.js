@@ -113,8 +113,7 @@ function wholeOf({ spec, panels }) {
   let low = Infinity, high = -Infinity;
   for (const { lines } of panels) for (const { x } of lines) for (const value of x) { low = Math.min(low, value); high = Math.max(high, value); }
   if (!(low < high)) return isFinite(low) ? [low - 0.5, low + 0.5] : [0, 1];
-  const room = panels.some(({ lines }) => lines.some(({ dash }) => dash === 'point')) ? 0.02 * (high - low) : 0;
-  return [low - room, high + room];
+  return [low, high];
 }
 
 // ---- drawing
