@@ -1,5 +1,6 @@
 """How a figure is spread over a fleet, before and after the change."""
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,8 @@ from engine_mount.reports.sections.section import Section
 if TYPE_CHECKING:
     import pyarrow
 
+_OF_ONE_SIDE = re.compile(r',?( simulated)? as recorded( \(--closed-loop\))?')
+"""What the meaning of a column says that stands for both sides here."""
 _MOST_BINS = 30  # chosen
 
 
@@ -68,7 +71,7 @@ def spread(pair: Pair) -> Section:
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
     moved = np.count_nonzero(both[0] != both[1])
     words = [
-        f'{_capital(pair.meaning)}: column {pair.name}. '
+        f'{_capital(_OF_ONE_SIDE.sub("", pair.meaning))}, in the column {pair.name}. '
         f'{moved} of {len(pair.before)} rows have another value with the change.'
     ]
     return Section(pair.name, _capital(title), words, chart, half=True)
