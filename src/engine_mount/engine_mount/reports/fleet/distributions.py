@@ -67,7 +67,7 @@ def spread(pair: Pair) -> Section:
     for (name, colour, dash), values in zip(looks, both, strict=True):
         counts = np.histogram(values, edges)[0].astype(np.float64)
         curves.append(Curve(name, np.repeat(edges, 2)[1:-1], np.repeat(counts, 2), colour, dash))
-    panels, limits = [Panel('number of rows', curves)], (edges[0], edges[-1])
+    panels, limits = [Panel('number of rows', curves, least=[0.0])], (edges[0], edges[-1])
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
     moved = np.count_nonzero(both[0] != both[1])
     words = [
