@@ -99,7 +99,7 @@ def test_the_page_tells_what_was_asked_what_failed_and_what_did_not_move():
     told = {
         finding.what: (finding.judgement, str(finding.text[0])) for finding in sections['overview'].findings
     }
-    assert told['Recordings'][0] == 'look'
+    assert told['Recordings'][0] == 'have a look'
     assert told['Replay without the change'] == (
         'bad',
         'does not give the recorded setpoints of 1 of 3 rows, by up to 0.0200 A: they were recorded with '

@@ -49,9 +49,8 @@ def _section(section: Section, budget: int) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    judged = finding.judgement.replace('look', 'have a look')
-    text = ' '.join(map(_cell, finding.text))
-    return f'<li class="{finding.judgement}"><b>{escape(finding.what)} <i>({judged})</i></b>{text}</li>'
+    text, judged = ' '.join(map(_cell, finding.text)), finding.judgement
+    return f'<li class="{judged}"><b>{escape(finding.what)} <i>({judged})</i></b>{text}</li>'
 
 
 def _cell(cell: Cell) -> str:

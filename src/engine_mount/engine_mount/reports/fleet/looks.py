@@ -128,51 +128,38 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
     place = np.nanargmax(size) if np.isfinite(size).any() else 0
     part = slice(*np.searchsorted(time, [time[place] - AROUND, time[place] + AROUND]))
     x, given = time[part], signals.given[part]
+
+    def compared(label: str, unit: str, pair: tuple[Array, Array]) -> list[Panel]:
+        """Return two panels: both, and the difference."""
+        one, other = (each[part] for each in pair)
+        (factor, shown), (scale, small) = handy_unit(unit, [*one, *other]), handy_unit(unit, other - one)
+        curves = [
+            Curve('as recorded', x, factor * one, COLOURS[0]),
+            Curve('changed', x, factor * other, COLOURS[1], DASHED),
+        ]
+        left = [Curve('difference', x, scale * (other - one), DIFFERENCE_COLOUR)]
+        title = f'{label}, changed minus as recorded ({small})'
+        return [Panel(f'{label} ({shown})', curves), Panel(title, left, share=0.7)]
+
     if moved is None:
         curve = Curve('displacement', x, _MM * given, COLOUR_OF['displacement'])
         panels = [
             Panel('recorded displacement (mm)', [curve]),
-            *_compared('setpoint', 'A', 1.0, time, signals.setpoints, part),
+            *compared('setpoint', 'A', signals.setpoints),
         ]
     else:
         curve = Curve('acceleration', x, given, COLOURS[2])
-        setpoints = _compared('setpoint in the simulation', 'A', 1.0, time, signals.setpoints, part)
         panels = [
             Panel('recorded acceleration of the chassis (m/s²)', [curve]),
-            *_compared('simulated displacement', 'mm', _MM, time, moved, part),
-            setpoints[0],
+            *compared('simulated displacement', 'm', moved),
+            compared('setpoint in the simulation', 'A', signals.setpoints)[0],
         ]
     origin = 'sample' if moved is None else 'acceleration'
     # at first what is around the difference is seen, and nothing beyond the ends of the recording
     begin = min(time[place] - AT_FIRST, time[-1] - 2.0 * AT_FIRST)
     begin = max(begin, time[0])
     view = begin, min(begin + 2.0 * AT_FIRST, time[-1])
-    return Chart(name, title, f'time from the first {origin} (s)', panels, view=view)
-
-
-def _compared(
-    label: str,
-    unit: str,
-    factor: float,
-    time: Array,
-    pair: tuple[Array, Array],
-    part: slice,
-) -> list[Panel]:
-    """Return two panels of a part of two signals: both, and the difference."""
-    x, before, after = time[part], factor * pair[0][part], factor * pair[1][part]
-    curves = [
-        Curve('as recorded', x, before, COLOURS[0]),
-        Curve('changed', x, after, COLOURS[1], DASHED),
-    ]
-    difference, scale, shown = after - before, 1.0, unit
-    if unit == 'mm':
-        scale, shown = handy_unit('m', difference / _MM)
-        scale /= _MM
-    curve = Curve('difference', x, scale * difference, DIFFERENCE_COLOUR)
-    return [
-        Panel(f'{label} ({unit})', curves),
-        Panel(f'{label}, changed minus as recorded ({shown})', [curve], share=0.7),
-    ]
+    return Chart(name, title, f'seconds from the first {origin}', panels, view=view)
 
 
 def worst_section(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> Section:

@@ -9,11 +9,6 @@ function show(chart, from, to) { // at most all of it, at least a ten-thousandth
   draw(chart);
 }
 
-function zoom(chart, factor) {
-  const [from, to] = chart.shown, rest = 0.5 * (1 - factor) * (to - from);
-  show(chart, from + rest, to - rest);
-}
-
 function read(chart, x) { // one line through all panels over the same axis
   for (const other of charts) {
     if (other !== chart && !(other.spec.x_label === chart.spec.x_label && chart.spec.x_label.startsWith('time'))) continue;
@@ -21,13 +16,12 @@ function read(chart, x) { // one line through all panels over the same axis
   }
 }
 
-function shareAt(chart, event) { // of the width of the drawing area
-  const box = chart.panels[0].canvas.getBoundingClientRect();
-  return Math.min(1, Math.max(0, (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT)));
-}
-
 function listen(chart) {
-  const { place } = chart, at = (event) => chart.shown[0] + shareAt(chart, event) * (chart.shown[1] - chart.shown[0]);
+  const { place } = chart;
+  const at = (event) => {
+    const box = chart.panels[0].canvas.getBoundingClientRect(), [from, to] = chart.shown;
+    return Math.min(to, Math.max(from, from + ((to - from) * (event.clientX - box.left - LEFT)) / (box.width - LEFT - RIGHT)));
+  };
   const onCanvas = (kind, act) => place.addEventListener(kind, (event) => { if (event.target.tagName === 'CANVAS') act(event); });
   let begun = null;
   onCanvas('pointerdown', (event) => {
@@ -55,9 +49,10 @@ function listen(chart) {
 function press(chart, event) {
   if (event.target !== chart.place || event.ctrlKey || event.metaKey || event.altKey) return;
   const [from, to] = chart.shown, spike = chart.spike === null ? (from + to) / 2 : chart.spike;
-  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : show(chart, from + 0.2 * way * (to - from), to + 0.2 * way * (to - from)));
+  const move = (first, second) => show(chart, from + first * (to - from), to + second * (to - from));
+  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : move(0.2 * way, 0.2 * way));
   const acts = {
-    ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => zoom(chart, 0.5), '-': () => zoom(chart, 2),
+    ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => move(0.25, -0.25), '-': () => move(-0.5, 0.5),
     0: () => show(chart, ...chart.whole), Escape: () => read(chart, null),
   };
   if (!acts[event.key]) return;
