@@ -208,7 +208,6 @@ class Model:
             self.state.time = (int(stamps[-1]) - zero) * 1e-9
             self._sampled = time.monotonic()
         self._watch_damping(series)
-        self._number += 1
         known = {key: values[np.isfinite(values)] for key, values in found.items()}
         extents = {key: (float(v.min()), float(v.max())) for key, v in known.items() if v.size}
         for trace in self.traces:
@@ -217,6 +216,7 @@ class Model:
                 peak, squares, count = self._motion.get(trace.label, (0.0, 0.0, 0))
                 squares += float(np.sum(moved * moved))
                 self._motion[trace.label] = max(peak, float(moved.max())), squares, count + len(moved)
+        self._number += bool(extents)  # an empty one is no gap in a line
         interval = Interval(self._number, self.state.time, extents)
         if extents:
             self.intervals.append(interval)

@@ -62,7 +62,7 @@ class Web:
         """What to type into a browser."""
         self._thread = threading.Thread(target=self._serve, name='page', daemon=True)
         self._begun = threading.Event()
-        self._refusal = ''
+        self._refusal, self._count = '', 0
         model.on_interval = self._add
 
     def start(self) -> None:
@@ -119,7 +119,8 @@ class Web:
         if not self._viewers:
             return
         content: dict[str, Any] = {'intervals': [interval.as_json()] if interval.extents else []}
-        if interval.number % _STATE_EVERY == 0:
+        self._count += 1
+        if self._count % _STATE_EVERY == 0:
             content |= {'state': self._model.state_json(), 'chart': self._model.chart()}
         text = json.dumps(content)
         for viewer in self._viewers:
