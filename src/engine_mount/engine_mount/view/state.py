@@ -51,6 +51,9 @@ class NodeState(NamedTuple):
     received: int
 
 
+_UNKNOWN = NodeState(0, '', {}, 0)
+
+
 @dataclass
 class GraphState:
     """Everything about the graph that is no trace; `take` keeps it up to date."""
@@ -123,10 +126,9 @@ class GraphState:
             space, _, name = verdict.node.rpartition('/')
             if space != self.namespace.strip('/'):
                 continue  # /diagnostics belongs to all mounts of the car
-            before = self.nodes.get(name)
+            before = self.nodes.get(name, _UNKNOWN)
             self.nodes[name] = NodeState(verdict.level, verdict.sentence, verdict.figures, message.received)
-            levels = verdict.level, 0 if before is None else before.level
-            if any(levels) and (before is None or before.sentence != verdict.sentence):
+            if (verdict.level or before.level) and before.sentence != verdict.sentence:
                 self.add(Mark(message.received, name, verdict.sentence), message.received)
 
 

@@ -14,7 +14,6 @@ from engine_mount.reports.drawing.chart import (
     Array,
     Chart,
     Curve,
-    Level,
     Panel,
     level_lines,
     look_of,
@@ -66,20 +65,16 @@ def traces(subjects: Sequence[Subject]) -> Section:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
     ends: list[float] = []
-    for quantity, what, unit, factor, share in (
-        ('displacement', 'displacement', 'mm', _MM, 1.5),
-        ('setpoint', 'current', 'A', 1.0, 1.0),
+    for quantity, what, unit, factor, share, lines, least in (
+        ('displacement', 'displacement', 'mm', _MM, 1.5, level_lines(levels), ()),
+        ('setpoint', 'current', 'A', 1.0, 1.0, (), (0.0,)),
     ):
         shown = [each for each in subjects if quantity != 'setpoint' or not each.run.without_friction]
         signals = [(each, signal) for each in shown if (signal := each[quantity]) is not None]
         if not signals:
             continue
         ends += [signal.time[place] for _, signal in signals for place in (0, -1)]
-        lines: list[Level] = []
-        name, least = what, [0.0]
-        if quantity == 'displacement':
-            lines, least = level_lines(levels), []
-            name = what if several else first.mount
+        name = first.mount if quantity == 'displacement' and not several else what
         curves = [each.curve(name, signal.time, factor * signal.values) for each, signal in signals]
         curves = [*_others(subjects, quantity, factor), *reversed(curves)]
         panels.append(Panel(f'{what} ({unit})', curves, levels=lines, share=share, least=least))
@@ -187,13 +182,11 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
                 f'{_MM * sine.amplitude:.3f}',
                 f'{cycle_work(x[inside], y[inside], periods):.3f}',
                 f'{100.0 * distortion(amplitudes):.1f}',
-                *(f'{value:.2f}' for value in amplitudes),
             )
         )
         said.append((subject, f'over the last {periods} periods until {time[inside][-1]:.2f} s'))
     head = (
         'recording', 'frequency (Hz)', 'amplitude (mm)', 'work per cycle (J)', 'distortion (%)',
-        *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     title, words = 'Harmonics of the mount force', shared_sentences(subjects, said)
     if not rows:
