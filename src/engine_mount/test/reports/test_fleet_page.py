@@ -14,10 +14,6 @@ pyarrow = pytest.importorskip('pyarrow')
 NUMBERS = {
     'duration_s': ('s', [4.0, 4.0, None, 2.0]),
     'as_recorded_largest_a': ('A', [0.0, 0.02, None, 0.0]),
-    'setpoints_differing': ('', [10, 0, None, 5]),
-    'switchings_appeared': ('', [1, 0, None, 0]),
-    'switchings_vanished': ('', [0, 0, None, 0]),
-    'switchings_moved': ('', [0, 0, None, 0]),
     'peak_current_a': ('A', [1.0, 2.0, None, 0.5]),
     'peak_current_changed_a': ('A', [1.5, 2.0, None, None]),
     'switched_on': ('', [1, 2, None, 3]),

@@ -99,7 +99,6 @@ def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Sec
     is_simulated = {row['asked'] for row in rows} == {DISPLACEMENT}
     findings = [
         _recordings(rows, done, failed, 'simulated' if is_simulated else 'replayed'),
-        _differing(done),
         *([] if is_simulated else [_trusted(rows)]),
     ]
     tables = [Table(('parameter', 'changed to'), parameters)] if parameters else []
@@ -116,14 +115,6 @@ def _recordings(rows: Rows, done: Rows, failed: Rows, verb: str) -> Finding:
         text += [Link(f'{others} with another policy', 'another_policy'), 'and']
     text.append(Link(f'{len(without)} failed', 'failures') if failed else 'none failed')
     return Finding('Recordings', LOOK if failed or not replayed else GOOD, text)
-
-
-def _differing(done: Rows) -> Finding:
-    differing = sum(bool(row['setpoints_differing']) for row in done)
-    kinds = [f'switchings_{what}' for what in ('appeared', 'vanished', 'moved')]
-    switched = sum(any(row[kind] for kind in kinds) for row in done)
-    text = f'{differing} of {len(done)} rows have other setpoints, {switched} are damped at other times;'
-    return Finding('Difference', LOOK if differing else GOOD, [text, Link('the worst', 'worst')])
 
 
 def _trusted(rows: Rows) -> Finding:
