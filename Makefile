@@ -48,7 +48,7 @@ check: $(VENV)/.ready ## drive the manoeuvre suite and judge it by its limits, b
 	@$(BIN)/engine-mount check $(CHECK_OPTIONS)
 
 faults: $(VENV)/.ready ## bring every fault into the real graph; writes docs/reference/faults.md
-	@$(BIN)/engine-mount faults --page docs/reference/faults.md $(FAULTS_OPTIONS)
+	@$(BIN)/engine-mount dev faults --page docs/reference/faults.md $(FAULTS_OPTIONS)
 
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
 	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
@@ -68,7 +68,7 @@ pages: $(VENV)/.ready-dev ## write the pages of docs/reference that come from th
 	@for page in commands_page fleet_columns_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
 
 bench: $(VENV)/.ready-desk ## performance figures as ratios, side by side in one run
-	@$(BIN)/engine-mount bench
+	@$(BIN)/engine-mount dev bench
 
 lint: $(VENV)/.ready-dev ## style, types
 	@$(BIN)/ruff check .
@@ -96,7 +96,7 @@ $(VENV)/.ready: $(VENV)/.created requirements.txt requirements-car.txt $(wildcar
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --use-pep517 \
 		$(foreach package,$(PACKAGES),-e src/$(package))
-	@$(BIN)/engine-mount prepare
+	@$(BIN)/engine-mount dev prepare
 	@touch $@
 
 $(VENV)/.ready-desk: $(VENV)/.ready requirements-desk.txt

@@ -5,6 +5,7 @@ _HARDWARE = 'by nobody: with a CAN FD adapter and the electronics of a mount'
 _LAUNCH = 'on a ROS 2 installation; test/graph/test_drive.py drives the same nodes'
 _BAG_PLAY = 'on a ROS 2 installation; src/mount_control/test plays to the same control'
 _RECORD = 'beside a running graph in test/graph/test_recording.py'
+_RQT = 'by nobody: on a ROS 2 installation; src/mount_bringup/test/test_aggregator.py holds the groups'
 _VIEW = 'with clients of its own in src/engine_mount/test/view'
 _SET = 'on a running node in test/replay/test_parameter_changes.py'
 
@@ -26,6 +27,8 @@ ELSEWHERE = {
     'ros2 lifecycle set /mount_right/': _HARDWARE,
     'ros2 topic hz /mount_right/': _HARDWARE,
     'ros2 topic echo': _HARDWARE,
+    'ros2 run diagnostic_aggregator': _RQT,
+    'ros2 run rqt_': _RQT,
     'ros2 launch mount_bringup vehicle.launch.py': _LAUNCH,
     'ros2 launch mount_bringup sim.launch.py': _LAUNCH,
     'export ROS_DOMAIN_ID': _BAG_PLAY,
@@ -43,7 +46,7 @@ ELSEWHERE = {
 """{beginning of the commands: where they are run}."""
 
 STAND_INS = {
-    'make drive': 'engine-mount drive --core',
-    "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --core --out bags/first',
+    'make drive': 'engine-mount drive --lockstep',
+    "make drive DRIVE_OPTIONS='--out bags/first'": 'engine-mount drive --lockstep --out bags/first',
 }
 """{command: what the test of the page runs in its place}."""

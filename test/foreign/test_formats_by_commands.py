@@ -68,7 +68,7 @@ def test_what_was_imported_goes_through_the_other_commands(tmp_path):
     assert 'imported' in done('info', place)
     done('audit', place)
     done('replay', place, '--out', tmp_path / 'replayed')
-    done('cut', place, '--from', 0.5, '--to', 1.0, '--out', tmp_path / 'piece')
+    done('edit', 'cut', place, '--from', 0.5, '--to', 1.0, '--out', tmp_path / 'piece')
     done('compare', place, place)
     done(
         'drive',

@@ -54,8 +54,9 @@ def outcomes_of(folder, *chosen):
     with free_domain() as domain:
         ended = subprocess.run(
             [
-                str(Path(sys.executable).parent / 'engine-mount'), 'faults', *chosen, '--priority', '0',
-                '--domain', str(domain), '--out', str(folder / 'runs'), '--json', str(folder / 'faults.json'),
+                str(Path(sys.executable).parent / 'engine-mount'), 'dev', 'faults', *chosen,
+                '--priority', '0', '--domain', str(domain), '--out', str(folder / 'runs'),
+                '--json', str(folder / 'faults.json'),
             ],
             stdin=subprocess.DEVNULL,
             capture_output=True,

@@ -33,7 +33,6 @@ def test_bad_recorded_input_is_refused(capsys, tmp_path, column, words):
 @pytest.mark.parametrize(
     ('options', 'words'),
     [
-        (('--scenario', 'race'), ("scenario 'race' is unknown", 'motorway, bench, sweep, recorded')),
         (
             ('--mount', 'friction_always_on', '--set', 'mount_control.policy=continuous_viscous'),
             ('needs mount_control.policy switched_viscous', 'received continuous_viscous'),
@@ -44,7 +43,6 @@ def test_bad_recorded_input_is_refused(capsys, tmp_path, column, words):
         ),
         (('--scenario', 'recorded'), ('needs a file',)),
         (('--set', 'mount_control.qualty=1'), ("'qualty' is no parameter of mount_control", 'quality')),
-        (('--fault', 'flat_tyre@3'), ("fault 'flat_tyre' is unknown",)),
         (('--core', '--fault', 'lost_5@3'), ('fault lost_5 shows on the CAN bus only',)),
         (('--domain', '400'), ("ROS domain '400'", '0 .. 101')),
     ],

@@ -81,24 +81,24 @@ def test_of_two_mounts_in_one_recording_both_are_compared_by_their_names(run, tm
 
 
 def test_a_cut_is_equal_in_the_common_time(run, tmp_path):
-    command('cut', run(), '--to', '1500ms', '--out', tmp_path / 'begin')
+    command('edit', 'cut', run(), '--to', '1500ms', '--out', tmp_path / 'begin')
     command('compare', run(), tmp_path / 'begin', codes=(1,))
     command('compare', run(), tmp_path / 'begin', '--common')
 
 
 def test_a_cut_around_an_event_says_which_and_lies_beside_the_recording_without_a_name(run, tmp_path):
     around = ('--event', 'switch-on', '--before', '200ms', '--after', '0.1s', '--out', tmp_path / 'cut')
-    printed = command('cut', run(), *around)
+    printed = command('edit', 'cut', run(), *around)
     assert 'around switch_on at 3.07' in printed
     assert '3 latched ones from before' in printed
-    command('cut', run(), '--from', '1s', '--to', '1.5s')
+    command('edit', 'cut', run(), '--from', '1s', '--to', '1.5s')
     assert (run() / 'recording_1s_1.5s' / 'metadata.yaml').exists()
 
 
 def test_a_reference_is_met_by_its_replay_and_not_by_another(run, tmp_path):
     reference, replayed = tmp_path / 'references' / 'bench', tmp_path / 'replay'
     words = ('--reference', 'bench', '--folder', reference.parent, '--reason', 'the first')
-    command('accept', run(), *words)
+    command('dev', 'accept', run(), *words)
     command('replay', reference, '--out', replayed)
     assert differences_from_reference(reference, replayed / 'recording') == []
     told = differences_from_reference(reference, run(*EARLIER) / 'recording')

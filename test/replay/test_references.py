@@ -22,7 +22,7 @@ def test_the_accepted_setpoints_are_met_to_the_bit(reference, tmp_path):
             f'{reference.name}:',
             *told,
             versions_sentence(version_differences(outcome.given.session, versions()), versions()),
-            f'if this is meant: engine-mount accept REPLAY --reference {reference.name} --reason "..."',
+            f'if this is meant: engine-mount dev accept REPLAY --reference {reference.name} --reason "..."',
         ]
     )
 

@@ -185,7 +185,7 @@ def test_a_damaged_recording_is_reported_as_far_as_it_goes(bench, tmp_path):
 
 def test_what_is_no_recording_is_refused_in_a_sentence(tmp_path):
     (tmp_path / 'x.mcap').write_bytes(b'hello')
-    assert 'is no MCAP file' in refused('report', tmp_path / 'x.mcap', codes=(1,))
+    assert 'is no MCAP file' in refused('report', tmp_path / 'x.mcap', codes=(2,))
     assert '7 recordings in one report are too many' in refused('report', *[REFERENCES_FOLDER / 'gap'] * 7)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from mount_bringup.settings import SettingError, general_name_of
 from mount_models.plain_yaml import YamlError, yaml_in_file
-from mount_models.quantity import check_name
+from mount_models.quantity import check_name, nearest
 
 _VALUES = 'ros__parameters'
 _PARTS = {'**': '(/[^/]+)*', '*': '/[^/]+'}  # of a name: any number, one
@@ -42,7 +42,7 @@ def settings_in(
         pattern, name = '/'.join(path[:place]).strip('/'), '.'.join(path[place + 1 :])
         nodes = [node for node in known if pattern.rpartition('/')[2] in (node, '*', '**')]
         if not nodes:
-            raise SettingError(f'{file}: {pattern!r} is no node of the graph; known are {", ".join(known)}')
+            raise SettingError(f'{file}: {pattern!r} is no node of the graph; {nearest(pattern, known)}')
         owners = [node for node in nodes if general_name_of(node, name) in known[node]]
         if not owners:
             names = {name for node in nodes for name in known[node]}

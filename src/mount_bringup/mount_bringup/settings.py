@@ -8,7 +8,7 @@ from mount_control import settings as control
 from mount_driver.parameters import DriverParameters
 from mount_init.parameters import InitParameters
 from mount_models.damper import damper_text
-from mount_models.quantity import ParameterError, check_name, flattened
+from mount_models.quantity import ParameterError, check_name, flattened, nearest
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_recorder.parameters import RecorderParameters
@@ -56,7 +56,7 @@ def checked_settings(
     for node, values in settings.items():
         kind = node.rpartition('/')[2]  # of a node of one mount, as in left/mount_control
         if kind not in known or (kind != node and kind not in OF_EACH):
-            raise ParameterError(f'{node!r} is no {owner}; known are {", ".join(known)}')
+            raise ParameterError(f'{node!r} is no {owner}; {nearest(node, known)}')
         for name in values:
             check_name(node, general_name_of(kind, name), known[kind])
         checked[node] = {
@@ -81,6 +81,8 @@ def _typed(name: str, value: Any, default: Any) -> Any:
     if isinstance(default, float) and not isinstance(value, bool):
         with contextlib.suppress(TypeError, ValueError):
             return float(value)  # of 3e-5 too, which is text in YAML
+    if isinstance(default, bool) and isinstance(value, str):  # of a launch argument
+        value = {'true': True, 'false': False}.get(value.lower(), value)
     if isinstance(default, tuple):
         if isinstance(value, (list, tuple)) and value and all(isinstance(text, str) for text in value):
             return list(value)

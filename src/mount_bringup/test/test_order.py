@@ -84,6 +84,13 @@ def test_arguments_win_over_the_file_and_the_file_over_what_is_not_given(paramet
     assert parameters('sim', text, recording='2026')['mount_recorder']['uri'] == '2026'
 
 
+@pytest.mark.parametrize(
+    'given', [{'use_sim_time': 'True'}, {'config': '/**: {ros__parameters: {use_sim_time: true}}'}]
+)
+def test_simulated_time_goes_to_the_nodes_which_warn(parameters, given):
+    assert all(values['use_sim_time'] is True for values in parameters('vehicle', **given).values())
+
+
 def test_a_mount_that_damps_always_takes_its_control_along(parameters):
     assert parameters('sim', mount='friction_always_on')['mount_control']['switching'] == 'always'
 
@@ -136,7 +143,7 @@ def test_what_cannot_be_is_refused_before_a_process_starts(order, given, words):
 @pytest.mark.parametrize(
     ('command', 'words'),
     [
-        (['car'], 'the first word must be one of vehicle, sim'),
+        (['car'], "graph 'car' is unknown; known are vehicle, sim"),
         (['sim', 'bench'], "'bench' is no parameter of sim.launch.py"),
     ],
 )

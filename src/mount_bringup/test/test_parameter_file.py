@@ -69,7 +69,10 @@ def test_an_entry_for_every_node_is_for_those_that_have_the_parameter(read):
         ),
         (entry('/left/mount_control', '{eigenfrequncy: 9}'), 'did you mean eigenfrequency?'),
         (entry('/**', '{sede: 9}'), "'sede' is no parameter of mount_sim or mount_control"),
-        (entry('/**/mount_kontrol'), "'../mount_kontrol' is no node of the graph; known are mount_sim"),
+        (
+            entry('/**/mount_kontrol'),
+            "'../mount_kontrol' is no node of the graph; did you mean mount_control",
+        ),
         (
             '/**/mount_control:\n  eigenfrequency: 9',
             '/mount_control/eigenfrequency must have ros__parameters',

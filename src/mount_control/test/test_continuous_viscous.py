@@ -1,4 +1,4 @@
-"""The continuous law: phase, opening, reversal, idle line."""
+"""The continuous law: phase, degree of damping, reversal, idle line."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_small_amplitude_gives_no_force_and_large_one_the_whole_damper() -> None
     assert abs(phasor(8.0, answers[:, 0])) == pytest.approx(damping * 2.0 * np.pi * 8.0 * 0.6e-3, rel=0.06)
 
 
-def test_opening_follows_at_once_and_closes_to_exactly_zero() -> None:
+def test_damping_follows_at_once_and_ends_at_exactly_zero() -> None:
     shaken = np.where(TIME < 1.0, sine(8.0, 1e-3), 0.0)
     answers, _ = followed(shaken)
     first = int(np.argmax(answers[:, 2] > 0.5))
@@ -106,13 +106,13 @@ def test_idle_line_is_not_in_the_force() -> None:
     assert traces['idle_amplitude'][-1] == pytest.approx(0.1e-3, rel=0.05)
 
 
-def test_idle_line_keeps_the_damper_closed() -> None:
-    opened, _ = followed(sine(8.0, 0.25e-3))
-    closed, _ = followed(sine(8.0, 0.25e-3) + sine(24.0, 0.2e-3))
+def test_idle_line_holds_the_damper_off() -> None:
+    alone, _ = followed(sine(8.0, 0.25e-3))
+    idling, _ = followed(sine(8.0, 0.25e-3) + sine(24.0, 0.2e-3))
     unweighted, _ = followed(sine(8.0, 0.25e-3) + sine(24.0, 0.2e-3), idle_weight=0.0)
-    assert opened[-1, 2] > 0.3
+    assert alone[-1, 2] > 0.3
     assert unweighted[-1, 2] > 0.3
-    assert not closed[-500:, 2].any()
+    assert not idling[-500:, 2].any()
 
 
 @pytest.mark.parametrize('frequency', [20.0, 23.0, 30.0, 33.0])

@@ -153,11 +153,10 @@ def check_gap(law: ForceLaw, gap: npt.ArrayLike) -> None:
         )
 
 
-def check_force_law(law: ForceLaw, lowest_current: float = 0.0) -> None:
+def check_force_law(law: ForceLaw) -> None:
     """Raise `LawRefusedError` unless `law` can be inverted everywhere within its guarded range.
 
     Looked at on 61 gaps and 119 currents from 1/60 of the highest up; below, the force is next to nothing.
-    With a `lowest_current` (A) above that, from there up only.
     """
     if not (0.0 < law.gap_low < law.gap_high and law.current_high > 0.0):
         raise LawRefusedError(
@@ -166,7 +165,7 @@ def check_force_law(law: ForceLaw, lowest_current: float = 0.0) -> None:
             'and currents above 0 A'
         )
     gaps = np.linspace(law.gap_low, law.gap_high, 61)
-    currents = np.linspace(max(LOWEST_SHARE * law.current_high, lowest_current), law.current_high, 119)
+    currents = np.linspace(LOWEST_SHARE * law.current_high, law.current_high, 119)
     forces = checked_force(law, currents, gaps[:, np.newaxis])
     # written so that NaN fails each of them
     _refuse_where(~(forces > 0.0), gaps, currents, 'be positive')

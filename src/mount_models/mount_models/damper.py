@@ -20,7 +20,7 @@ from mount_models.arithmetic.elementary import expm1
 from mount_models.arithmetic.sums import each_interpolated
 from mount_models.arrays import FloatArray
 from mount_models.plain_yaml import YamlError, plain_yaml
-from mount_models.quantity import ParameterError, Quantity, check_name, checked
+from mount_models.quantity import ParameterError, Quantity, check_name, checked, nearest
 
 SMALLEST_DEAD_ZONE = 0.0001
 """A dead zone is none at all or at least this wide (m/s, chosen), because it sets the grid of the table."""
@@ -188,7 +188,7 @@ def _law_of(values: Mapping[str, Any]) -> Any:
     given = dict(values)
     name = given.pop('law', None)
     if name not in DAMPER_LAWS:
-        raise ParameterError(f'no damper law is called {name!r}; known are {", ".join(DAMPER_LAWS)}')
+        raise ParameterError(f'no damper law is called {name!r}; {nearest(name, DAMPER_LAWS)}')
     law = DAMPER_LAWS[name]
     for each in given:
         check_name(f'the {name} damper', each, law._fields)

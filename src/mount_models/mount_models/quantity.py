@@ -56,9 +56,13 @@ class Quantity:
 def check_name(owner: str, name: str, known: Collection[str]) -> None:
     """Raise `ParameterError` with the nearest names if `name` is none of the `known` ones of `owner`."""
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=3)
-        hint = f'; did you mean {" or ".join(near)}?' if near else f'; known are {", ".join(known)}'
-        raise ParameterError(f'{name!r} is no parameter of {owner}{hint}')
+        raise ParameterError(f'{name!r} is no parameter of {owner}; {nearest(name, known)}')
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """Return the hint for a wrong name: the most similar of the `known` ones, all where none is similar."""
+    near = difflib.get_close_matches(name, known, n=3)
+    return f'did you mean {" or ".join(near)}?' if near else f'known are {", ".join(known)}'
 
 
 def quantities(parameters: type[P] | P) -> dict[str, Quantity]:

@@ -11,8 +11,8 @@ BURST = 10  # marks, chosen: so many of a kind in a row ...
 REFILL = 2.0  # s, chosen: ... and then one in this time, so that a broken stream does not flood
 
 PAUSE = 0.04
-"""Seconds (chosen) for which damping must be off to count as switched off: an opening that flutters about its
-smallest is one. What switches by periods of 20 Hz or less is never off for less."""
+"""Seconds (chosen) for which damping must be off to count as switched off: damping that flutters about its
+lowest degree is on. What switches by periods of 20 Hz or less is never off for less."""
 
 
 class MarkKind(Enum):

@@ -90,6 +90,7 @@ class MountRecorder(SafeLifecycleNode):
             on_loss=self._mark_loss,
         )
         self._subscriptions_by_topic: dict[str, Subscription] = {}
+        self._switches: dict[str, SwitchWatch] = {}
         self._logged_failure = ''
         for entry in topics:
             common = entry.name.startswith('/') or mounts == ['']
@@ -179,8 +180,10 @@ class MountRecorder(SafeLifecycleNode):
         elif entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
             rate = entry.rate_at(self._settings.sample_rate)
             stamps = recorder.watches[name] = StampWatch(rate)
-            watch = SwitchWatch(self._marks, stamps, mount) if entry is CONTROL_TRACE else stamps
-            recorder.observers[name] = watch.observe
+            recorder.observers[name] = stamps.observe
+            if entry is CONTROL_TRACE:
+                switch = self._switches[mount] = SwitchWatch(self._marks, stamps, mount)
+                recorder.observers[name] = switch.observe
 
     def _figures(self, recorder: Recorder) -> dict[str, Any]:
         figures: dict[str, Any] = {'folder': str(recorder.folder), **recorder.figures()}
@@ -193,6 +196,7 @@ class MountRecorder(SafeLifecycleNode):
             'marks': self._marks.sent,
             'events': receptions[self._event].received if self._event in receptions else 0,
         }
+        figures |= {f'damping_off.{mount}'.rstrip('.'): each.off for mount, each in self._switches.items()}
         for name, subscription in self._subscriptions_by_topic.items():
             figures[f'publishers.{name}'] = subscription.get_publisher_count()
         return {**figures, **recorder.figures_by_topic()}

@@ -19,6 +19,8 @@ class SwitchWatch:
         self._marks, self._stamps, self._mount = marks, stamps, mount
         self._reader = ScalarsReader(('damping_active', 'magnitude'))
         self._damped: int | None = None  # stamp of the last step with damping on
+        self.off = 0
+        """Stamp of the first step without damping after it, ns."""
 
     def observe(self, raw: bytes) -> None:
         """Evaluate a serialised trace; its magnitude is the band displacement that decided, m, or NaN."""
@@ -29,6 +31,8 @@ class SwitchWatch:
                 level = '' if math.isnan(magnitude) else f' at {1e3 * magnitude:.2f} mm in the band'
                 self._marks.mark(MarkKind.SWITCH_ON, stamp, f'{of_mount(self._mount)}damping on{level}')
             self._damped = stamp
+        elif self._damped is not None and self.off <= self._damped:
+            self.off = stamp
 
 
 class FaultWatch:

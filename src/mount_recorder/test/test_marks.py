@@ -87,23 +87,24 @@ def step(stamp, active, magnitude=math.nan):
 
 
 def observe_steps(marks, steps, mount=''):
-    """Let a watch of `control_trace` see {index: damping_active}."""
+    """Return a watch of `control_trace` that has seen {index: damping_active}."""
     watch = SwitchWatch(marks, StampWatch(1000.0), mount)
     for index, active in steps.items():
         watch.observe(step(START + index * PERIOD, active, 4.2e-4 if active == 1.0 else math.nan))
+    return watch
 
 
 @pytest.mark.parametrize(
-    ('steps', 'begins'),
+    ('steps', 'begins', 'off'),
     [
-        ({0: 0.0, 1: 1.0, 2: 0.0} | dict.fromkeys(range(3, 100), 0.0) | {100: 1.0}, (1, 100)),
+        ({0: 0.0, 1: 1.0, 2: 0.0} | dict.fromkeys(range(3, 100), 0.0) | {100: 1.0}, (1, 100), 2),
         # An opening that flutters, with pauses shorter than 40 ms, is one.
-        ({time: 0.03 if time % 30 < 15 and 100 < time < 300 else 0.0 for time in range(400)}, (101,)),
-        (dict(enumerate((0.0, 0.1, 0.7, 1.0, 0.4))), (1,)),
+        ({time: 0.03 if time % 30 < 15 and 100 < time < 300 else 0.0 for time in range(400)}, (101,), 285),
+        (dict(enumerate((0.0, 0.1, 0.7, 1.0, 0.4))), (1,), None),
     ],
 )
-def test_switching_on_is_marked_each_time_and_switching_off_is_not(marks, sent, steps, begins):
-    observe_steps(marks, steps)
+def test_switching_on_is_marked_each_time_and_switching_off_is_reported(marks, sent, steps, begins, off):
+    assert observe_steps(marks, steps).off == (0 if off is None else START + off * PERIOD)
     assert [(mark.time, mark.kind) for mark in sent] == [
         (START + begin * PERIOD, 'switch_on') for begin in begins
     ]

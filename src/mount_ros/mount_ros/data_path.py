@@ -12,12 +12,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.waitable import Waitable
 
 from mount_ros.data_thread import DataThread, LocalTopic, Poll
 from mount_ros.messages.cdr import message_class
+from mount_ros.nodes.parameters import USE_SIM_TIME
 from mount_ros.private_rclpy import raw_publisher
 from mount_ros.publishers import PublisherWatch
 from mount_ros.qos import control_qos, publisher_qos
@@ -49,6 +51,7 @@ def io_node(owner: Node, name: str = '') -> Node:
         cli_args=['--ros-args', '-r', f'__node:={name or owner.get_name()}_io'],
         start_parameter_services=False,
         enable_rosout=False,
+        parameter_overrides=[Parameter(USE_SIM_TIME, value=False)],  # also where all nodes are given true
     )
 
 

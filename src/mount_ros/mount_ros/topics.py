@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from mount_models.quantity import nearest
 from mount_models.sampling import SAMPLE_RATE
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -256,4 +257,4 @@ def topic(name: str) -> Topic:
     for candidate in TOPICS:
         if candidate.name == name:
             return candidate
-    raise KeyError(f'{name!r} is no topic of the graph; known are {", ".join(t.name for t in TOPICS)}')
+    raise KeyError(f'{name!r} is no topic of the graph; {nearest(name, [t.name for t in TOPICS])}')

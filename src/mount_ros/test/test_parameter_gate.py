@@ -1,8 +1,12 @@
 """What may be set on a node when, and what the node hears of it."""
 
 import pytest
+import rclpy
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from mount_ros.data_path import io_node
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import Change
 
@@ -66,11 +70,21 @@ def test_all_others_are_refused_until_cleanup(subject, name, value):
     assert subject.taken == []
 
 
-def test_the_time_of_a_simulator_is_refused_in_words_at_any_time(subject):
+def test_the_time_of_a_simulator_has_no_effect_at_the_start_and_is_refused_later(make_node, capfd):
+    subject = make_node(Subject, use_sim_time=True)
+    assert 'use_sim_time stays false' in capfd.readouterr().err
+    assert subject.trigger_configure() is TransitionCallbackReturn.SUCCESS
+    assert not subject.get_parameter('use_sim_time').value
     (refused,) = _set(subject, use_sim_time=True)
     assert not refused.successful
-    assert refused.reason.startswith('use_sim_time must be false: the stamps of the messages are the time')
-    subject.trigger_configure()
-    assert not _set(subject, use_sim_time=True)[0].successful
-    assert _set(subject, use_sim_time=False)[0].successful
+    assert refused.reason.startswith('use_sim_time stays false: the stamps of the messages are the time')
     assert '/clock' not in dict(subject.get_topic_names_and_types())
+
+
+def test_the_node_of_the_data_takes_no_clock_where_all_nodes_are_given_one(domain):
+    context = rclpy.Context()
+    rclpy.init(args=['--ros-args', '-p', 'use_sim_time:=true'], context=context, domain_id=domain)
+    owner = Node('owner', context=context)
+    found = [node.get_parameter('use_sim_time').value for node in (owner, io_node(owner))]
+    context.try_shutdown()
+    assert found == [True, False]

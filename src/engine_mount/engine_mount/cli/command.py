@@ -2,7 +2,6 @@
 
 import os
 import sys
-from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -17,6 +16,7 @@ from engine_mount.cli.commands import (
     cut,
     drive,
     experiment,
+    export_signals,
     faults,
     fleet,
     identify,
@@ -30,8 +30,9 @@ from engine_mount.cli.commands import (
     view,
 )
 from engine_mount.cli.commands.options import with_repeated_options
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, Group, check_former_names, group
 from engine_mount.cli.terminal import refuse, terminal
+from engine_mount.signals.sources.uris import SourceError, StoreAwayError
 from mount_ros.environment import prepare_environment
 
 _RECORDINGS = 'Recordings'
@@ -88,63 +89,71 @@ def prepare() -> None:
         prepare()
 
 
-_COMMANDS: dict[str, tuple[tuple[Callable[..., None], str | None], ...]] = {
-    'Drive and watch': (
-        (drive.drive, drive.EPILOG),
-        (view.view, view.EPILOG),
-        (view.status, view.STATUS_EPILOG),
-        (record.record, record.EPILOG),
-    ),
-    _RECORDINGS: (
-        (ls.ls, ls.EPILOG),
-        (ls.info, ls.INFO_EPILOG),
-        (report.report, report.EPILOG),
-        (replay.replay, replay.EPILOG),
-        (compare.compare, compare.EPILOG),
-        (audit.audit, audit.EPILOG),
-    ),
-    'Change recordings': (
-        (import_files.import_file, import_files.EPILOG),
-        (cut.cut, cut.EPILOG),
-        (recover.recover, recover.EPILOG),
-    ),
-    _MOUNT: ((experiment.experiment, experiment.EPILOG),),
-    'This project on this machine': (
-        (check.check, check.EPILOG),
-        (faults.faults, faults.EPILOG),
-        (bench.bench, bench.EPILOG),
-        (accept.accept, accept.EPILOG),
-        (prepare, None),
-    ),
-}
-"""Panel of the help: function and epilog of each sub-command."""
+_DEV = group('dev', 'This project on this machine: speed, faults, references, compilation.')
+_EXPORT = group('export', 'Export for other programs: signals of a recording as a table.')
+_EDIT = group('edit', 'Change recordings: cut a piece out, recover a damaged one.')
 
-for _panel, _functions in _COMMANDS.items():
-    for _function, _epilog in _functions:
+for _group, _panel, _functions in (
+    (app, 'Drive and watch', (drive.drive, view.view, view.status, record.record, check.check)),
+    (
+        app,
+        _RECORDINGS,
+        (
+            *(ls.ls, ls.info, report.report, replay.replay, compare.compare, audit.audit),
+            import_files.import_file,
+        ),
+    ),
+    (app, _MOUNT, (experiment.experiment,)),
+    (_EXPORT, None, (export_signals.signals,)),
+    (_EDIT, None, (cut.cut, recover.recover)),
+    (_DEV, None, (faults.faults, bench.bench, accept.accept, prepare)),
+):
+    for _function in _functions:
         _name = _function.__name__.removesuffix('_file')
-        app.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
-app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
-app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
-app.add_typer(identify.app, rich_help_panel=_MOUNT)
-app.add_typer(road.app, rich_help_panel=_RECORDINGS)
+        _texts = vars(sys.modules[_function.__module__])
+        _epilog = _texts.get(f'{_name.upper()}_EPILOG', _texts.get('EPILOG'))
+        _group.command(_name, cls=Command, epilog=_epilog, rich_help_panel=_panel)(_function)
+for _group, _panel in (
+    *((_EXPORT, _RECORDINGS), (_EDIT, _RECORDINGS), (fleet.app, _RECORDINGS), (road.app, _RECORDINGS)),
+    *((calibrate.app, _MOUNT), (identify.app, _MOUNT), (_DEV, 'This project')),
+):
+    app.add_typer(_group, rich_help_panel=_panel)
+
+_UNUSABLE = (
+    *(ValueError, FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError),
+    *(PermissionError, SourceError),
+)
+"""Errors in what the user named; a drive that has begun raises `GraphError` instead."""
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command; every refusal is one sentence and a non-zero exit code."""
+    """Run the command; every refusal is one sentence and a non-zero exit code, 2 for a wrong use."""
     from mount_bringup.graph.nodes import GraphError
     from mount_bringup.graph.shutdown import INTERRUPTED, Interrupted
     from mount_ros.nodes.shutdown import end_process
 
+    words = with_repeated_options(sys.argv[1:] if arguments is None else arguments)
     try:
         prepare_environment()
-        app(args=with_repeated_options(sys.argv[1:] if arguments is None else arguments))
-    except SystemExit as end:
-        if not isinstance(end.code, int):
-            raise
-        end_process(end.code)
+        check_former_names(words)
+        code = app(args=words, prog_name='engine-mount', standalone_mode=False) or 0
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt  # which Typer has caught
     except (KeyboardInterrupt, Interrupted) as end:
-        terminal(stderr=True).print(f'interrupted; {str(end) or "the coil is at 0 A"}', soft_wrap=True)
-        end_process(INTERRUPTED)
+        terminal(stderr=True).print('; '.join(filter(None, ('interrupted', str(end)))), soft_wrap=True)
+        code = INTERRUPTED
+    except typer.TyperException as error:
+        if sentence := _sentence(error):  # else the help of a group was printed
+            refuse(sentence)
+        code = error.exit_code
     except (ValueError, GraphError, OSError) as error:
         refuse(error)
-        end_process(1)
+        code = 2 if isinstance(error, _UNUSABLE) and not isinstance(error, StoreAwayError) else 1
+    end_process(code)
+
+
+def _sentence(error: typer.TyperException) -> str:
+    """Return what was wrong in the use of the command, without the words that Typer puts before it."""
+    if near := getattr(error, 'possibilities', ()):
+        return f'{error.message}; did you mean {" or ".join(near)}?'
+    return error.format_message().removeprefix('Invalid value: ')

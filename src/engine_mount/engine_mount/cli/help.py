@@ -1,7 +1,7 @@
 """What `--help` and Tab show: words of this project, names from the code, runs from folders."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,40 @@ _WORDS = {
     'str': 'TEXT',
     'path': 'PATH',
 }
+FORMER = {
+    'accept': 'dev accept',
+    'bench': 'dev bench',
+    'cut': 'edit cut',
+    'faults': 'dev faults',
+    'prepare': 'dev prepare',
+    'recover': 'edit recover',
+    '--time-column': '--time',
+    'fleet query --csv': '--format csv',
+    'fleet query --json': '--format json',
+    'identify friction --channel': '--column',
+    'replay --mount': '--position',
+    'view --rate': '--playback-speed',
+}
+"""Former names of commands and options (of all commands, or of one), and those of today."""
 
 
-class Command(TyperCommand):
-    """A sub-command."""
+def check_former_names(words: Sequence[str]) -> None:
+    """Refuse a former name, with that of today: an option with another meaning is never taken silently."""
+    given = [word.partition('=')[0] for word in words]
+    for former, today in FORMER.items():
+        *command, name = former.split()
+        if given[: len(command)] == command and name in (given if name.startswith('-') else given[:1]):
+            raise typer.BadParameter(f'{name} is now {today}')
 
+
+class _Worded:
     def get_params(self, ctx: Any) -> list[Any]:
         """Return the parameters with words for what they take."""
-        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]
+        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]  # type: ignore[misc]
+
+
+class Command(_Worded, TyperCommand):
+    """A sub-command."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Return what stands behind the name of the command in its usage: options, then arguments."""
@@ -31,12 +57,8 @@ class Command(TyperCommand):
         return ['[OPTIONS]', *map(_in_usage, arguments)]
 
 
-class Group(TyperGroup):
+class Group(_Worded, TyperGroup):
     """A command with sub-commands."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Return the parameters with words for what they take."""
-        return [_worded(parameter, ctx) for parameter in super().get_params(ctx)]
 
 
 def group(name: str, text: str) -> typer.Typer:

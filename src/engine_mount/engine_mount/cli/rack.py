@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.commands.options import OUTPUT, option, write_figures
+from engine_mount.cli.commands.options import OUTPUT, option, target, write_figures
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -79,9 +79,9 @@ def _number(text: str, where: str) -> float:
 
 Base = Annotated[Path | None, option('specimen with all other values; default: the shipped one')]
 Name = Annotated[str, option('name of the specimen; default: that of the base')]
-Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE', panel=OUTPUT)]
+Out = Annotated[Path | None, option('write the specimen (YAML)', 'FILE', panel=OUTPUT, check=target)]
 
-EXIT_CODES = 'Exit code: 0 when all requested files are written, 1 with the reason when not.\n\nExamples:'
+EXIT_CODES = 'Exit code: 0 when all requested files are written, 2 with the reason when not.\n\nExamples:'
 
 
 def progress() -> AbstractContextManager[Callable[[float, str], None]]:

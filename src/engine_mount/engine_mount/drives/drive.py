@@ -1,10 +1,11 @@
 """Simulated drives: an order checked whole, driven in core or through the nodes, and recorded."""
 
+import contextlib
 import io
 import math
 import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from engine_mount.settings.options import mounts_of, settings_of_mounts, with_sa
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.graph.domain import chosen_domain
-from mount_bringup.graph.nodes import RESTART_LIMIT, SIM, GraphSettings, Grouping
+from mount_bringup.graph.nodes import RESTART_LIMIT, SIM, GraphError, GraphSettings, Grouping
 from mount_bringup.settings import check_sample_rate, checked_settings
 from mount_control.controller import FAULT_SENTENCE
 from mount_control.policy.registry import DEFAULT
@@ -152,21 +153,22 @@ def drive(
     folder = make_run_folder(Path(out) if out is not None else None, scenario)
     values = _with_file(values, excitation, folder.path / FOLDER)
     session = partial(_session, scenario, mode, values, excitation)
-    if core:
-        figures, complaints = _drive_core(values, checked, folder, session, namespace, screen), []
-    else:
-        from engine_mount.drives.graph_drive import drive_graph  # loads the middleware
+    separate = Grouping.COMPOSED if composed else Grouping.APART
+    settings = GraphSettings(
+        namespace=namespace,
+        domain=domain,
+        parameters=values,
+        grouping=Grouping.TOGETHER if lockstep and not apart else separate,
+        priority=0 if lockstep else priority,
+        restart_limit=restarts,
+    )
+    with report_early_end(folder, screen):
+        if core:
+            figures, complaints = _drive_core(values, checked, folder, session, namespace, screen), []
+        else:
+            from engine_mount.drives.graph_drive import drive_graph  # loads the middleware
 
-        separate = Grouping.COMPOSED if composed else Grouping.APART
-        settings = GraphSettings(
-            namespace=namespace,
-            domain=domain,
-            parameters=values,
-            grouping=Grouping.TOGETHER if lockstep and not apart else separate,
-            priority=0 if lockstep else priority,
-            restart_limit=restarts,
-        )
-        figures, complaints = drive_graph(settings, checked, folder, session, screen, lockstep=lockstep)
+            figures, complaints = drive_graph(settings, checked, folder, session, screen, lockstep=lockstep)
     beyond, first = figures.pop('beyond_range'), figures.pop('first_beyond_range')
     control_faults = figures.pop('control_faults')
     if control_faults:
@@ -174,6 +176,19 @@ def drive(
     if beyond:
         complaints.insert(0, beyond_range_sentence(beyond, first))
     return Drive(folder, scenario, mode, values, complaints=complaints, **figures)
+
+
+@contextlib.contextmanager
+def report_early_end(folder: RunFolder, screen: Screen) -> Iterator[None]:
+    """Name the recording of a drive that ends early; a `ValueError` is then no wrong use: a `GraphError`."""
+    try:
+        yield
+    except BaseException as error:  # however it ends
+        if folder.recording.exists():
+            screen.say(f'recording  {folder.recording}')
+        if isinstance(error, ValueError):
+            raise GraphError(str(error)) from error
+        raise
 
 
 def check_drive(parameters: Parameters, *, core: bool = False) -> Excitation:

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 from mount_bringup.graph.graph import GraphObserver
-from mount_bringup.graph.nodes import CONTROL, DRIVER, INIT, GraphNode
-from mount_recorder.automatic_marks import MarkKind, Ration, of_mount
+from mount_bringup.graph.nodes import DRIVER, INIT, RECORDER, GraphNode
+from mount_recorder.automatic_marks import PAUSE, MarkKind, Ration, of_mount
 from mount_ros.messages.event import BY_HAND, Mark
 from mount_ros.nodes.diagnostics import Level
 
@@ -71,14 +71,11 @@ class DriveEvents(GraphObserver):
             self._say(line(_ACTIVE, f'all nodes, {self._active - self._begin:.1f} s after the start'))
 
     def on_report(self, name: str, figures: Mapping[str, str]) -> None:
-        mount, _, node = name.rpartition('/')
+        node = name.rpartition('/')[2]
         if node == DRIVER.name and self._zero is None:
             self._find_zero(figures)
-        elif node == CONTROL.name and figures.get('damping_active') == 'False':
-            stamp = _number(figures, 'last_stamp')
-            if stamp > self._damping.get(mount, stamp):
-                del self._damping[mount]
-                self._show('damping', mount, stamp, 'damping off')
+        elif node == RECORDER.name:
+            self._show_switching_off(figures)
         self._show_sentence(name, figures)
 
     def on_mark(self, mount: str, mark: Mark) -> None:
@@ -97,6 +94,14 @@ class DriveEvents(GraphObserver):
         if samples := _number(figures, 'samples'):
             steps = samples + _number(figures, 'lost') - 1
             self._zero = _number(figures, 'last_stamp') - round(steps * 1e9 / float(figures['sample_rate']))
+
+    def _show_switching_off(self, figures: Mapping[str, str]) -> None:
+        """Show at which sample the recorder saw damping go off, once the pause is long enough to be one."""
+        for mount, began in list(self._damping.items()):
+            off = _number(figures, f'damping_off.{mount}'.rstrip('.'))
+            if off > began and _number(figures, 'last_stamp') - off >= PAUSE * 1e9:
+                del self._damping[mount]
+                self._show('damping', mount, off, 'damping off')
 
     def _show_sentence(self, name: str, figures: Mapping[str, str]) -> None:
         """Show the gap once, and each warning or error that begins or stands once all nodes are active."""

@@ -18,6 +18,7 @@ from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 
 from engine_mount.recordings.screen import Screen
+from mount_bringup.graph.nodes import GraphError
 from mount_bringup.graph.shutdown import ending_signals
 from mount_recorder.bag_writer import RecordingError
 from mount_recorder.diagnosis import OnFull
@@ -87,10 +88,13 @@ def record(
     domain: int = 0,
     namespace: str = '',
 ) -> Recorded:
-    """Record `topics` (none named: all) until Ctrl-C, SIGTERM or `duration` (s); raises a `ValueError`."""
+    """Record `topics` (none named: all) until Ctrl-C, SIGTERM or `duration` (s).
+
+    Raises a `ValueError`, or `GraphError` where no graph can be reached.
+    """
     names = chosen_topics(topics)
     if refusal := loopback_refusal():
-        raise RecordingError(refusal)
+        raise GraphError(refusal)
     values = {'uri': str(out), 'topics': names, **parameters._asdict()}
     signals: list[bool] = []  # that end the recording; no lock: a second one may come amid the first
     with ending_signals(lambda: signals.append(True)), ros_context(domain) as context:

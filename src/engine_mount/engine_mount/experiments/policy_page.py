@@ -55,7 +55,7 @@ extremum keeps \
 
 `engine-mount experiment policy` writes this page from its numbers. Two policies drive the
 same mount. `{PAPER}`, the paper's, waits until the magnitude has exceeded 0.8 mm for one period and then
-damps by a characteristic of the velocity in the band. `{CONTINUOUS}` opens a viscous damper with the
+damps by a characteristic of the velocity in the band. `{CONTINUOUS}` engages a viscous damper with the
 amplitude in the band, from 0.12 mm on, without waiting, and takes the force from the unfiltered velocity
 (`mount_control/policy/continuous_viscous.py`). `mount_control.policy` selects the policy. All figures are
 simulated; vehicle and hydromount are chosen, not measured ([results.md](results.md)).
@@ -189,7 +189,7 @@ frequencies and forces:
 | roughness | | acceleration: worst, at | mean | share above 1.05 | displacement: mean | worst |
 |---|---|---|---|---|---|---|
 {table_rows(idling)}
-The price of quiet: where a strong idle line meets a rough road, the damper stays nearly closed and the \
+The price of quiet: where a strong idle line meets a rough road, the damper stays nearly off and the \
 engine moves more than on the hydromount, which transmits the line instead. `idle_weight` weighs one \
 against the other.
 

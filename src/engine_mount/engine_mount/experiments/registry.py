@@ -17,7 +17,7 @@ from engine_mount.experiments.harness.experiment import (
 )
 from engine_mount.settings.run_folder import RunFolderError, new_place
 from mount_bringup.settings import checked_settings, defaults_of_nodes
-from mount_models.quantity import flattened
+from mount_models.quantity import flattened, nearest
 
 ALL = 'all'
 
@@ -30,7 +30,7 @@ def listed() -> list[tuple[str, str, str]]:
 def experiment_named(name: str) -> Experiment:
     """Return the experiment of this name; raises `ExperimentError` for an unknown one."""
     if name not in NAMES:
-        raise ExperimentError(f'{name!r} is no experiment; known are {", ".join((*NAMES, ALL))}')
+        raise ExperimentError(f'{name!r} is no experiment; {nearest(name, (*NAMES, ALL))}')
     experiment: Experiment = import_module(f'{__package__}.{name}').EXPERIMENT
     return experiment
 

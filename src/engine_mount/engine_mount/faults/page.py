@@ -13,7 +13,7 @@ _RUN_FOLDER = re.compile(r'/\S*/(?=faults_\d+_\d+/)')  # of the machine that wro
 _HEADS = ('fault', 'what', 'detected by', 'ms', '0 A, ms', 'coil, A', 'sentence', 'recovery')
 _INTRODUCTION = """# Faults
 
-What the graph does about each fault, measured. `engine-mount faults --page FILE` writes this page, `make
+What the graph does about each fault, measured. `engine-mount dev faults --page FILE` writes this page, `make
 faults` does it for all of them ([the command](../../src/engine_mount/engine_mount/cli/README.md#faults));
 times are those of the machine that did.
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from engine_mount.fleet.job import JOURNAL, ORDER
 from engine_mount.fleet.tables import COLUMNS, NEEDED_FOR
 from engine_mount.signals.extras import required
+from mount_models.quantity import nearest
 
 if TYPE_CHECKING:
     import pyarrow
@@ -124,7 +125,7 @@ def worst(folder: str | os.PathLike[str], by: str, count: int = 10) -> list[Wors
     name = 'result' if 'result' in tables else 'recordings'
     numbers = [field.name for field in tables[name].schema if str(field.type) in ('double', 'int64')]
     if by not in numbers:
-        raise QueryError(f'{by!r} is no column of numbers of {name}; there are {", ".join(numbers)}')
+        raise QueryError(f'{by!r} is no column of numbers of {name}; {nearest(by, numbers)}')
     order = f'abs("{by}") desc, recording, mount'
     sql = f'select * from {name} where "{by}" is not null order by {order} limit {count}'
     places = _places(Path(folder)) if name == 'result' else {}
@@ -141,7 +142,7 @@ def _commands(row: Mapping[str, Any], uri: str) -> list[str]:
     changes = json.loads(row.get('changes') or '{}')
     if not changes or row['asked'] == 'displacement':
         return [f'engine-mount report {place}', f'engine-mount view {place}']
-    mount = [f'--mount {row["mount"]}'] if row['mount'] else []
+    mount = [f'--position {row["mount"]}'] if row['mount'] else []
     settings = [
         f'--set {shlex.quote(f"{node}.{name}={value if isinstance(value, str) else json.dumps(value)}")}'
         for node, values in changes.items()

@@ -193,9 +193,7 @@ class AnswerFigures:
 
     def __init__(self) -> None:
         self._columns: dict[str, list[Column]] = defaultdict(list)
-        self._steps: list[
-            list[tuple[Times, Column]]
-        ] = []  # of each run: stamps (ns), how far damping is open
+        self._steps: list[list[tuple[Times, Column]]] = []  # of each run: stamps (ns), degree of damping
         self._table: Sequence[Column] = ()
 
     def begin_run(self, current: Column, normal_force: Column) -> None:

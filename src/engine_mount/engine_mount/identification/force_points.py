@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.polynomial import polyfit
 
 from engine_mount.identification.fitting import FloatArray
 from mount_models.quantity import LawRefusedError
@@ -15,7 +16,11 @@ _PARTS, _FEWEST_IN_PART = 8, 25  # chosen: noise often grows with the force
 _SAME_GAP = 1e-6  # m, chosen
 _FEWEST_CURRENTS = 8  # chosen: five coefficients and some to spare
 _SMALLEST_SPAN = 0.1  # chosen: of the largest gap
+_WEAK, _FEWEST_WEAK = 0.4, 5  # chosen: of the largest force of a gap; there the core hardly saturates
+_NEAR_ZERO = 0.1  # of the largest current, chosen
+_LARGEST_ZERO = 0.005  # of the largest force, chosen
 _FAR = 6.0  # standard deviations, chosen: of 10^5 good points none
+_FAR_TOLERANCES = 1.5, 10.0  # chosen: nearer no law of this form comes everywhere, further no noise goes
 _MANY = 0.1  # chosen: that many are not outliers, something is wrong
 _NAMED = 5
 
@@ -74,6 +79,24 @@ def checked_points(gap: npt.ArrayLike, current: npt.ArrayLike, force: npt.ArrayL
     return points
 
 
+def check_zero(points: ForcePoints) -> None:
+    """Raise `LawRefusedError` for forces that do not lead to 0 N at 0 A, by the weak ones of each gap."""
+    zeros = []
+    for group in gap_groups(points.gap):
+        current, force = points.current[group], points.force[group]
+        weak = force <= _WEAK * force.max()
+        if weak.sum() >= _FEWEST_WEAK and current.min() <= _NEAR_ZERO * current.max():
+            zeros.append(polyfit(current[weak] ** 2, force[weak], 2)[0])  # without remanence it is even
+    zero, limit = float(np.median(zeros or [0.0])), _LARGEST_ZERO * points.force.max()
+    # a load cell has the same zero at each gap
+    if abs(zero) > max(limit, np.ptp(zeros or [0.0])):
+        raise LawRefusedError(
+            f'the force at 0 A ({zero:.2f} N by the weak currents) must lie within {limit:.2f} N of 0: set '
+            'the zero of the load cell, or subtract this force; if it returns, the core is magnetised, which '
+            'the law does not describe'
+        )
+
+
 def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
     """Return the places of points that share a gap (m), by rising gap; measured gaps may scatter a little."""
     order = np.argsort(gap, kind='stable')
@@ -85,7 +108,8 @@ def gap_groups(gap: FloatArray) -> list[npt.NDArray[np.intp]]:
 def check_outliers(points: ForcePoints, expected: FloatArray, tolerance: FloatArray) -> None:
     """Raise `LawRefusedError` naming the points whose force lies far from the `expected` one (N).
 
-    Far is more than six standard deviations of points with like forces, and more than `tolerance` (N).
+    Far is more than six standard deviations of points with like forces, and more than 1.5 `tolerance` (N),
+    or more than 10.
     """
     misfit = np.abs(points.force - expected) / tolerance
     far = far_points(points.force, misfit)
@@ -103,10 +127,9 @@ def check_outliers(points: ForcePoints, expected: FloatArray, tolerance: FloatAr
             'are gap, current and force of the same actuator, in the units of their columns, and taken at '
             'the same time?'
         )
-    others = f' and {far.size - worst.size} more' if far.size > worst.size else ''
     raise LawRefusedError(
         f'{far.size} of {misfit.size} points are outliers, off by more than {_FAR:.0f} standard deviations '
-        f'of points with like forces: {"; ".join(named)}{others}: measure them again, or leave them out'
+        f'of points with like forces: {"; ".join(named)}: measure them again, or leave them out'
     )
 
 
@@ -116,5 +139,5 @@ def far_points(force: FloatArray, misfit: FloatArray) -> npt.NDArray[np.intp]:
     parts = np.array_split(order, max(1, min(_PARTS, force.size // _FEWEST_IN_PART)))
     middles = np.array([np.median(force[part]) for part in parts])
     scatters = np.array([1.4826 * np.median(misfit[part]) for part in parts])
-    limit = np.maximum(_FAR * np.interp(force, middles, scatters), 1.0)
+    limit = np.clip(_FAR * np.interp(force, middles, scatters), *_FAR_TOLERANCES)
     return np.flatnonzero(misfit > limit)

@@ -85,7 +85,7 @@ def measured_point(
     try:
         crossing = find_crossing(current, inductance, crossing_inductance, _CROSSING_HALF_WIDTH)
     except CrossingError as error:
-        raise LawRefusedError(f'{name}: {error}, or choose another --crossing-inductance') from error
+        raise LawRefusedError(f'{name}: {error}') from error
     return GapPoint(name, gap, celsius, *at_rest, crossing.current, crossing.current_std)
 
 
@@ -177,8 +177,7 @@ def _check_slopes(what: str, curve: ScaledPolynomial, slopes: FloatArray, covari
         raise LawRefusedError(
             f'the {what} must rise or fall steadily with the gap to separate gaps; at '
             f'{1e6 * (curve.centre + curve.scale * _GRID[np.argmax(doubtful)]):.0f} um it does not, beyond '
-            f'{_BEYOND_DOUBT:g} standard deviations: narrow the range of gaps, or choose another rest '
-            'current or crossing inductance'
+            f'{_BEYOND_DOUBT:g} standard deviations: narrow the range of gaps'
         )
 
 

@@ -22,6 +22,7 @@ from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_o
 from engine_mount.identification.friction.screening import case_of, subtract_zero
 from engine_mount.recordings.recording import recording_hash
 from engine_mount.signals.mapping import Mapping
+from mount_models.quantity import nearest
 from mount_models.specimen import chosen_specimen, friction_contact
 
 STEPS = ('auto', RAMP, SAWTOOTH, 'ladder')
@@ -81,7 +82,7 @@ def friction(
 def _check_order(train: Sequence[Path], held_out: Sequence[Path], files: Sequence[Path], step: str) -> None:
     """Raise `IdentificationError` for arguments that contradict each other."""
     if step not in STEPS:
-        raise IdentificationError(f'--step {step!r} must be one of {", ".join(STEPS)}')
+        raise IdentificationError(f'--step {step!r} is unknown; {nearest(step, STEPS)}')
     if files and (train or held_out):
         raise IdentificationError(
             '--file tries all pairs of its files; give it alone, or --train and --held-out'

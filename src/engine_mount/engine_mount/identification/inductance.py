@@ -1,6 +1,8 @@
 """Gap curves and their temperature compensation from ripple at two or more coil temperatures."""
 
+import contextlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -155,33 +157,29 @@ def calibrate_inductance(
 ) -> InductanceCalibration:
     """Return the calibration by the core's `coefficient` (1/K); raises `LawRefusedError`.
 
-    Recordings at temperatures `held_out` (degC) only judge it.
+    Recordings at temperatures `held_out` (degC) only judge it. A refusal names another crossing inductance
+    where one serves all recordings.
     """
-    points = [measured_point(each, base.rest_current, base.crossing_inductance) for each in recordings]
-    unseen = [point for point in points if any(_is_alike(point.celsius, celsius) for celsius in held_out)]
-    fitted = [point for point in points if point not in unseen]
-    groups: dict[float, list[GapPoint]] = {}
-    for point in sorted(fitted, key=lambda each: each.celsius):
-        near = [key for key in groups if _is_alike(key, point.celsius)]
-        groups.setdefault(near[-1] if near else point.celsius, []).append(point)
-    if not groups:
+
+    def attempt(level: float) -> InductanceCalibration:
+        own = replace(base, crossing_inductance=level)
+        return _calibrated(recordings, own, files, coefficient, held_out)
+
+    try:
+        return attempt(base.crossing_inductance)
+    except LawRefusedError as error:
+        low, high = np.transpose([np.nanpercentile(each.inductance, (2, 98)) for each in recordings])
+        serving = []
+        # 20 of them, chosen, rounded to 0.01 mH: exactly the value that the sentence names is tried
+        for level in np.round(np.linspace(low.max(), high.min(), 20), 5).tolist():
+            with contextlib.suppress(LawRefusedError):
+                attempt(level)
+                serving.append(level)
+        if not serving:
+            raise
         raise LawRefusedError(
-            f'all {len(points)} recordings are held out; leave those out of --held-out-temperature that the '
-            'curves shall be fitted to'
-        )
-    own = max(groups, key=lambda celsius: (len(groups[celsius]), -abs(celsius - 20.0)))
-    calibration = calibrate_gap_curves(groups.pop(own))
-    if not groups:
-        raise LawRefusedError(
-            f'all recordings are at one coil temperature ({own:.0f} degC), and it moves the gap that is '
-            f'read: record {_FEWEST_GAPS} or more gaps at a second temperature too'
-        )
-    celsius = float(np.mean([point.celsius for point in calibration.points]))
-    other = groups[max(groups, key=lambda key: (len(groups[key]), abs(key - own)))]
-    compensation = measured_compensation(calibration.curves, celsius, other, coefficient)
-    errors = gap_errors(calibration.curves, compensation, fitted, 'fitted')
-    errors += gap_errors(calibration.curves, compensation, unseen, 'held out')
-    return InductanceCalibration(base, files, calibration, compensation, errors)
+            f'{error}; --crossing-inductance {1e3 * serving[len(serving) // 2]:g} serves these recordings'
+        ) from error
 
 
 def measured_compensation(
@@ -247,6 +245,40 @@ def gap_errors(
         figures = {name: float(f'{value:.3g}') for name, value in zip(_ERRORS, worst, strict=True)}
         rows.append({'celsius': float(celsius), 'source': source, **figures})
     return rows
+
+
+def _calibrated(
+    recordings: Sequence[RippleRecording],
+    base: Specimen,
+    files: Sequence[Path],
+    coefficient: float,
+    held_out: Sequence[float],
+) -> InductanceCalibration:
+    points = [measured_point(each, base.rest_current, base.crossing_inductance) for each in recordings]
+    unseen = [point for point in points if any(_is_alike(point.celsius, celsius) for celsius in held_out)]
+    fitted = [point for point in points if point not in unseen]
+    groups: dict[float, list[GapPoint]] = {}
+    for point in sorted(fitted, key=lambda each: each.celsius):
+        near = [key for key in groups if _is_alike(key, point.celsius)]
+        groups.setdefault(near[-1] if near else point.celsius, []).append(point)
+    if not groups:
+        raise LawRefusedError(
+            f'all {len(points)} recordings are held out; leave those out of --held-out-temperature that the '
+            'curves shall be fitted to'
+        )
+    own = max(groups, key=lambda celsius: (len(groups[celsius]), -abs(celsius - 20.0)))
+    calibration = calibrate_gap_curves(groups.pop(own))
+    if not groups:
+        raise LawRefusedError(
+            f'all recordings are at one coil temperature ({own:.0f} degC), and it moves the gap that is '
+            f'read: record {_FEWEST_GAPS} or more gaps at a second temperature too'
+        )
+    celsius = float(np.mean([point.celsius for point in calibration.points]))
+    other = groups[max(groups, key=lambda key: (len(groups[key]), abs(key - own)))]
+    compensation = measured_compensation(calibration.curves, celsius, other, coefficient)
+    errors = gap_errors(calibration.curves, compensation, fitted, 'fitted')
+    errors += gap_errors(calibration.curves, compensation, unseen, 'held out')
+    return InductanceCalibration(base, files, calibration, compensation, errors)
 
 
 def _is_alike(one: float, other: float) -> bool:

@@ -146,8 +146,14 @@ def _ripple_from_table(
     file: Path, mapping: Choices, values: FileValues, turns_area: float
 ) -> list[RippleRecording]:
     columns = select_rows(
-        recording_place(file), mapping, {name: RACK[name] for name in RACK if name != 'force'}, ('current',)
+        recording_place(file), mapping, {name: RACK[name] for name in RACK if name != 'force'}, ()
     )
+    if 'current' not in columns or np.ptp(columns['current']) == 0.0:
+        raise IdentificationError(
+            f'{file} has no current that changes; gap curves need inductance over current at each gap, from '
+            'the rest current until the core saturates: record it, or choose its column with --column '
+            'current=HEADER:UNIT'
+        )
     current, celsius = columns['current'], columns.get('coil_temperature')
     if celsius is not None:
         celsius = np.round(celsius - ZERO_CELSIUS, 9)  # 20 degC stay 20 to the bit on the way over K
@@ -161,7 +167,6 @@ def _ripple_from_table(
             f'{file} must have a column inductance_mh, or current_rate_a_per_s and flux_rate_t_per_s; choose '
             'them with --column NAME=HEADER:UNIT'
         )
-    _check_alive(file, 'current', 'A', current)
     _check_alive(file, 'inductance', 'H', inductance, current)
     by_column = 'gap' in columns and file not in values.gap
     gaps = columns['gap'] if by_column else np.full(current.shape, values.gap_of(file))

@@ -10,7 +10,6 @@ from typing import Any
 
 import yaml
 
-from engine_mount.identification.fitting import IdentificationError
 from engine_mount.recordings.recording import recording_hash
 from mount_models.specimen import SCHEMA_VERSION, Specimen, checked_specimen
 from mount_recorder.versions import versions
@@ -21,15 +20,6 @@ PARTS = {
     'friction': 'identify friction',
 }
 """Parts of a specimen that are measured, and the command for each."""
-
-
-def check_targets(*files: Path | None) -> None:
-    """Raise `IdentificationError` unless every file that is to be written has a folder to be in."""
-    for file in files:
-        if file is not None and (file.is_dir() or not file.absolute().parent.is_dir()):
-            raise IdentificationError(
-                f'{file} must be a file in an existing folder; make {file.parent} first'
-            )
 
 
 def described_files(files: Sequence[Path]) -> list[dict[str, str]]:

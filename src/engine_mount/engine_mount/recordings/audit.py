@@ -25,7 +25,7 @@ from engine_mount.recordings.answers import (
 from engine_mount.recordings.events import CONTROL, node_reports
 from engine_mount.recordings.metadata import read_statement
 from engine_mount.recordings.recording import Recording
-from engine_mount.recordings.series import Series, SeriesError
+from engine_mount.recordings.series import Column, Series, SeriesError
 from engine_mount.recordings.session import recorded_sample_rate
 from engine_mount.recordings.times import (
     MOST_JITTER,
@@ -58,7 +58,8 @@ class TopicAudit:
     """What is there of a topic and what is not; None and NaN where it cannot be told, as `remark` says.
 
     `present` counts messages, `duplicated` those of them that repeat a sample, so that
-    expected = present - duplicated + lost. The stamp of a `misdated` one cannot be that of its sample; for
+    expected = present - duplicated + lost. The 0 A with which control ends repeats the last stamp, and is no
+    duplicate. The stamp of a `misdated` one cannot be that of its sample; for
     all else it counts as taken where it came. `displacement` has `lost_samples`, counted once
     whether their displacement, their ripple or both are missing, and how the samples were answered;
     `current_setpoint` has `latency`.
@@ -93,6 +94,7 @@ class _Topic(NamedTuple):
     wrong: NDArray[np.bool_]
     stamps: Times
     obstacle: str = ''  # why there are no stamps
+    closed: bool = False  # whether the last one is the 0 A with which control ends
 
 
 class _Mount(NamedTuple):
@@ -165,11 +167,25 @@ def _judged(recording: Recording, series: Series) -> _Topic:
         why = str(error).removeprefix(f'{series.topic}: ').removesuffix('; use receive_times')
         stamps, obstacle = NO_TIMES, why
     wrong = misdated(stamps)
-    return _Topic(series, topic, rate, wrong, redated(stamps, wrong, rate) if rate else stamps, obstacle)
+    closed = topic is CURRENT_SETPOINT and len(stamps) > 1 and stamps[-2] == stamps[-1]
+    closed = closed and _currents(recording, series.topic)[-1] == 0.0
+    return _Topic(
+        series, topic, rate, wrong, redated(stamps, wrong, rate) if rate else stamps, obstacle, bool(closed)
+    )
+
+
+def _currents(recording: Recording, topic: str) -> Column:
+    """Return the setpoints, A; NaN where they are no setpoints of ours."""
+    current = CURRENT_SETPOINT.names[0]
+    recording.load_columns({topic: (current,)})
+    try:
+        return recording[topic][current]
+    except SeriesError:
+        return np.full(len(recording[topic]), math.nan)
 
 
 def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
-    series, topic, rate, wrong, stamps, obstacle = topics[name]
+    series, topic, rate, wrong, stamps, obstacle, closed = topics[name]
     present = len(series)
     if not present:
         return TopicAudit(None, 0, None, remark='no message')
@@ -187,6 +203,9 @@ def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
         misdated=int(np.count_nonzero(wrong)) or None,
         rate_hz=rate,
         remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',
+    )
+    entry = replace(
+        entry, duplicated=(entry.duplicated or 0) - closed, expected=(entry.expected or 0) + closed
     )
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE):
         if len(_Mount(name.removesuffix(topic.name), topics).stamps(DISPLACEMENT)):
@@ -242,9 +261,5 @@ def _lost_steps(recording: Recording, mount: _Mount, answers: Answers) -> int:
     untraced = ~is_in(setpoints, np.sort(traced)) & (spanned(setpoints, answers.spans) >= 0)
     if not len(traced) or not untraced.any():
         return 0
-    name, current = mount.namespace + CURRENT_SETPOINT.name, CURRENT_SETPOINT.names[0]
-    recording.load_columns({name: (current,)})
-    try:
-        return len(distinct(setpoints[untraced & (recording[name][current] > 0.0)]))
-    except SeriesError:
-        return 0  # no setpoints of ours
+    currents = _currents(recording, mount.namespace + CURRENT_SETPOINT.name)
+    return len(distinct(setpoints[untraced & (currents > 0.0)]))

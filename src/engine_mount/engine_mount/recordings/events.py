@@ -196,7 +196,7 @@ def switching_times(time: Signal, active: Signal) -> tuple[Signal, Signal]:
 
 
 def switching_places(time: Signal, active: Signal) -> tuple[Places, Places]:
-    """Return at which samples damping went on and off: where it is active, an opening of any width.
+    """Return at which samples damping went on and off: where it is active, to any degree.
 
     So it counts as on where the coil carries current. A pause shorter than `PAUSE` is none.
     """

@@ -13,8 +13,10 @@ from engine_mount.recordings.audit import TopicAudit
 from engine_mount.recordings.events import CONTROL, node_reports, recorded_marks
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
+from engine_mount.recordings.session import told_session
 from mount_models.sampling import SETPOINT_TIMEOUT
 from mount_recorder.automatic_marks import MarkKind
+from mount_ros.topics import DIAGNOSTICS
 
 _SAME = 5.0  # s, chosen: a mark that repeats the sentence of a report so soon is of the same fault
 _NUMBERS = re.compile(r'\d+(\.\d+)?')
@@ -93,6 +95,7 @@ class Losses:
     `lost_messages` are those of any topic that were sent and are not there. While control was active,
     `asked` samples were taken, of which `unanswered` have no setpoint and `late` one that came too late to be
     used. `misdated` messages have a stamp that is none of a sample. None where the recording cannot tell.
+    `unjudged` is the reason why no node reports faults, empty where nodes do.
     """
 
     samples: int | None
@@ -104,6 +107,7 @@ class Losses:
     misdated: int
     faults: tuple[Fault, ...]
     whole: bool  # nothing of the recording is known to be damaged or missing
+    unjudged: str = ''
 
     @property
     def sound(self) -> bool:
@@ -152,7 +156,7 @@ class Losses:
     def faults_text(self) -> str:
         """Return how many faults there are, and the first in words, each on a line of its own."""
         if not self.faults:
-            return 'none'
+            return f'not judged: {self.unjudged}' if self.unjudged else 'none'
         rest = len(self.faults) - _SHOWN
         more = [f'and {rest} more'] if rest > 0 else []
         return f'{len(self.faults)}:\n' + ';\n'.join([*map(str, self.faults[:_SHOWN]), *more])
@@ -178,6 +182,10 @@ def losses(recording: Recording, audits: Mapping[str, TopicAudit]) -> Losses:
     """Return the figures of a recording from its audit."""
     sampled = [entry for entry in audits.values() if entry.lost_samples is not None]
     answers = [entry.answers for entry in audits.values() if entry.answers is not None]
+    unjudged = ''
+    if DIAGNOSTICS.name not in audits or not audits[DIAGNOSTICS.name].present:
+        core = told_session(recording).get('mode') == 'core'
+        unjudged = 'core has no watches' if core else 'no diagnostics recorded'
     return Losses(
         samples=_sum(entry.expected for entry in sampled),
         lost_samples=_sum(entry.lost_samples for entry in sampled),
@@ -188,6 +196,7 @@ def losses(recording: Recording, audits: Mapping[str, TopicAudit]) -> Losses:
         misdated=_sum(entry.misdated for entry in audits.values()) or 0,
         faults=tuple(faults(recording, audits)),
         whole=recording.whole,
+        unjudged=unjudged,
     )
 
 

@@ -3,13 +3,14 @@
 Those that drive something are written at its rate, others as sampled.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.recordings.metadata import units_text
 from engine_mount.signals.even_grid import evenly_spaced
@@ -36,19 +37,26 @@ PREFIX = 'measured/'
 """The beginning of topics that only foreign recordings have."""
 SCENARIO = 'imported'
 """The scenario of such a recording, as its session tells it."""
-_BLOCK = 20_000_000_000  # ns, chosen: 20 s at 1 kHz are 7 MB of messages for each topic
-Times = NDArray[np.int64]
+_BLOCK = 5_000_000_000  # ns, chosen: 5 s at 1 kHz are 2 MB of messages for each topic
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """What is written in a `field` of a topic: stamps (ns, rising) and values (n,) in the SI unit `unit`."""
+    """What is written in a `field` of a topic: values (n,) in the SI unit `unit`.
+
+    Their `times` (n,), rising, are in s after `begin` (ns).
+    """
 
     topic: Topic
     field: str
     unit: str
-    stamps: Times
+    times: FloatArray
+    begin: int
     values: FloatArray
+
+    def stamps(self, place: Any) -> Any:
+        """Return the stamps in ns at `place`, an index or a slice."""
+        return self.begin + np.rint(SECOND * self.times[place]).astype(np.int64)
 
 
 def recorded_as(wanted: Quantity) -> tuple[Topic, str]:
@@ -70,29 +78,29 @@ def channels_of(
     Raises `SignalError` for what no command could follow.
     """
     notes: list[str] = []
-    found: dict[str, tuple[Times, FloatArray]] = {}
+    found: dict[str, tuple[FloatArray, int, FloatArray]] = {}
     ends = (DISPLACEMENT,) if DISPLACEMENT in signals else (ENGINE, CHASSIS)
     if all(name in signals for name in ends):
         sides = [signals[name] for name in ends]
-        stamps, (upper, *lower) = _resampled(sides, LOWEST_RATE, SHORTEST, notes)
-        found[DISPLACEMENT] = stamps, upper - sum(lower)
+        times, begin, (upper, *lower) = _resampled(sides, LOWEST_RATE, SHORTEST, notes)
+        found[DISPLACEMENT] = times, begin, upper - sum(lower)
         check_size(
-            ' and '.join(one.name for one in sides), found[DISPLACEMENT][1], 1.0 / SAMPLE_RATE,
+            ' and '.join(one.name for one in sides), found[DISPLACEMENT][-1], 1.0 / SAMPLE_RATE,
             ControlParameters().displacement_range, 'm',
             'is its unit another one, its zero another offset (in a mapping file), or is this sample a fault '
             'to cut out?',
         )  # fmt: skip
     for name, signal in signals.items():
         if name == ACCELERATION:
-            stamps, (values,) = _resampled([signal], LOWEST_RATE_OF_ACCELERATION, 0.0, notes)
-            found[name] = stamps, values
+            times, begin, (values,) = _resampled([signal], LOWEST_RATE_OF_ACCELERATION, 0.0, notes)
+            found[name] = times, begin, values
         elif name != DISPLACEMENT:
             check_order(signal.name, signal.times, 'cut the file there')
-            found[name] = signal.begin + np.rint(SECOND * signal.times).astype(np.int64), signal.values
+            found[name] = signal.times, signal.begin, signal.values
     channels = []
-    for name, (stamps, values) in found.items():
+    for name, sampled in found.items():
         wanted = quantities.get(name) or QUANTITIES[name]
-        channels.append(Channel(*recorded_as(wanted), wanted.unit.symbol, stamps, values))
+        channels.append(Channel(*recorded_as(wanted), wanted.unit.symbol, *sampled))
     return channels, list(dict.fromkeys(notes))
 
 
@@ -101,8 +109,8 @@ def write_channels(
 ) -> None:
     """Write the recording `folder`; log times are the stamps. `progress` takes the share that is done."""
     writer = BagWriter(folder, chunk_size=LONG_CHUNK_SIZE)
-    begin = min(int(channel.stamps[0]) for channel in channels)
-    end = max(int(channel.stamps[-1]) for channel in channels)
+    begin = min(int(channel.stamps(0)) for channel in channels)
+    end = max(int(channel.stamps(-1)) for channel in channels)
     try:
         writer.add_topic(f'/{SESSION.name}', SESSION.type)
         for channel in channels:
@@ -120,8 +128,8 @@ def write_channels(
 
 def _resampled(
     signals: Sequence[Signal], lowest_rate: float, shortest: float, notes: list[str]
-) -> tuple[Times, list[FloatArray]]:
-    """Return stamps (ns) at the rate of a drive for as long as all signals last, and the values of each.
+) -> tuple[FloatArray, int, list[FloatArray]]:
+    """Return times (s) at the rate of a drive for as long as all signals last, their begin (ns), and values.
 
     Adds what was done to `notes`; raises `SignalError`, also where they last for less than `shortest` (s).
     """
@@ -143,25 +151,22 @@ def _resampled(
         if not has_step(one, step)
     ]
     values = [resampled(one, step, (begin - one.begin) / SECOND, count)[:] for one in even]
-    return np.arange(begin, begin + count * step_ns, step_ns, dtype=np.int64), values
+    return np.arange(count, dtype=np.float64) * step, begin, values
 
 
 def _write_block(writer: BagWriter, channels: Sequence[Channel], first: int, behind: int) -> None:
     """Write the messages from `first` on and before `behind` (ns)."""
-    topics: list[str] = []
-    messages: list[bytes] = []
-    stamps = [np.zeros(0, np.int64)]
+    messages: list[tuple[int, str, bytes]] = []
     for channel in channels:
-        part = slice(*np.searchsorted(channel.stamps, [first, behind]))
+        places = range(channel.values.size)
+        part = slice(*(bisect_left(places, edge, key=channel.stamps) for edge in (first, behind)))
         if part.start < part.stop:
-            topic, own, values = channel.topic, channel.stamps[part], channel.values[part]
+            topic, own, values = channel.topic, channel.stamps(part), channel.values[part]
             if topic.type == JOINT_STATE:
                 rows = ScalarsLayout(topic).pack_rows(own, values[:, None])
             else:
                 rows = OneNumberLayout(accelerometer).pack_rows(own, values)
-            topics += [f'/{topic.name}'] * len(rows)
-            messages += rows.view(f'V{rows.shape[1]}').ravel().tolist()
-            stamps.append(own)
-    times = np.concatenate(stamps)
-    for place in np.argsort(times, kind='stable').tolist():
-        writer.write(topics[place], messages[place], int(times[place]))
+            raw = rows.view(f'V{rows.shape[1]}').ravel().tolist()
+            messages += zip(own.tolist(), [f'/{topic.name}'] * len(raw), raw, strict=True)
+    for stamp, name, message in sorted(messages, key=itemgetter(0)):
+        writer.write(name, message, stamp)

@@ -10,9 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine_mount.signals.signal import SECOND, FloatArray, Signal, SignalError, check_count, check_order
+from engine_mount.signals.signal import (
+    SECOND,
+    FloatArray,
+    Signal,
+    SignalError,
+    check_count,
+    check_order,
+    mean,
+)
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.sums import mean
 
 ON_THE_LINE = 1e-3
 """Share of a period, chosen: so late a sample of a sine of 0.15 of the rate is wrong by a thousandth."""
@@ -57,12 +64,13 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
             f'{name}: time does not rise: all samples are at {signal.times[0]:g} s; say their --rate'
         )
     again = (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)
-    once = np.concatenate([[True], ~again])
+    once = np.concatenate([[True], ~again]) if again.any() else slice(None)
     times, values = signal.times[once], signal.values[once]
     check_count(name, times.size)
     numbers = np.arange(times.size) - 0.5 * (times.size - 1)
     period = mean(numbers * times) / mean(numbers * numbers)
     first = mean(times) + numbers[0] * period
+    del numbers  # it can be an hour
     late = float(np.abs(times - (first + period * np.arange(times.size))).max()) / period
     notes = list(signal.notes)
     if late > JITTER:

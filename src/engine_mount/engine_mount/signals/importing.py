@@ -112,7 +112,7 @@ def import_file(
         imported.recordings.append(folder)
         for channel in channels:
             topic = f'/{channel.topic.name}'
-            imported.samples[topic] = imported.samples.get(topic, 0) + int(channel.stamps.size)
+            imported.samples[topic] = imported.samples.get(topic, 0) + channel.values.size
     return imported
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from engine_mount.signals.formats.measured import MeasuredColumn
 from engine_mount.signals.mapping import ColumnChoice
 from engine_mount.signals.quantities import Quantity
-from engine_mount.signals.signal import FloatArray, SignalError
+from engine_mount.signals.signal import FloatArray, SignalError, mean
 from engine_mount.signals.units import STANDARD_GRAVITY, Unit, find_unit, unit_of, units_of
-from mount_models.arithmetic.sums import mean
 
 GRAVITY_WITHIN = 0.06
 """Share of standard gravity, chosen: a tilt of 20 degrees, or the error of a common sensor."""
@@ -93,12 +92,11 @@ def unit_of_column(
 
 
 def _size(values: FloatArray) -> FloatArray:
-    """Return mean, lowest, highest and usual lowest and highest of values (n,), NaN left out."""
-    known = values[~np.isnan(values)]
-    low, high = known.min(), known.max()
-    usual = np.percentile(known[:: max(1, known.size // _LOOKED_AT)], _USUAL)
+    """Return mean, lowest, highest and usual lowest and highest of values (n,)."""
+    low, high = values.min(), values.max()
+    usual = np.percentile(values[:: max(1, values.size // _LOOKED_AT)], _USUAL)
     # one that is all the same has that mean, which a sum would miss by its rounding
-    return np.array([mean(known) if high > low else low, low, high, *usual])
+    return np.array([mean(values) if high > low else low, low, high, *usual])
 
 
 def _doubt(wanted: Quantity, size: FloatArray) -> str:

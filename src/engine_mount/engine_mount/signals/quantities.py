@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units import Unit, si_unit
+from mount_models.quantity import nearest
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ QUANTITIES = by_name(
 def quantity(name: str, known: Quantities = QUANTITIES) -> Quantity:
     """Return the quantity `name`; raises `SignalError` with those that are known."""
     if name not in known:
-        raise SignalError(f'{name!r} is no quantity; known are {", ".join(known)}')
+        raise SignalError(f'{name!r} is no quantity; {nearest(name, known)}')
     return known[name]
 
 

@@ -22,11 +22,10 @@ from engine_mount.signals.formats.reading import headings, read
 from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
-from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count
+from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count, mean
 from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, si_unit, unit_of
-from mount_models.arithmetic.sums import mean
 
 _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
@@ -66,7 +65,7 @@ def select(
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
     uri = measured.provenance.uri
-    signals, quantities, columns = {}, {}, {}
+    signals, quantities, columns, chosen = {}, {}, {}, []
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
         if name not in mapping.others:
@@ -78,12 +77,16 @@ def select(
             raise SignalError(
                 f'{name} (column {column.name!r}): no unit is said, and its header has none; name it'
             )
-        where = f'{name_of(uri)}, column {column.name!r}'
         base, notes = column.time, ()
         if timed:
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
+        chosen.append((name, choice, wanted, column, base, notes))
+    measured = replace(measured, columns={})  # what the file holds of a column goes when it is converted
+    while chosen:
+        name, choice, wanted, column, base, notes = chosen.pop(0)
+        where = f'{name_of(uri)}, column {column.name!r}'
         is_known = _known(where, column, base, whole=whole)
         own = replace(column, values=column.values[is_known])
         unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
@@ -98,7 +101,8 @@ def select(
         begin = base.begin + round(SECOND * float(times[0]))
         if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
+        times = times - times[0] if missing else base.from_first
+        signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
             'times': base.told, 'samples': int(values.size),
@@ -176,7 +180,7 @@ def _by_title(there: Sequence[Heading], wanted: Quantity) -> ColumnChoice | None
     return fitting[0] if fitting else None
 
 
-def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_]:
+def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -> NDArray[np.bool_] | slice:
     """Return which samples hold a number; raises `SignalError` for values without times or bounds."""
     if base.times.size != column.values.size:
         raise SignalError(
@@ -191,7 +195,7 @@ def _known(where: str, column: MeasuredColumn, base: TimeBase, *, whole: bool) -
             said = f'row {place + 1} is {value}'
         raise SignalError(f'{where}: {said} ({bad.size} such of {known.size}); repair it or cut it out')
     check_count(where, int(np.count_nonzero(known)), 1 if whole else FEWEST)
-    return known
+    return slice(None) if known.all() else known  # a copy of an hour less
 
 
 def _at_times_of(first: Signal, signal: Signal, inside: NDArray[np.bool_]) -> FloatArray:

@@ -9,13 +9,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from engine_mount.recordings.recording import open_run
-from mount_ros.topics import TOPICS, Topic
+from mount_bringup.graph.nodes import GraphError
+from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 
 _PERIOD = 0.01  # s, chosen
-_LOWEST_RATE, _HIGHEST_RATE = 0.01, 1000.0
 
 
-class FeedError(ValueError):
+class FeedError(GraphError):
     """There is nothing to look at; the text says why and what would help."""
 
 
@@ -48,19 +48,20 @@ class Feed(Protocol):
 
 
 class RecordedFeed:
-    """A recording of one mount, from `begin` (s) on, `rate` times as fast as it was recorded."""
+    """A recording of one mount, `rate` times as fast as it was recorded.
+
+    It begins at `begin` (s from the first displacement sample).
+    """
 
     def __init__(self, path: Path, rate: float = 1.0, begin: float = 0.0, namespace: str = ''):
-        """Raises `FeedError`, or `ReadingError` for what is no recording."""
-        if not _LOWEST_RATE <= rate <= _HIGHEST_RATE:
-            raise FeedError(f'--rate ({rate:g}) must lie within {_LOWEST_RATE:g} .. {_HIGHEST_RATE:g}')
+        """Raises a `ValueError` for what is no recording, or for a `begin` that lies beyond it."""
         recording = open_run(path)
         mounts, wanted = recording.mounts, namespace.strip('/')
         if not wanted and len(mounts) == 1:
             wanted = mounts[0]
         if mounts and wanted not in mounts:
             named = ', '.join(mount or '/' for mount in sorted(mounts))
-            raise FeedError(f'{path} holds the mounts {named}: choose one with --namespace')
+            raise ValueError(f'{path} holds the mounts {named}: choose one with --namespace')
         part = recording.of_mount(wanted)
         self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
         self.title = f'{recording.short_name} at {rate:g} x'
@@ -69,15 +70,16 @@ class RecordedFeed:
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
         times = [series.receive_times for _, series in self._series]
         if not sum(map(len, times)):
-            raise FeedError(f'{path} holds no message of the topics of a mount')
+            raise ValueError(f'{path} holds no message of the topics of a mount')
         arrivals = np.concatenate(times)
         order = np.argsort(arrivals, kind='stable')
         self._arrivals = arrivals[order]
         self._owners = np.repeat(np.arange(len(times)), [*map(len, times)])[order]
         self._places = np.concatenate([np.arange(len(each)) for each in times])[order]
-        self._seconds = (self._arrivals - self._arrivals[0]) * 1e-9
+        samples = [each.receive_times for topic, each in self._series if topic is DISPLACEMENT and len(each)]
+        self._seconds = (self._arrivals - (*samples, self._arrivals)[0][0]) * 1e-9
         if not 0.0 <= begin <= self._seconds[-1]:
-            raise FeedError(f'--from ({begin:g} s) must lie within 0 .. {self._seconds[-1]:.3f} s')
+            raise ValueError(f'--from ({begin:g} s) must lie within 0 .. {self._seconds[-1]:.3f} s')
         self._rate, self._begin = rate, begin
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None

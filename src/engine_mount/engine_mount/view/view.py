@@ -26,7 +26,7 @@ def open_feed(
 ) -> Iterator[Feed]:
     """Give the feed of a recording from `begin` (s) on, or of the running graph.
 
-    Raises `FeedError` or `ReadingError`.
+    Raises `FeedError` or a `ValueError`.
     """
     feed: Feed
     if recording is not None:

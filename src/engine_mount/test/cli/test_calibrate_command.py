@@ -112,6 +112,7 @@ def test_doubtful_points_are_refused_and_no_file_is_written(files, tmp_path, col
     ('column', 'options', 'sentence'),
     [
         ('gap_um', [], 'its air gap is not known; add --gap changed.csv=UM'),
+        ('current_a', [], 'gap curves need inductance over current at each gap'),
         ('coil_temperature_c', [], 'add --coil-temperature DEGC'),
         ('', ['--gap', 'changed.csv=0.349'], 'was it meant in mm?'),
         ('', ['--gap', 'other.csv=349'], "'other.csv' is no file of those given"),

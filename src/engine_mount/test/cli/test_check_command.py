@@ -94,23 +94,6 @@ def test_a_worse_controller_fails_by_name(check, setting, caught):
     assert first[0] == 'fail'
 
 
-@pytest.mark.parametrize(
-    ('options', 'word'),
-    [
-        (('--only', 'gpa'), "'gpa' is no manoeuvre of the suite; did you mean gap"),
-        (('--set', 'mount_control.polcy=x'), 'did you mean policy'),
-        (('--set', 'mount_sim.motorway.gap_depth=0'), 'is set by the manoeuvre gap itself'),
-        (('--suite', 'nowhere.yaml'), 'cannot be read'),
-    ],
-)
-def test_wrong_use_drives_nothing(check, tmp_path, options, word):
-    ended, figures = check('wrong', *options)
-    assert ended.exit_code == 2
-    assert word in ' '.join(ended.output.replace('│', ' ').split())
-    assert figures == b''
-    assert not (tmp_path / 'wrong').exists()
-
-
 def test_the_manoeuvres_are_listed():
     listed = command('check', '--list').splitlines()
     assert listed[0].split()[:2] == ['rest', 'Standing,']

@@ -59,7 +59,7 @@ def test_runs_and_recordings_are_offered_the_newest_first(tmp_path, monkeypatch)
     ('words', 'offered'),
     [
         (['rep'], ['report', 'replay']),
-        (['faults', '--only', 'coil_open,kill_d'], ['coil_open,kill_driver']),
+        (['dev', 'faults', '--only', 'coil_open,kill_d'], ['coil_open,kill_driver']),
     ],
 )
 def test_bash_is_offered_values(words, offered):

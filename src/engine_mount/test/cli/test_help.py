@@ -21,7 +21,7 @@ def test_help_fits_80_columns_names_no_type_of_python_and_gives_an_example(words
     assert shown.exit_code == 0
     assert max(map(len, shown.output.splitlines())) <= 80
     assert not re.search(r'<\w+|list\[|\{\w+\}', shown.output)
-    if words in COMMANDS and words != 'prepare':
+    if words in COMMANDS and words != 'dev prepare':
         assert f'engine-mount {words}' in shown.output.split('╯')[-1]
         assert 'xit code' in shown.output
     for option in re.findall(r'--[\w-]+ +NUMBER +(.*)', shown.output):

@@ -111,7 +111,7 @@ def test_audit_and_recover_take_the_folder_of_a_run_its_recording_or_a_file(tmp_
     run.mkdir()
     recorded(run / 'recording', {DISPLACEMENT: displacements(5)})
     assert 'Nothing is known to be lost' in command('audit', run / place)
-    command('recover', run / place)
+    command('edit', 'recover', run / place)
     (made,) = run.rglob('*_recovered')
     assert made.parent == (run if place == '' else (run / place).parent)
     assert engine_mount.open(made).message_count == 5

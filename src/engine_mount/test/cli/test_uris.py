@@ -51,8 +51,8 @@ def test_replay_takes_uris_of_a_recording_and_of_a_table():
 
 @pytest.mark.parametrize('inner', ['', '/gap_0.mcap'])
 def test_what_is_made_of_a_uri_goes_into_the_current_folder(tmp_path, inner):
-    command('cut', RUN + inner, '--to', '1s')
-    command('recover', RUN + inner)
+    command('edit', 'cut', RUN + inner, '--to', '1s')
+    command('edit', 'recover', RUN + inner)
     command('report', RUN + inner)
     name = 'gap_0' if inner else 'gap'
     assert made(tmp_path) == [f'{name}_{what}' for what in ('0s_1s', 'recovered', 'report', 'report.html')]

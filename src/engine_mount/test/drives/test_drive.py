@@ -11,7 +11,7 @@ from engine_mount.drives import graph_drive
 from engine_mount.drives.drive import CombinationError, drive
 from engine_mount.drives.external_excitation import recorded_acceleration
 from engine_mount.recordings.screen import Screen
-from mount_bringup.graph.nodes import CONTROL, RECORDER
+from mount_bringup.graph.nodes import CONTROL, RECORDER, GraphError
 from mount_models.quantity import ParameterError
 
 SENTENCE = 'the run goes on without recording: no space left'
@@ -107,3 +107,18 @@ def test_the_bar_begins_at_0_whatever_was_measured_before_and_ends_at_1():
     shares = [graph_drive._share(report(3000), report(now)) for now in (3000, 4000, 5000)]
     assert shares == [0.0, 0.5, 1.0]
     assert graph_drive._share(report(5000), report(5000)) == graph_drive._share({}, {'samples': '1'}) == 1.0
+
+
+@pytest.mark.parametrize(
+    ('end', 'raised'), [(KeyboardInterrupt, KeyboardInterrupt), (ValueError, GraphError)]
+)
+def test_a_drive_that_ends_early_names_its_recording_and_is_no_wrong_use(tmp_path, monkeypatch, end, raised):
+    def record(folder, *_, **options):
+        folder.mkdir()
+        raise end
+
+    monkeypatch.setattr('engine_mount.drives.drive.record_core', record)
+    shown = io.StringIO()
+    with pytest.raises(raised):
+        drive(core=True, out=tmp_path / 'run', screen=Screen(shown))
+    assert shown.getvalue() == f'recording  {tmp_path}/run/recording\n'

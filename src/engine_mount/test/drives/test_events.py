@@ -35,8 +35,9 @@ def events(told, clock) -> DriveEvents:
     return DriveEvents(SIMULATED, told.append, clock)
 
 
-def off_at(stamp: int) -> dict[str, str]:
-    return {'level': '0', 'sentence': 'damping off', 'damping_active': 'False', 'last_stamp': str(stamp)}
+def off_at(stamp: int, mount: str = '') -> dict[str, str]:
+    figures = {f'damping_off{mount}': str(stamp), 'last_stamp': str(stamp + 40_000_000)}
+    return {'level': '0', 'sentence': 'recording', **figures}
 
 
 def test_the_states_of_the_nodes_are_told_before_any_of_them_is_there(events, told):
@@ -73,9 +74,11 @@ def test_the_gap_is_told_once(events, told):
 def test_damping_is_told_with_times_from_the_first_displacement_sample(events, told):
     events.on_report('mount_driver', DRIVER)
     events.on_mark('', Mark(8_000_000_000, 'switch_on', 'damping on at 0.9 mm in the band'))
-    events.on_report('mount_control', off_at(7_900_000_000))  # from before the mark
-    events.on_report('mount_control', off_at(8_460_000_000))
-    events.on_report('mount_control', off_at(9_460_000_000))
+    events.on_report('mount_recorder', off_at(7_900_000_000))  # from before the mark
+    events.on_report('mount_recorder', off_at(8_460_000_000) | {'last_stamp': '8499000000'})  # a short pause
+    assert events.damping == 'damping on'
+    events.on_report('mount_recorder', off_at(8_460_000_000))
+    events.on_report('mount_recorder', off_at(9_460_000_000))
     assert told == ['    1.00 s damping on at 0.9 mm in the band', '    1.46 s damping off']
 
 
@@ -83,9 +86,9 @@ def test_the_damping_of_several_mounts_is_told_from_the_marks_of_their_common_re
     events = DriveEvents(of_mounts(SIMULATED, ('left', 'right')), told.append)
     events.on_report('left/mount_driver', DRIVER)
     events.on_mark('', Mark(8_000_000_000, 'switch_on', 'left: damping on'))
-    events.on_report('right/mount_control', off_at(8_460_000_000))
+    events.on_report('mount_recorder', off_at(8_460_000_000, '.right'))
     assert events.damping == 'damping on'
-    events.on_report('left/mount_control', off_at(8_460_000_000))
+    events.on_report('mount_recorder', off_at(8_460_000_000, '.left'))
     assert told == ['    1.00 s left: damping on', '    1.46 s left: damping off']
 
 
@@ -95,7 +98,7 @@ def test_damping_that_flutters_is_summed_up(events, told, clock):
         clock.now = 0.05 * switch
         stamp = 8_000_000_000 + 50_000_000 * switch
         events.on_mark('', Mark(stamp, 'switch_on', 'damping on'))
-        events.on_report('mount_control', off_at(stamp + 20_000_000))
+        events.on_report('mount_recorder', off_at(stamp + 20_000_000))
     assert 10 < len(told) < 17
     assert 'more since the line before' in told[-1]
     assert events.damping == 'damping off, switched on 200 times'

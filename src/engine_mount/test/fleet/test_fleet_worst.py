@@ -56,13 +56,13 @@ def test_the_commands_name_the_place_the_mount_and_the_change(result):
     place = result.parent / 'my drives' / 'b'
     assert one.commands == [
         f"engine-mount report '{place}'",
-        f"engine-mount replay '{place}' --mount left --set mount_control.switch_on_level=0.0006 "
+        f"engine-mount replay '{place}' --position left --set mount_control.switch_on_level=0.0006 "
         '--set mount_control.policy=switched_viscous',
     ]
 
 
 def test_a_column_without_numbers_is_refused_with_those_that_have_some(result):
-    with pytest.raises(QueryError, match=r'is no column of numbers of result; there are size_bytes, '):
+    with pytest.raises(QueryError, match=r'is no column of numbers of result; known are size_bytes, '):
         worst(result, 'recording')
 
 

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from engine_mount.identification import force_law
 from engine_mount.identification.force_law import ActuatorCalibration, fit_force_law
 from engine_mount.identification.force_points import gap_groups
-from mount_models.actuator import TABLE_1, ForceLaw, checked_force
+from mount_models.actuator import TABLE_1, ForceLaw, check_force_law, checked_force
 from mount_models.quantity import LawRefusedError, OutsideLawError, with_values
 from mount_models.specimen import default_specimen
 from mount_sim.plant.reluctance import ReluctanceActuator, force
@@ -138,8 +137,8 @@ def with_nan(force):
 @pytest.mark.parametrize(
     ('gaps', 'currents', 'force', 'sentence'),
     [
-        (GAPS, CURRENTS, mixed, r'must|of the same actuator'),
-        (GAPS, CURRENTS, lambda f: f[::-1], 'must'),
+        (GAPS, CURRENTS, mixed, 'of the same actuator'),
+        (GAPS, CURRENTS, lambda f: f[::-1], 'must fall with the air gap'),
         (GAPS, CURRENTS, with_nan, 'finite'),
         (GAPS, CURRENTS, lambda f: -f, 'sign of the load cell'),
         (GAPS, -CURRENTS, lambda f: f, 'polarity of the current sensor'),
@@ -187,13 +186,70 @@ def test_forces_from_0_2_ampere_on_give_a_law_with_the_measured_range_in_the_spe
                 assert float(checked_force(fit.law, current, gap)) == expected
 
 
-def test_a_law_that_fails_only_below_the_lowest_current_is_refused_for_that(monkeypatch):
-    def fails_below(law, lowest_current=0.0):
-        if lowest_current < 0.5:
-            raise LawRefusedError('the force must be positive; at 293 um and 0.05 A it does not: look again')
+def synthetic(strongest, gaps, currents, saturation=math.inf, noise=0.005, zero=0.0, seed=0):
+    """Return gaps, currents, true and measured forces of a magnet with 100 um of residual gap."""
+    gap, current = gaps[:, np.newaxis] * 1e-6, currents
+    field = current / current.max() * (gap.min() + 100e-6) / (gap + 100e-6)
+    truth = strongest * field**2 / (1.0 + (field / saturation) ** 2)
+    random = np.random.default_rng(seed).standard_normal((2, *truth.shape))
+    return gap, current, truth, truth * (1.0 + noise * random[0]) + strongest * (1e-4 * random[1] + zero)
 
-    monkeypatch.setattr(force_law, 'check_force_law', fails_below)
-    with pytest.raises(LawRefusedError, match=r'measured from 0\.80 A on only.*measure from 0\.05 A on'):
-        fit_force_law(*points_from(0.8))
-    with pytest.raises(LawRefusedError, match='look again'):
-        fit_force_law(*points_from(0.0))
+
+SYNTHETIC = {
+    'no saturation': (synthetic(1500.0, np.linspace(200, 700, 15), np.linspace(0.05, 3.0, 31)), ''),
+    'no saturation, small': (
+        synthetic(10.0, np.linspace(100, 500, 8), np.linspace(0.03, 1.5, 12), noise=0.01), '',
+    ),
+    'no saturation, large': (
+        synthetic(2000.0, np.linspace(600, 3000, 10), np.linspace(0.2, 12.0, 25), noise=0.001), '',
+    ),
+    'no saturation, few gaps': (synthetic(300.0, np.linspace(200, 600, 5), np.linspace(0.1, 3.0, 20)), ''),
+    'no saturation, few currents': (
+        synthetic(300.0, np.linspace(200, 600, 10), np.linspace(0.1, 3.0, 8), noise=0.02), '',
+    ),
+    'saturation': (synthetic(330.0, np.linspace(250, 550, 12), np.linspace(0.06, 3.0, 24), 0.8), ''),
+    'noise': (synthetic(330.0, np.linspace(250, 550, 12), np.linspace(0.06, 3.0, 24), 0.6, 0.02), ''),
+    'deep saturation': (synthetic(120.0, np.linspace(200, 900, 12), np.linspace(0.1, 6.0, 30), 0.3), ''),
+    'saturation, few currents': (
+        synthetic(500.0, np.linspace(200, 500, 12), np.linspace(0.08, 4.0, 9), 0.7), '',
+    ),
+    'zero': (
+        synthetic(330.0, np.linspace(250, 550, 12), np.linspace(0.06, 3.0, 24), 0.8, zero=0.02),
+        r'force at 0 A \(6\.\d\d N .* zero of the load cell',
+    ),
+    'too few gaps': (
+        synthetic(330.0, np.linspace(250, 550, 4), np.linspace(0.06, 3.0, 24), 0.8), 'at least 5 air gaps',
+    ),
+    'too few currents': (
+        synthetic(330.0, np.linspace(250, 550, 12), np.linspace(0.06, 3.0, 7)), '8 currents or more',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(('points', 'refusal'), SYNTHETIC.values(), ids=SYNTHETIC)
+def test_any_actuator_is_identified_within_its_noise_or_refused_for_its_reason(points, refusal):
+    gap, current, truth, force = points
+    if refusal:
+        with pytest.raises(LawRefusedError, match=refusal):
+            fit_force_law(gap, current, force, 0.006 * force.max())
+        return
+    fit = fit_force_law(gap, current, force, 0.006 * force.max())
+    noise = np.sqrt(np.mean((force - truth) ** 2))
+    assert np.sqrt(np.mean(fit.error**2)) <= 1.4 * noise
+    assert np.sqrt(np.mean((checked_force(fit.law, current, gap) - truth) ** 2)) <= noise
+    check_force_law(fit.law)
+
+
+def test_a_law_without_saturation_is_right_between_the_gaps_and_states_its_doubt():
+    gap, current, truth, _ = synthetic(300.0, np.linspace(200, 600, 5), np.linspace(0.1, 3.0, 20))
+    fits = [
+        fit_force_law(gap, current, synthetic(300.0, gap[:, 0] * 1e6, current, seed=seed)[3], 1.8)
+        for seed in range(8)
+    ]
+    between = np.linspace(200e-6, 600e-6, 97)[:, np.newaxis]
+    expected = truth[0, -1] * ((300e-6) / (between + 100e-6)) ** 2
+    found = np.array([checked_force(fit.law, current[-1], between) for fit in fits])
+    assert found == pytest.approx(np.broadcast_to(expected, found.shape), rel=0.01)
+    powers = np.pi * current[-1] ** 2 * 400.0 ** np.arange(len(fits[0].law.a5))
+    stated = np.sqrt(powers @ fits[0].covariance[4:, 4:] @ powers)
+    assert found[:, 48, 0].std(ddof=1) == pytest.approx(stated, rel=0.7)

@@ -107,7 +107,7 @@ def test_the_zero_of_the_loop_is_taken_by_word_and_doubts_that_of_the_file():
     assert 'doubtful: the loop gives 2' in untouched.notes[-1]
     without = measured(x, jenkin(x, LIMITS, 1e6, 1e-3, 0.0), 0.0)
     assert subtract_zero(without)[0].notes == ()
-    with pytest.raises(IdentificationError, match="--zero 'rest' must be one of law, recorded"):
+    with pytest.raises(IdentificationError, match="--zero 'rest' is unknown; known are law, recorded"):
         subtract_zero(recording, 'rest')
 
 

@@ -9,7 +9,7 @@ import engine_mount
 from engine_mount.recordings.audit import audit
 from mount_recorder.bag_writer import BagWriter
 from mount_ros.messages.scalars import ScalarsLayout
-from mount_ros.topics import DISPLACEMENT
+from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT
 
 
 def test_sound_recording_has_nothing_to_tell(drive):
@@ -40,6 +40,15 @@ def test_topics_without_a_rate_have_no_expectation(tmp_path):
     assert audits['/session'].expected is None
     assert audits['/session'].present == 1
     assert audits['/displacement'].remark == 'no message'
+
+
+@pytest.mark.parametrize(('current', 'duplicated'), [(0.0, 0), (0.5, 1)])
+def test_the_zero_current_with_which_control_ends_is_no_duplicate(tmp_path, current, duplicated):
+    layout = ScalarsLayout(CURRENT_SETPOINT)
+    raws = [layout.pack(START + PERIOD * min(each, 99), (current,)) for each in range(101)]
+    bag = bag_of(tmp_path / 'bag', '/current_setpoint', CURRENT_SETPOINT.type, raws)
+    entry = audit(bag)['/current_setpoint']
+    assert (entry.expected, entry.present, entry.duplicated) == (101 - duplicated, 101, duplicated)
 
 
 @pytest.mark.parametrize(('late', 'figures'), [(8, (6000, 0, 0)), (600, (None, None, None))])

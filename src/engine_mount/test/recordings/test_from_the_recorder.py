@@ -16,7 +16,7 @@ def test_statement_that_is_not_understood_is_empty(text):
     assert read_statement({}) == {}
 
 
-def test_switched_stretches_of_an_opening_that_flutters():
+def test_switched_stretches_of_damping_that_flutters():
     time = np.arange(400)
     active = np.where(time % 30 < 15, 0.03, 0.0) * ((time > 100) & (time < 300))
     on, off = switching_times(1e-3 * time, active)

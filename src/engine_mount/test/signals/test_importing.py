@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from loaded_modules import modules_after
 
 import engine_mount
 from engine_mount.recordings.edit import cut
@@ -47,6 +48,14 @@ def test_titles_and_units_tell_what_columns_are(imported, tmp_path):
     assert acceleration['linear_acceleration.z'] == pytest.approx(SHAKING + 9.80665)
     assert set(np.diff(acceleration.stamps)) == {1_000_000}
     assert any('subtracted (its mean)' in note for note in done.notes)
+
+
+def test_an_import_at_1_khz_loads_neither_pandas_nor_what_compiles(imported, tmp_path):
+    imported({'t [s]': TIMES, 'Weg [mm]': 1e3 * TRAVEL, 'force [N]': 1e5 * TRAVEL})
+    program = f"import engine_mount as e; e.import_file('{tmp_path}/drive.csv', '{tmp_path}/again')"
+    loaded = modules_after(program)
+    assert 'engine_mount.signals.channels' in loaded
+    assert not {'pandas', 'numba.np.linalg'} & loaded
 
 
 def test_the_session_tells_where_it_came_from(imported, tmp_path):

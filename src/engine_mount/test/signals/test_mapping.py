@@ -41,7 +41,7 @@ def test_a_mapping_file_says_columns_units_and_times(tmp_path):
     ('text', 'reason'),
     [
         ('colums: {}', 'colums is not known; known are system, time, columns, others'),
-        ('columns: {displacment: {column: x}}', "'displacment' is no quantity; known are displacement"),
+        ('columns: {displacment: {column: x}}', "'displacment' is no quantity; did you mean displacement"),
         ('columns: {displacement: {colum: x}}', 'displacement: colum is not known'),
         ('columns: {displacement: x}', 'displacement must have keys'),
         ('columns: {displacement: {unit: mm}}', 'names no column'),

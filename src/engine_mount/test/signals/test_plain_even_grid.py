@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from engine_mount.signals.even_grid import evenly_spaced
-from engine_mount.signals.signal import SignalError, signal_of
+from engine_mount.signals.signal import SignalError, mean, signal_of
+from mount_models.arithmetic import sums
 
 PERIOD = 0.01
 COUNT = 3000
@@ -101,3 +102,8 @@ def test_a_clock_that_runs_a_little_slow_has_the_rate_of_its_name():
     assert evenly_spaced(signal, 0.125, 100.0).rate == pytest.approx(99.6, rel=1e-3)
     with pytest.raises(SignalError, match='at least 101 are needed'):
         evenly_spaced(signal, 0.125, 101.0)
+
+
+def test_the_mean_of_a_signal_is_the_ordered_sum_to_the_bit():
+    values = np.random.default_rng(3).normal(size=10_001)
+    assert mean(values) == sums.mean(values) != np.mean(values)

@@ -118,7 +118,7 @@ class Graph:
     def check(self) -> None:
         """Raise the reason why a wait must end."""
         if self._interrupted:
-            raise Interrupted
+            raise Interrupted('the coil is at 0 A')
 
     def wait_until(self, condition: Callable[[], bool], limit: float, what: str) -> None:
         """Serve the graph until `condition`; raise `GraphError` if it breaks down or `limit` s pass."""

@@ -30,7 +30,7 @@ from mount_bringup.settings import (
 )
 from mount_control.policy.registry import DEFAULT, POLICIES
 from mount_driver.parameters import DriverParameters
-from mount_models.quantity import check_name
+from mount_models.quantity import check_name, nearest
 from mount_ros.nodes.real_time import HIGHEST
 
 _CAN_OF_VEHICLE = {'interface': 'socketcan', 'channel': 'can0'}
@@ -84,6 +84,7 @@ _COMMON = (
     ),
     ('log_level', 'lowest level of the log of the nodes', 'info', 'debug info warn error fatal'),
     ('sample_rate', 'Hz: how often the electronics measure and are answered; empty: as in the config file'),
+    ('use_sim_time', 'true: no effect but a warning of each node, which needs no /clock'),
 )
 _OWN = {
     'vehicle': (
@@ -157,7 +158,7 @@ def launch_order(command: Sequence[str]) -> LaunchOrder:
     """
     graph, *words = command or ['']
     if graph not in GRAPHS:
-        raise SettingError(f'graph {graph!r} is unknown; the first word must be one of {", ".join(GRAPHS)}')
+        raise SettingError(f'graph {graph!r} is unknown; {nearest(graph, GRAPHS)}')
     given = texts_of(words, graph)
     nodes = SIMULATED if graph == 'sim' else VEHICLE
     namespace, domain = given['namespace'].strip('/'), chosen_domain(None)
@@ -224,7 +225,7 @@ def _known_parameters(nodes: Sequence[GraphNode]) -> dict[str, dict[str, Any]]:
     known[RECORDER.name] |= {'uri': '', 'mounts': '', 'topics': ['displacement']}
     if SIM in nodes:
         known[SIM.name] |= {'interface': '', 'channel': driver.channel, 'port': driver.port}
-    return known
+    return {node: {**values, 'use_sim_time': False} for node, values in known.items()}
 
 
 def _of_arguments(graph: str, given: Mapping[str, str], known: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""A viscous damper that opens with the amplitude in the band, without waiting for a period.
+"""A viscous damper that engages with the amplitude in the band, without waiting for a period.
 
 How much force comes from the unfiltered velocity, so that friction vanishes where the true velocity reverses;
 the band-pass only decides whether to damp. An idle line is told apart from the engine's motion: it keeps the
-damper from opening, and what force there is follows the engine alone.
+damper from engaging, and what force there is follows the engine alone.
 
     x_n = x - idle line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the idle line
     A = sqrt(x_b^2 + (v_b / w0)^2),  A_i = idle_weight (w_i / w0) (amplitude of the idle line)
@@ -27,13 +27,13 @@ from mount_models.sampling import SAMPLE_TIME
 
 _REVERSAL_SLOPE = 2.0
 """So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
-_LOWEST_OPENING = 0.03
-"""Below this opening there is no current (chosen): the offset current alone would rub with some 2 N."""
+_LOWEST_DEGREE = 0.03
+"""Below this degree there is no current (chosen): the offset current alone would rub with some 2 N."""
 _SMALLEST_SQUARE = 1e-12  # m^2: of a micrometre, keeps 0 / 0 away
 
 
 class Parameters(NamedTuple):
-    """Parameters of tracker, band-pass, opening and damper."""
+    """Parameters of tracker, band-pass, degree of damping and damper."""
 
     eigenfrequency: Annotated[
         float,
@@ -59,7 +59,7 @@ class Parameters(NamedTuple):
         Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95),
     ] = 0.7
     damping_coefficient: Annotated[
-        float, Quantity('N s/m', 'c: force over velocity, opened fully', 1.0, 1e4)
+        float, Quantity('N s/m', 'c: force over velocity at full damping', 1.0, 1e4)
     ] = 2600.0
     rounding_velocity: Annotated[
         float,
@@ -72,11 +72,13 @@ class Parameters(NamedTuple):
     full_amplitude: Annotated[
         float, Quantity('m', 'amplitude in the band from which damping is full', 1e-6, 0.01)
     ] = 0.0004
-    opening_time: Annotated[float, Quantity('s', 'time constant of the opening', 0.001, 1.0)] = 0.008
-    closing_time: Annotated[float, Quantity('s', 'and of the closing', 0.001, 10.0)] = 0.4
+    opening_time: Annotated[
+        float, Quantity('s', 'time constant by which the degree of damping rises', 0.001, 1.0)
+    ] = 0.008
+    closing_time: Annotated[float, Quantity('s', 'and by which it falls', 0.001, 10.0)] = 0.4
     idle_weight: Annotated[
         float,
-        Quantity('1', 'how much an idle line closes; 0: as if the engine never idled', 0.0, 100.0),
+        Quantity('1', 'how much an idle line lowers damping; 0: as if the engine never idled', 0.0, 100.0),
     ] = 5.0
 
 
@@ -95,8 +97,8 @@ class Law(NamedTuple):
     force_limit: float
     lowest: float
     per_range: float
-    opening: float
-    closing: float
+    rise: float
+    fall: float
     idle_weight: float
 
 
@@ -106,7 +108,7 @@ STATE = record_type(
         ('line', idle_line.STATE),
         ('position', 'f8'),
         ('velocity', 'f8'),
-        ('opening', 'f8'),
+        ('degree', 'f8'),
     ]
 )
 TRACE = {
@@ -140,8 +142,8 @@ def design(parameters: Parameters, sample_time: float) -> Design:
             force_limit=parameters.force_limit,
             lowest=parameters.lowest_amplitude,
             per_range=1.0 / (parameters.full_amplitude - parameters.lowest_amplitude),
-            opening=min(sample_time / parameters.opening_time, 1.0),
-            closing=min(sample_time / parameters.closing_time, 1.0),
+            rise=min(sample_time / parameters.opening_time, 1.0),
+            fall=min(sample_time / parameters.closing_time, 1.0),
             idle_weight=parameters.idle_weight / (parameters.eigenfrequency * sample_time),
         )
     )
@@ -200,13 +202,13 @@ def start(law, state, window, displacement):
 
 @compiled
 def transfer(law, new_law, state, window, new_window):
-    """Go on from the same last samples; tracker, idle line and opening keep their past."""
+    """Go on from the same last samples; tracker, idle line and degree of damping keep their past."""
     band_pass.transfer(law.band, new_law.band, state.band)
 
 
 @compiled
 def step(law, table, state, window, trace, displacement):
-    """Take one sample (m); return force (N), velocity (m/s) at which it acts, and opening 0 .. 1."""
+    """Take one sample (m); return force (N), velocity (m/s) at which it acts, degree of damping 0 .. 1."""
     line_displacement, line_velocity = idle_line.step(law.line, state.line, displacement)
     engine = displacement - line_displacement
     banded, _, band_velocity = band_pass.step(law.band, state.band, engine)
@@ -216,7 +218,7 @@ def step(law, table, state, window, trace, displacement):
     in_band = band_velocity / law.w0
     square = banded * banded + in_band * in_band
     amplitude = math.sqrt(square)
-    opening = _opening(law, state, amplitude, square)
+    degree = _degree(law, state, amplitude, square)
 
     trace.band_displacement = banded
     trace.amplitude = amplitude
@@ -224,12 +226,12 @@ def step(law, table, state, window, trace, displacement):
     trace.idle_frequency = state.line.turns / law.sample_time
     trace.engine_velocity = engine_velocity
     trace.predicted_velocity = velocity
-    if opening == 0.0:
+    if degree == 0.0:
         return 0.0, velocity, 0.0
     direction = -1.0 if velocity < 0.0 else 1.0
     speed = min(_REVERSAL_SLOPE * abs(velocity), max(direction * engine_velocity, 0.0))
     rounded = math.sqrt(speed * speed + law.rounding * law.rounding) - law.rounding
-    return direction * min(law.damping * opening * rounded, law.force_limit), velocity, opening
+    return direction * min(law.damping * degree * rounded, law.force_limit), velocity, degree
 
 
 @compiled
@@ -243,10 +245,10 @@ def _tracked(law, state, displacement):
 
 
 @compiled
-def _opening(law, state, amplitude, square):
-    """Return how far the damper is open, 0 or `_LOWEST_OPENING` .. 1, for an amplitude (m) and its square."""
+def _degree(law, state, amplitude, square):
+    """Return the degree of damping, 0 or `_LOWEST_DEGREE` .. 1, for an amplitude (m) and its square."""
     share = min(max((amplitude - law.lowest) * law.per_range, 0.0), 1.0)
     idle = law.idle_weight * state.line.turns * state.line.amplitude
     wanted = share * share * (3.0 - 2.0 * share) * square / (square + idle * idle + _SMALLEST_SQUARE)
-    state.opening += (law.opening if wanted > state.opening else law.closing) * (wanted - state.opening)
-    return state.opening if state.opening >= _LOWEST_OPENING else 0.0
+    state.degree += (law.rise if wanted > state.degree else law.fall) * (wanted - state.degree)
+    return state.degree if state.degree >= _LOWEST_DEGREE else 0.0

@@ -2,7 +2,7 @@
 
 from mount_control.policy import continuous_viscous, switched_viscous
 from mount_control.policy.contract import Policy
-from mount_models.quantity import ParameterError
+from mount_models.quantity import ParameterError, nearest
 
 DEFAULT = 'continuous_viscous'
 UNPREFIXED = 'switched_viscous'
@@ -17,7 +17,7 @@ POLICIES: dict[str, Policy] = {
 def chosen_policy(name: str) -> Policy:
     """Return the policy of this name, or raise `ParameterError` with the known ones."""
     if name not in POLICIES:
-        raise ParameterError(f'policy {name!r} is unknown; known are {", ".join(POLICIES)}')
+        raise ParameterError(f'policy {name!r} is unknown; {nearest(name, POLICIES)}')
     return POLICIES[name]
 
 

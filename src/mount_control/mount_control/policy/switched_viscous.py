@@ -12,7 +12,7 @@ from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
 from mount_models.damper import damper_curve, damper_force
-from mount_models.quantity import ParameterError, Quantity
+from mount_models.quantity import ParameterError, Quantity, nearest
 
 DEFAULT_DAMPER = 'viscous_2000'
 SWITCHING = {
@@ -112,7 +112,7 @@ def design(parameters: Parameters, sample_time: float) -> Design:
 def _check(parameters: Parameters) -> None:
     if parameters.switching not in SWITCHING:
         raise ParameterError(
-            f'switching {parameters.switching!r} is unknown; known are {", ".join(SWITCHING)}'
+            f'switching {parameters.switching!r} is unknown; {nearest(parameters.switching, SWITCHING)}'
         )
     if not parameters.switch_off_level < parameters.switch_on_level:
         raise ParameterError(

@@ -144,5 +144,5 @@ def _check_monotone(name: str, polynomial: ScaledPolynomial) -> None:
     if falters.any():
         raise LawRefusedError(
             f'{name} must be monotone to tell gaps apart; it turns at {x[int(np.argmax(falters))]:.6g} (SI): '
-            f'narrow the range of gaps, or choose another rest current or crossing inductance'
+            f'narrow the range of gaps'
         )

@@ -23,8 +23,8 @@ from mount_ros.private_rclpy import OpenLifecycleNode, given_at_start, integer_a
 P = TypeVar('P', bound=NamedTuple)
 
 USE_SIM_TIME = 'use_sim_time'
-_SIM_TIME_REFUSED = (
-    'use_sim_time must be false: the stamps of the messages are the time of this graph, also of one that is '
+_NO_SIM_TIME = (
+    'use_sim_time stays false: the stamps of the messages are the time of this graph, also of one that is '
     'played back, and its watches go by the steady clock; /clock is not needed'
 )
 
@@ -112,6 +112,10 @@ class ParameterNode(OpenLifecycleNode):
     def __init__(self, name: str, **arguments):
         super().__init__(name, **arguments)
         self._in_use: dict[str, Any] = {}  # all values while they are fixed
+        if self.get_parameter(USE_SIM_TIME).value:
+            # rclpy takes /clock by now: up to 1000 messages a second beside the data.
+            self.get_logger().warning(_NO_SIM_TIME)
+            self.set_parameters([Parameter(USE_SIM_TIME, value=False)])
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._apply_parameters)
 
@@ -130,14 +134,12 @@ class ParameterNode(OpenLifecycleNode):
         self._in_use = {}
 
     def refuse_given(self) -> None:
-        """Raise `ParameterError` for a value given at the start to an unknown name, and for simulated time.
+        """Raise `ParameterError` for a value given at the start to an unknown name.
 
         ROS itself ignores an unknown name silently, so a misspelt one would leave a default at work.
         """
         for name in sorted(given_at_start(self)):
             check_name(self.get_name(), name, self._parameter_names())
-        if self.get_parameter(USE_SIM_TIME).value:
-            raise ParameterError(f'{self.get_name()}: {_SIM_TIME_REFUSED}')
 
     def declare_parameter(self, name: str, value: Any = None, *arguments, **options) -> Parameter:
         """Declare a parameter; a whole number given at the start for a float becomes one."""
@@ -175,7 +177,7 @@ class ParameterNode(OpenLifecycleNode):
         changes, reason = self._changes(parameters), ''
         fixed = [name for name in changes if name not in self.run_time_parameters]
         if any(parameter.name == USE_SIM_TIME and parameter.value for parameter in parameters):
-            reason = _SIM_TIME_REFUSED
+            reason = _NO_SIM_TIME
         elif fixed:
             known = ', '.join(sorted(self.run_time_parameters)) or 'nothing'
             reason = (

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 from mount_driver.bus import Frame
 from mount_driver.can_library import can
 from mount_driver.protocol import MountCodec
-from mount_models.quantity import ParameterError
+from mount_models.quantity import ParameterError, nearest
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
@@ -524,7 +524,7 @@ def _fault(text: str, form: str, seed: int, sample_rate: float) -> Fault:
         raise ParameterError(f'fault {text!r:.60} is not written as {form}')
     name = found[1]
     if name not in FAULTS:
-        raise ParameterError(f'fault {name!r} is unknown; known are {", ".join(FAULTS)}')
+        raise ParameterError(f'fault {name!r} is unknown; {nearest(name, FAULTS)}')
     kind = FAULTS[name]
     begin = _time(text, found[2] or '0')
     duration = _time(text, found[3]) if found[3] else kind.duration

@@ -16,7 +16,7 @@ import numpy as np
 from mount_models.arithmetic.elementary import cosines, sines
 from mount_models.arithmetic.series import StreamedSeries, series_of, series_over_time
 from mount_models.arrays import FloatArray
-from mount_models.quantity import ParameterError
+from mount_models.quantity import ParameterError, nearest
 from mount_sim.excitation.excitation import Excitation, Seat
 from mount_sim.excitation.road import Gap, RandomRoad, gap_in_road, random_road, sweep_road
 from mount_sim.excitation.scenario import SCENARIO_NAMES, STEP_TIME, IdleForce, TipIn
@@ -72,7 +72,7 @@ def build_excitation(sim: SimParameters, made: tuple[str, StreamedSeries] | None
     without it they are read from the file that the scenario names.
     """
     if sim.scenario not in SCENARIO_NAMES:
-        raise ParameterError(f'scenario {sim.scenario!r} is unknown; known are {", ".join(SCENARIO_NAMES)}')
+        raise ParameterError(f'scenario {sim.scenario!r} is unknown; {nearest(sim.scenario, SCENARIO_NAMES)}')
     shaken = _of_array(sim, made) if sim.scenario in _ARRAYS else _SCENARIOS[sim.scenario](sim)
     idle, tip_in = sim.idle, sim.tip_in
     given = {'idle.amplitude': idle.amplitude, 'tip_in.force': tip_in.force}

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Mapping
 from enum import IntEnum
 from typing import Annotated, Any, NamedTuple
 
-from mount_models.quantity import ParameterError, Quantity
+from mount_models.quantity import ParameterError, Quantity, nearest
 
 
 class Contents(IntEnum):
@@ -41,7 +41,7 @@ _SEATED = {
 def seated_mount(name: str) -> SeatedMount:
     """Return the mount of a name in `MOUNTS`, or raise `ParameterError` with the known ones."""
     if name not in MOUNTS:
-        raise ParameterError(f'mount {name!r} is unknown; known are {", ".join(MOUNTS)}')
+        raise ParameterError(f'mount {name!r} is unknown; {nearest(name, MOUNTS)}')
     return _SEATED.get(name, SeatedMount())
 
 
@@ -136,7 +136,7 @@ def mount_names(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(',')) if text.strip() else ()
     for name in names:
         if name not in PLACES:
-            raise ParameterError(f'mounts ({text}): {name!r} is no place; known are {", ".join(PLACES)}')
+            raise ParameterError(f'mounts ({text}): {name!r} is no place; {nearest(name, PLACES)}')
     if len(set(names)) < len(names):
         raise ParameterError(f'mounts ({text}) must name each place once')
     return names

@@ -1,4 +1,4 @@
-"""`engine-mount accept`: a reference recording made or renewed, with a reason."""
+"""`engine-mount dev accept`: a reference recording made or renewed, with a reason."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,13 +6,13 @@ from typing import Annotated
 from engine_mount.cli.commands.options import option, recording_argument
 from engine_mount.cli.fetching import local
 
-EPILOG = """Exit code: 0 when the reference is made, 1 when it was refused, with the reason.
+EPILOG = """Exit code: 0 when the reference is made, 2 when it was refused, with the reason.
 
 Examples:
 
 `engine-mount drive --core --scenario bench --duration 3 --out bags/new`
 
-`engine-mount accept bags/new --reference initialisation --reason "ramp is 50 ms shorter"`
+`engine-mount dev accept bags/new --reference initialisation --reason "ramp is 50 ms shorter"`
 """
 
 

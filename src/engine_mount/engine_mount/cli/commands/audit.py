@@ -6,7 +6,7 @@ from engine_mount.cli.commands.options import JsonFile, RecordingPlace, write_fi
 from engine_mount.cli.fetching import local
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
-control left samples without a setpoint, on faults, or when nothing can be read.
+control left samples without a setpoint, or on faults; 2 when nothing can be read.
 
 Examples:
 

@@ -1,13 +1,11 @@
-"""`engine-mount bench`: what matters for speed, beside its alternative."""
+"""`engine-mount dev bench`: what matters for speed, beside its alternative."""
 
 from dataclasses import asdict
 from importlib import import_module
 from typing import Annotated
 
-import typer
-
 from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
-from engine_mount.cli.commands.options import Domain, JsonFile, Priority, option, write_figures
+from engine_mount.cli.commands.options import Domain, JsonFile, Priority, names_in, option, write_figures
 from engine_mount.cli.help import named
 
 EPILOG = """Groups: `calls` (cost of one sample in core and in a replay), `imports` (time and memory of the
@@ -18,16 +16,14 @@ Exit code: 0 when everything was measured, 1 when the graph refused or ended, wi
 
 Examples:
 
-`engine-mount bench --only graph --json bench.json` - the graph beside the bare middleware
+`engine-mount dev bench --only graph --json bench.json` - the graph beside the bare middleware
 
-`engine-mount bench --only graph --sample-rate 2000` - the same at 2 kHz
+`engine-mount dev bench --only graph --sample-rate 2000` - the same at 2 kHz
 """
 
 
 def bench(
-    only: Annotated[
-        list[str] | None, option('measure this group alone; may be repeated', 'GROUP', named('group'))
-    ] = None,
+    only: Annotated[str, option('these groups only', 'NAME,...', named('group'))] = '',
     rounds: Annotated[int, option('of each run of the graph; their median is the figure', least=1)] = 5,
     seconds: Annotated[float, option('length of a run in real time', least=1.0)] = 5.0,
     sample_rate: Annotated[float, option('samples per second of the graph and the chain', 'HZ')] = 1000.0,
@@ -40,14 +36,12 @@ def bench(
     from engine_mount.recordings.screen import Table
     from mount_bringup.graph.domain import chosen_domain
 
-    unknown = [name for name in only or () if name not in GROUPS]
-    if unknown:
-        raise typer.BadParameter(f'{unknown[0]!r} is no group of bench; known are {", ".join(GROUPS)}')
+    chosen = names_in(only, GROUPS, 'group of bench')
     order = BenchOrder(rounds, seconds, sample_rate, chosen_domain(domain), priority)
     screen = TerminalScreen()
     found: dict[str, Comparison] = {}
     with screen.console.status('measuring') as status:
-        for name in only or GROUPS:
+        for name in chosen:
             status.update(f'measuring: {name}')
             measure = getattr(import_module(f'engine_mount.cli.bench.{GROUPS[name]}'), name)
             found |= measure(order, status.update)

@@ -99,15 +99,15 @@ def actuator(
 ) -> None:
     """Fit the force law, Eqs (3) and (4), to measured points of gap, current and force.
 
-    Outliers, too few gaps or currents, and a law that is not positive, rising with the current and falling
-    with the gap within the measured range are refused. Then no file is written.
+    An actuator that does not saturate gets the parabola of Eq (3) alone. The law holds within the measured
+    gaps and up to the largest current; there it is positive, rises with the current and falls with the gap.
+    Forces that contradict this beyond their noise, outliers, a zero of the load cell, and too few gaps or
+    currents are refused. Then no file is written.
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
     from engine_mount.identification.rack import FileValues
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
@@ -158,9 +158,7 @@ def inductance(
     """
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
-    from engine_mount.identification.specimen import check_targets
 
-    check_targets(out, json_file, figure)
     screen = TerminalScreen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))

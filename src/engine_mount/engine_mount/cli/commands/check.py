@@ -48,17 +48,14 @@ def check(
 
     screen = TerminalScreen()
     given = changes_of(settings)
-    try:
-        known = shipped_suite() if suite is None else suite_in_file(suite)
-        chosen = chosen_of(known, [name for name in only.split(',') if name])
-        if show:
-            for each in chosen:
-                screen.say(f'{each.name:14}{each.about}')
-            return
-        place = out or new_place('check')
-        trials = trials_of(chosen, given, place)
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
+    known = shipped_suite() if suite is None else suite_in_file(suite)
+    chosen = chosen_of(known, [name for name in only.split(',') if name])
+    if show:
+        for each in chosen:
+            screen.say(f'{each.name:14}{each.about}')
+        return
+    place = out or new_place('check')
+    trials = trials_of(chosen, given, place)
     make_run_folder(place, 'check')
     results = run_trials(
         trials, jobs, screen, lambda trial, result: report.show_result(trial, result, screen)

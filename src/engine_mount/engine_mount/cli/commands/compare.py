@@ -1,6 +1,5 @@
 """`engine-mount compare`: what is different between two recordings, in words."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,7 +12,6 @@ from engine_mount.cli.commands.options import (
     write_figures,
 )
 from engine_mount.cli.fetching import local, named
-from engine_mount.cli.terminal import refuse
 
 EPILOG = """Examples:
 
@@ -23,7 +21,6 @@ EPILOG = """Examples:
 
 `engine-mount compare bags/long bags/cut --common`; drawn: `engine-mount report A --compare B`
 """
-_NOT_COMPARED = 2
 
 
 def compare(
@@ -47,17 +44,6 @@ def compare(
     Exit code 0: equal to the bit, or within the tolerances; 1: different; 2: not compared, for example
     because A or B is no recording.
     """
-    try:
-        equal = _compare(a, b, tolerances or [], common, json_file)
-    except (ValueError, OSError) as error:
-        refuse(error)
-        raise typer.Exit(_NOT_COMPARED) from None
-    if not equal:
-        raise typer.Exit(1)
-
-
-def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Path | None) -> bool:
-    """Compare, print and write what differs; return whether all is equal."""
     from engine_mount import compare as compare_recordings
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.difference import signal_table
@@ -66,7 +52,7 @@ def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Pat
 
     screen = TerminalScreen()
     recordings = open_run(local(a, screen)), open_run(local(b, screen))
-    comparison = compare_recordings(*recordings, tolerances, common=common)
+    comparison = compare_recordings(*recordings, tolerances or [], common=common)
     screen.say(f'A {comparison.name_a}, B {comparison.name_b}')
     for sentence in comparison.sentences():
         screen.say(f'- {sentence}')
@@ -78,4 +64,5 @@ def _compare(a: str, b: str, tolerances: list[str], common: bool, json_file: Pat
         for warning in recording.warnings:
             screen.note(f'{named(recording.path)}: {warning}')
     write_figures(comparison.figures(), json_file)
-    return comparison.equal
+    if not comparison.equal:
+        raise typer.Exit(1)

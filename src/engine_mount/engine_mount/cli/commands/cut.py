@@ -1,31 +1,30 @@
-"""`engine-mount cut`: a piece of a recording as a recording of its own."""
+"""`engine-mount edit cut`: a piece of a recording as a recording of its own."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from engine_mount.cli.commands.options import RecordingPlace, option
+from engine_mount.cli.commands.options import From, RecordingPlace, option, seconds
 from engine_mount.cli.fetching import beside, local
 
-_TIME = 'from the first displacement sample, such as 12s'
-
-EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1 when a part was not.
+EPILOG = """Exit code: 0 when the piece is written and all of it was readable, 1 when a part was not,
+2 when nothing was cut.
 
 Examples:
 
-`engine-mount cut RECORDING --from 12s --to 20s`
+`engine-mount edit cut RECORDING --from 12s --to 20s`
 
-`engine-mount cut RECORDING --event switch-on --before 5s --after 10s --out bags/first_switching`
+`engine-mount edit cut RECORDING --event switch-on --before 5s --after 10s --out bags/first_switching`
 
-`engine-mount cut RECORDING --event 2` - around the second event
+`engine-mount edit cut RECORDING --event 2` - around the second event
 """
 
 
 def cut(
     recording: RecordingPlace,
-    begin: Annotated[str, option(_TIME, 'TIME', None, '--from')] = '',
-    end: Annotated[str, option(_TIME, 'TIME', None, '--to')] = '',
+    begin: From = '',
+    end: Annotated[str, option('end, as --from', 'TIME', None, '--to')] = '',
     event: Annotated[
         str, option('around an event: its number, its kind, or kind:number, as in switch-on:2')
     ] = '',
@@ -49,12 +48,12 @@ def cut(
         raise typer.BadParameter('give --from and --to (or one of them), or --event')
     screen = TerminalScreen()
     opened = open_run(local(recording, screen))
-    first, last = (_seconds(text) if text else None for text in (begin, end))
+    first, last = (seconds(text) if text else None for text in (begin, end))
     reason = ''
     if event:
         found = find_event(opened, event)
         time = event_time(found, opened.time_axis)
-        first, last = max(0.0, time - _seconds(before)), time + _seconds(after)
+        first, last = max(0.0, time - seconds(before)), time + seconds(after)
         reason = f'{found.kind} at {time:.3f} s' + (f': {found.text}' if found.text else '')
     times = f'_{first or 0.0:g}s_' + ('end' if last is None else f'{last:g}s')
     done = cut_recording(opened, out or beside(opened.path, times), first, last, reason)
@@ -67,10 +66,3 @@ def cut(
         screen.note(sentence)
     if done.losses:
         raise typer.Exit(1)
-
-
-def _seconds(text: str) -> float:
-    from engine_mount.settings.amounts import duration_in_nanoseconds
-
-    plain = text.replace('.', '', 1).isdigit()
-    return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9

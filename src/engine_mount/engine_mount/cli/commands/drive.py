@@ -38,8 +38,8 @@ from mount_bringup.graph.nodes import RESTART_LIMIT
 
 EPILOG = """Exit code: 0 when the drive came to its end with nothing lost, no sample without a setpoint while
 control was active, control active when the excitation began (0.5 s later at most), no fault, and the
-recording whole; 1 when one of these did not hold, or nothing was driven, with the reason; 2 for a wrong
-use of the command; 130 when interrupted.
+recording whole; 1 when one of these did not hold, with the reason; 2 for a wrong use of the command:
+nothing was driven; 130 when interrupted, with the path of the recording.
 
 Times are in s from the first displacement sample, as in `report`, `cut` and `compare`.
 
@@ -161,8 +161,8 @@ def drive(
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print the results."""
     from engine_mount.cli.screen import TerminalScreen
-    from engine_mount.drives.drive import CombinationError
     from engine_mount.drives.drive import drive as run_drive
+    from engine_mount.drives.drive import report_early_end
     from engine_mount.reports.drive.results import evaluate_drive
     from engine_mount.settings.amounts import recorder_options
 
@@ -209,16 +209,14 @@ def drive(
             str(local(file, screen)), column or [], time=time, rate=rate, scale=scale, mapping_file=map_file,
             stated=stated(dbc, decimal, delimiter),
         )  # fmt: skip
-    try:
-        driven = run_drive(
-            core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
-            mounts=mounts, duration=duration, sample_rate=sample_rate, seed=seed, faults=fault or (),
-            parameters=parameters, excitation=excitation, out=out, domain=domain, namespace=namespace,
-            priority=priority, restarts=restarts, screen=screen,
-        )  # fmt: skip
-    except CombinationError as error:
-        raise typer.BadParameter(str(error)) from None
-    told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
+    driven = run_drive(
+        core=core, lockstep=lockstep, apart=apart, composed=composed, scenario=scenario, mount=mount,
+        mounts=mounts, duration=duration, sample_rate=sample_rate, seed=seed, faults=fault or (),
+        parameters=parameters, excitation=excitation, out=out, domain=domain, namespace=namespace,
+        priority=priority, restarts=restarts, screen=screen,
+    )  # fmt: skip
+    with report_early_end(driven.folder, screen):
+        told = evaluate_drive(driven.folder, driven.parameters, driven.figures, screen, report=report)
     write_figures(told.figures, json_file)
     page = [driven.folder.report] if driven.folder.report.exists() else []
     for word, places in (('figure', told.pictures), ('report', page), ('recording', told.recordings)):

@@ -15,7 +15,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.help import named, setting
 
-EPILOG = """Exit code: 0 when it ran, with any result; 1 when the order was refused.
+EPILOG = """Exit code: 0 when it ran, with any result; 2 when the order was refused.
 
 Examples:
 
@@ -64,15 +64,11 @@ def experiment(
         return
     from engine_mount.experiments.page import print_outcome, write_page
     from engine_mount.settings.options import settings_of_options
-    from mount_bringup.settings import SettingError
 
     if not names:
         raise typer.BadParameter('name an experiment, several, or all; --list tells which there are')
-    try:
-        chosen = experiments_named(names)
-        given = settings_of_options(settings or [], known_settings(chosen))
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
+    chosen = experiments_named(names)
+    given = settings_of_options(settings or [], known_settings(chosen))
     outcomes = []
     for known, order in orders(chosen, given, out):
         with screen.bar(known.name) as bar:

@@ -1,4 +1,4 @@
-"""`engine-mount faults`: every fault in the real graph, and what the graph does about it."""
+"""`engine-mount dev faults`: every fault in the real graph, and what the graph does about it."""
 
 import sys
 from pathlib import Path
@@ -12,6 +12,7 @@ from engine_mount.cli.commands.options import (
     Listing,
     Page,
     Priority,
+    names_in,
     option,
     write_figures,
 )
@@ -23,11 +24,11 @@ The graphs run in real time, and a machine with other work makes them late: repe
 
 Examples:
 
-`engine-mount faults --list` - all faults with their requirements
+`engine-mount dev faults --list` - all faults with their requirements
 
-`engine-mount faults --only coil_open,kill_driver --json faults.json` - two of them
+`engine-mount dev faults --only coil_open,kill_driver --json faults.json` - two of them
 
-`engine-mount faults --page docs/reference/faults.md` - all, with the page
+`engine-mount dev faults --page docs/reference/faults.md` - all, with the page
 """
 
 _DRIVE = (sys.executable, '-P', '-c', 'from engine_mount.cli.command import main; main()', 'drive')
@@ -52,11 +53,8 @@ def faults(
     from engine_mount.settings.run_folder import make_run_folder
     from mount_bringup.graph.domain import chosen_domain
 
-    screen, wanted = TerminalScreen(), list(filter(None, only.split(',')))
-    unknown = [name for name in wanted if name not in MATRIX]
-    if unknown:
-        raise typer.BadParameter(f'{", ".join(unknown)}: no such fault; --list tells which there are')
-    chosen = [case for case in MATRIX.values() if (not wanted or case.name in wanted)]
+    screen, wanted = TerminalScreen(), names_in(only, MATRIX, 'fault')
+    chosen = [case for case in MATRIX.values() if case.name in wanted]
     if show:
         rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]
         screen.table(Table('', 'll', rows, ('name', 'fault: what is required')))

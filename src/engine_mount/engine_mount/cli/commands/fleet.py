@@ -17,6 +17,7 @@ from engine_mount.cli.commands.options import (
     argument,
     changes_of,
     flag,
+    names_in,
     option,
     write_figures,
 )
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 app = group('fleet', 'Many recordings: catalogue, what if, queries.')
 
 _INDEX_EPILOG = """Exit code: 0 when the catalogue is written, also when recordings are damaged, which
-their rows show; 1 when a place cannot be listed, its store no longer answers, or the cluster is lost.
+their rows show; 1 when a store no longer answers or the cluster is lost; 2 when a place does not exist.
 
 Examples:
 
@@ -45,7 +46,7 @@ Unchanged recordings are not read again, missing ones leave the catalogue. After
 same command resumes where it stopped. Import foreign files first: `engine-mount import`.
 """
 _REPLAY_EPILOG = """Exit code: 0 when every recording has its row, with figures or with a reason; 1
-when one could not be fetched, or the order was refused.
+when one could not be fetched; 2 when the order was refused.
 
 Examples:
 
@@ -164,21 +165,21 @@ def _note_question(screen: 'TerminalScreen', what: str, folder: Path, rows: str)
     screen.note(f'why {what}: engine-mount fleet query {shlex.quote(str(folder))} "{sql}"')
 
 
-_QUERY_EPILOG = """Exit code: 0 when the query has a result, 1 with the reason when not.
+_QUERY_EPILOG = """Exit code: 0 when the query has a result, 2 with the reason when not.
 
 Examples:
 
 `engine-mount fleet query catalogue "select scenario, count(*) from recordings group by all"`
 
-`engine-mount fleet query catalogue "select uri, reason from recordings where reason != ''" --csv`
+`engine-mount fleet query catalogue "select uri, reason from recordings where reason != ''" --format csv`
 
-`engine-mount fleet query result "select recording from result where switchings_vanished > 0" --json`
+`engine-mount fleet query result "select recording from result where switchings_vanished > 0" --format json`
 
 Tables are `recordings` and `events` of a catalogue, `result` of a replay; their columns stand in
 docs/reference/fleet_columns.md, and `describe result` lists them. A query is one SELECT: it writes nothing,
 and reads these tables and no other file.
 """
-_WORST_EPILOG = """Exit code: 0 when the column exists, 1 with the reason when not.
+_WORST_EPILOG = """Exit code: 0 when the column exists, 2 with the reason when not.
 
 Examples:
 
@@ -189,7 +190,7 @@ Examples:
 `engine-mount fleet query catalogue "from recordings order by contact_gap_m limit 10"` - the smallest gaps
 """
 _REPORT_EPILOG = """Exit code: 0 when the page is written, also when a recording could not be read again for
-its picture, which the page reports; 1 when there is no result, or the page cannot be written.
+its picture, which the page reports; 2 when there is no result.
 
 Examples:
 
@@ -198,7 +199,7 @@ Examples:
 `engine-mount fleet report result --by pad_energy_changed_j --count 5 --out energy.html`
 """
 
-_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not, or the order was refused.
+_EXAMPLE_EPILOG = """Exit code: 0 when all recordings are made; 1 when one is not; 2 when the order is wrong.
 
 Examples:
 
@@ -219,19 +220,17 @@ _NUMBERS = ('int', 'uint', 'float', 'double', 'decimal')
 def query(
     folder: Annotated[Path, argument('catalogue or result', 'FOLDER')],
     sql: Annotated[str, argument('one SELECT', 'SQL')],
-    csv: Annotated[bool, flag('--csv', 'print the result as CSV')] = False,
-    as_json: Annotated[bool, flag('--json', 'print the result as JSON: a list of rows')] = False,
+    form: Annotated[str, option('table, csv, or json: a list of rows', 'FORMAT', None, '--format')] = 'table',
     time_limit: Annotated[float, option('a query that takes longer is refused', 'S', least=0.1)] = 60.0,
 ) -> None:
     """Query a catalogue or a result in SQL."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import query
 
-    if csv and as_json:
-        raise typer.BadParameter('choose --csv or --json, not both')
+    names_in(form, ('table', 'csv', 'json'), 'format')
     answer = query(folder, sql, time_limit)
-    if csv or as_json:
-        typer.echo(_csv(answer) if csv else _json(answer), nl=False)
+    if form in ('csv', 'json'):
+        typer.echo(_csv(answer) if form == 'csv' else _json(answer), nl=False)
     else:
         _print_rows(answer, TerminalScreen())
 

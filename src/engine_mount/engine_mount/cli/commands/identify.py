@@ -54,15 +54,9 @@ def friction(
     ] = None,
     file: Annotated[list[str] | None, option('train on each, predict each other one', 'FILE...')] = None,
     step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
-    channel: Annotated[
+    column: Annotated[
         list[str] | None,
-        option(
-            'column, or MCAP topic.field, of a quantity; repeatable',
-            'NAME=COLUMN:UNIT',
-            None,
-            '--channel',
-            '--column',
-        ),
+        option('column, or topic.field, of a quantity; may be repeated', 'NAME=COLUMN:UNIT'),
     ] = None,
     map_file: MapFile = None,
     time: TimeColumn = '',
@@ -92,12 +86,10 @@ def friction(
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import identify
     from engine_mount.identification.friction.files import friction_mapping
-    from engine_mount.identification.specimen import check_targets
     from engine_mount.signals.mapping import with_options
 
-    check_targets(out, json_file, figure)
     mapping = with_options(mapping_of(map_file), (), time, rate)
-    columns = friction_mapping(channel or [], mapping, stated(dbc, decimal, delimiter))
+    columns = friction_mapping(column or [], mapping, stated(dbc, decimal, delimiter))
     screen = TerminalScreen()
     training, unseen, files = (
         [local(place, screen) for place in places or []] for places in (train, held_out, file)

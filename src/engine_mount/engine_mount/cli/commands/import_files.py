@@ -19,7 +19,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local
 
-EPILOG = """Exit code: 0 when the recording is written, 1 when the file was refused, with the reason.
+EPILOG = """Exit code: 0 when the recording is written, 2 when the file was refused, with the reason.
 
 A column that is named without a unit needs one in its header. Quantities are displacement,
 engine_displacement, chassis_displacement, acceleration, force, current and others; a wrong one lists them.
@@ -33,7 +33,7 @@ Examples:
 `engine-mount import Weg.xlsx --column displacement=Weg:mm --time Zeit:ms --out bags/weg`
 
 Import several files one by one; `rosbags-convert --src A B --dst C --dst-storage mcap` joins their
-recordings, and `engine-mount cut` takes a part.
+recordings, and `engine-mount edit cut` takes a part.
 """
 
 

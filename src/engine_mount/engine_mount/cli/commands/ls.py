@@ -14,7 +14,7 @@ from engine_mount.cli.commands.options import (
 )
 from engine_mount.cli.fetching import local, named
 
-EPILOG = """Exit code: 0, also when a recording is damaged, which its line shows; 1 when a folder does not
+EPILOG = """Exit code: 0, also when a recording is damaged, which its line shows; 2 when a folder does not
 exist.
 
 Examples:
@@ -27,7 +27,7 @@ The verdict is that of the run's summary, as `drive` printed it. A recording wit
 when nothing of its files is missing; `engine-mount audit` checks further.
 """
 
-INFO_EPILOG = """Exit code: 0 when the recording could be read, with any content; 1 when not.
+INFO_EPILOG = """Exit code: 0 when the recording could be read, with any content; 2 when not.
 
 Examples:
 

@@ -1,13 +1,14 @@
 """Options that several sub-commands have."""
 
+from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as Figures
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from engine_mount.cli.help import Completer, recordings, setting
+from mount_models.quantity import nearest
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -25,14 +26,15 @@ def option(
     least: float | None = None,
     most: float | None = None,
     panel: str | None = None,
+    check: Callable[[Any], Any] | None = None,
 ) -> Any:
-    """Return an option with its help `text`, the placeholder of its value, and limits.
+    """Return an option with its help `text`, the placeholder of its value, limits and a check of its value.
 
     `panel` is the group in the help; options of files and roads have theirs by the beginning of their text.
     """
     return typer.Option(
         *names, help=text, metavar=metavar, autocompletion=complete, min=least, max=most,
-        rich_help_panel=panel or _panel(text),
+        rich_help_panel=panel or _panel(text), callback=check,
     )  # fmt: skip
 
 
@@ -65,14 +67,34 @@ def recording_argument(metavar: str | None = None, instead: str = '') -> Any:
 
 
 def changes_of(settings: list[str] | None) -> dict[str, dict[str, Any]]:
-    """Return {node: {parameter: value}} of `--set`; raises `BadParameter` where it is written wrongly."""
+    """Return {node: {parameter: value}} of `--set`; raises `SettingError` where it is written wrongly."""
     from engine_mount.settings.options import settings_of_options
-    from mount_bringup.settings import SettingError
 
-    try:
-        return settings_of_options(settings or [])
-    except SettingError as error:
-        raise typer.BadParameter(str(error)) from None
+    return settings_of_options(settings or [])
+
+
+def names_in(text: str, known: Collection[str], what: str) -> list[str]:
+    """Return the names of a text such as `a,b`, all `known` ones of none; refuse one that is no `what`."""
+    names = list(filter(None, text.split(',')))
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(f'{name!r} is no {what}; {nearest(name, known)}')
+    return names or list(known)
+
+
+def seconds(text: str) -> float:
+    """Return a time such as 12s or 1500ms in s, of nothing 0; raises `ValueError`."""
+    from engine_mount.settings.amounts import duration_in_nanoseconds
+
+    plain = text.replace('.', '', 1).isdigit()
+    return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9 if text else 0.0
+
+
+def target(file: Path | None) -> Path | None:
+    """Return a file that is to be written; refuse it before any work where it has no folder to be in."""
+    if file is not None and (file.is_dir() or not file.absolute().parent.is_dir()):
+        raise typer.BadParameter(f'{file} must be a file in an existing folder; make {file.parent} first')
+    return file
 
 
 def write_figures(figures: Figures[str, Any], file: Path | None) -> None:
@@ -87,9 +109,13 @@ RecordingPlace = Annotated[str, recording_argument()]
 RecordingPlaces = Annotated[list[str], recording_argument('RECORDING...')]
 NewFolder = Annotated[Path | None, option('folder to create; default: a new one in bags', panel=OUTPUT)]
 JsonFile = Annotated[
-    Path | None, option('write all figures to this file', 'FILE', None, '--json', panel=OUTPUT)
+    Path | None,
+    option('write all figures to this file', 'FILE', None, '--json', panel=OUTPUT, check=target),
 ]
-Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE', panel=OUTPUT)]
+From = Annotated[
+    str, option('begin, from the first displacement sample, such as 12s', 'TIME', None, '--from')
+]
+Figure = Annotated[Path | None, option('draw the result (PNG)', 'FILE', panel=OUTPUT, check=target)]
 Page = Annotated[Path | None, option('write the page, and its pictures beside it', 'FILE', panel=OUTPUT)]
 Listing = Annotated[bool, flag('--list', 'list all names')]
 Split = Annotated[str, option('largest file, such as 500MB; default: one file', 'SIZE', panel=OUTPUT)]
@@ -117,9 +143,6 @@ TimeColumn = Annotated[
     option(
         'foreign file: column of its times, and their unit, as in t:ms; default: by title, in s',
         'COLUMN[:UNIT]',
-        None,
-        '--time',
-        '--time-column',
     ),
 ]
 Rate = Annotated[float | None, option('foreign file without times: samples per second', 'HZ')]

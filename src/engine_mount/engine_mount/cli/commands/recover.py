@@ -1,4 +1,4 @@
-"""`engine-mount recover`: a sound recording out of a cut or damaged one."""
+"""`engine-mount edit recover`: a sound recording out of a cut or damaged one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,14 +11,14 @@ from engine_mount.cli.fetching import beside, local
 INCOMPLETE = 3
 
 EPILOG = f"""Exit code: 0 when nothing of the file is missing in the new recording, {INCOMPLETE} when
-something is lost and the rest stands in it, 1 when nothing could be recovered, 2 for a wrong use of the
+something is lost and the rest stands in it, 2 when nothing could be recovered, or for a wrong use of the
 command.
 
 Examples:
 
-`engine-mount recover bags/first/recording`
+`engine-mount edit recover bags/first/recording`
 
-`engine-mount recover crash/drive_0.mcap --out bags/drive_recovered`
+`engine-mount edit recover crash/drive_0.mcap --out bags/drive_recovered`
 
 All chunks whose checksum holds are kept, with topics, times, session, metadata and the recorder's report of
 its own losses. A last chunk that was cut off is lost. The original is not touched.

@@ -17,7 +17,7 @@ from engine_mount.cli.fetching import local
 from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when the setpoints equal the recorded ones, or a change was requested; 1 when they
-differ, or the order was refused.
+differ; 2 when the order was refused.
 
 Examples:
 
@@ -35,7 +35,7 @@ def replay(
     table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    mount: Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))] = '',
+    position: Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))] = '',
 ) -> None:
     """Replay a recorded displacement through the same controller and compare the answers with the recording.
 
@@ -52,7 +52,7 @@ def replay(
     if table not in ('', DEFAULT_TABLE):
         table = str(local(table, screen))
     with screen.console.status('replaying'):
-        replayed = run_replay(place, changes, table=table, mount=mount, out=out or new_place('replay'))
+        replayed = run_replay(place, changes, table=table, mount=position, out=out or new_place('replay'))
     figures = replayed.figures
     screen.table(Table(f'replay of {figures["source"]}', 'll', replayed.rows()))
     for sentence in figures['notes']:

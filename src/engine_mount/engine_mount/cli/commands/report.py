@@ -7,8 +7,7 @@ from engine_mount.cli.commands.options import RecordingPlaces, option
 from engine_mount.cli.fetching import beside, is_fetched, local, named
 from engine_mount.cli.help import recordings as offered
 
-EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 1 when nothing can be read
-or written.
+EPILOG = """Exit code: 0 when the page is written, also about a damaged recording; 2 when nothing can be read.
 
 Examples:
 

@@ -20,7 +20,7 @@ from engine_mount.cli.help import Command, group
 
 app = group('road', 'Measured roads: class and waviness; a road from a recorded acceleration.')
 
-_SHOW_EPILOG = """Exit code: 0 when the file is a road, 1 with the reason when not.
+_SHOW_EPILOG = """Exit code: 0 when the file is a road, 2 with the reason when not.
 
 Examples:
 
@@ -28,7 +28,7 @@ Examples:
 
 `engine-mount road show profile.csv --column Hoehe:mm --distance Weg:m --speed 60/3.6`
 """
-_INVERT_EPILOG = """Exit code: 0 when the profile is written, 1 with the reason when not.
+_INVERT_EPILOG = """Exit code: 0 when the profile is written, 2 with the reason when not.
 
 Examples:
 

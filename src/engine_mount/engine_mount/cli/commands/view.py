@@ -6,11 +6,13 @@ import typer
 
 from engine_mount.cli.commands.options import (
     Domain,
+    From,
     JsonFile,
     Namespace,
     flag,
     option,
     recording_argument,
+    seconds,
     write_figures,
 )
 from engine_mount.cli.fetching import local
@@ -21,7 +23,7 @@ Examples:
 
 `engine-mount view` - beside a running drive: a page at localhost, and a server for Foxglove and Lichtblick
 
-`engine-mount view bags/first --rate 0.2` - a recording, five times slower
+`engine-mount view bags/first --playback-speed 0.2` - a recording, five times slower
 
 `engine-mount view --host 0.0.0.0` - from a phone in the same network, with the printed token
 
@@ -49,8 +51,10 @@ def view(
             instead='folder of a run or of a recording, or its URI; without: the running graph'
         ),
     ] = None,
-    rate: Annotated[float, option('recording: speed against the clock')] = 1.0,
-    begin: Annotated[float, option('recording: start time', 'S', None, '--from')] = 0.0,
+    playback_speed: Annotated[
+        float, option('recording: speed against the clock', least=0.01, most=1000.0)
+    ] = 1.0,
+    begin: From = '',
     host: Annotated[str, option('address of the page; beyond this machine: with a token')] = '127.0.0.1',
     port: Annotated[int, option('of the page')] = 8137,
     foxglove_port: Annotated[int, option('of the Foxglove server on this machine, 0: none')] = 8765,
@@ -65,8 +69,8 @@ def view(
 
     screen = TerminalScreen()
     place = None if recording is None else local(recording, screen)
-    number = chosen_domain(domain)
-    with open_feed(place, rate=rate, begin=begin, domain=number, namespace=namespace) as feed:
+    number, start = chosen_domain(domain), seconds(begin)
+    with open_feed(place, rate=playback_speed, begin=start, domain=number, namespace=namespace) as feed:
         serve_view(feed, screen.say, host=host, port=port, foxglove_port=foxglove_port, beside=beside)
 
 

@@ -26,6 +26,7 @@ from engine_mount.signals.mapping import Mapping, with_options
 from engine_mount.signals.quantities import Quantity, by_name
 from engine_mount.signals.selection import select_rows
 from engine_mount.signals.units import unit_of
+from mount_models.quantity import nearest
 
 _NEEDED = ('displacement', 'friction_force', 'normal_force')
 FRICTION = by_name(
@@ -48,12 +49,12 @@ _BAND_SPREAD = 0.8
 def friction_mapping(
     texts: Sequence[str] = (), mapping: Mapping | None = None, stated: Stated = NOT_STATED
 ) -> Mapping:
-    """Return the columns of a mapping, and of `--channel NAME=COLUMN:UNIT` options, which go before it.
+    """Return the columns of a mapping, and of `--column NAME=COLUMN:UNIT` options, which go before it.
 
     Of a mapping these are displacement, force (or friction_force), normal force and time. Raises
     `SignalError`.
     """
-    mapping = replace((mapping or Mapping()).of(FRICTION), option='--channel {quantity}={column}:{unit}')
+    mapping = replace((mapping or Mapping()).of(FRICTION), option='--column {quantity}={column}:{unit}')
     return with_options(mapping, texts, known=FRICTION, stated=stated)
 
 
@@ -94,7 +95,7 @@ def _read_damper(path: Path, mapping: Mapping, clamp: str) -> FrictionRecording:
     A channel `normal_force` is measured, and used instead of all this.
     """
     if clamp not in CLAMPS:
-        raise IdentificationError(f'clamp {clamp!r} must be one of {", ".join(CLAMPS)}')
+        raise IdentificationError(f'clamp {clamp!r} is unknown; {nearest(clamp, CLAMPS)}')
     table = _rig_table(path)
     columns = select_rows(table, mapping, FRICTION, _NEEDED[:2], timed=True)
     time, displacement = columns.pop('time'), columns['displacement']

@@ -26,6 +26,7 @@ from engine_mount.identification.friction.recording import (
     smoothed_displacement,
     thinned,
 )
+from mount_models.quantity import nearest
 
 ZEROS = ('law', 'recorded')
 """Sources of the zero: the loop, or the file as it is."""
@@ -106,7 +107,7 @@ def subtract_zero(recording: FrictionRecording, zero_from: str = '') -> tuple[Fr
     """
     source = zero_from or recording.zero_from
     if source not in ZEROS:
-        raise IdentificationError(f'--zero {source!r} must be one of {", ".join(ZEROS)}')
+        raise IdentificationError(f'--zero {source!r} is unknown; {nearest(source, ZEROS)}')
     look = first_look(recording)
     width = f'+- {look.deviation:.0f} N, {look.deviation / look.sliding_force:.1%} of the force of sliding'
     by_loop, zero, note = f'{look.zero:.0f} N ({width})', 0.0, ''

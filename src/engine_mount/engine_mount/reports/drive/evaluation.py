@@ -70,6 +70,11 @@ def tracking_error(drive: DriveSignals, policy: Policy, parameters: Any) -> floa
     return float(np.sqrt(np.mean(error**2)) / np.max(np.abs(wanted[on])))
 
 
+def error_text(share: float) -> str:
+    """Return a `tracking_error` in words, and beside it what it does not prove."""
+    return f'{100.0 * share:.1f} % rms of the peak wanted force; model and plant share the friction law'
+
+
 def wanted_force(
     drive: DriveSignals, policy: Policy, parameters: Any
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -13,7 +13,7 @@ from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
 from engine_mount.reports.drive.beside import name_of, peaks_beside, peaks_text
-from engine_mount.reports.drive.evaluation import tracking_error
+from engine_mount.reports.drive.evaluation import error_text, tracking_error
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
 from mount_bringup.graph.recovery import Restart
@@ -113,13 +113,10 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     if reason:
         rows.append(('friction', f'not applicable: {reason}'))
     else:
-        percent = (
-            'damping was never on' if error is None else f'{100 * error:.1f} % rms of the peak wanted force'
-        )
         rows += [
             ('damping switched', Switching(figures['switch_on_s'], figures['switch_off_s']).sentence(2)),
             ('peak current', 'unknown' if peak is None else f'{peak:.2f} A'),
-            ('friction force error', percent),
+            ('friction force error', 'damping was never on' if error is None else error_text(error)),
         ]
     rows += found.rows()
     for entry in figures['restarts']:

@@ -7,6 +7,7 @@ import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
+from engine_mount.reports.drive.evaluation import error_text
 from engine_mount.reports.sections.motion import peak_cell
 from engine_mount.reports.sections.run import HEAD_OF_SESSION
 from engine_mount.reports.sections.section import (
@@ -63,7 +64,7 @@ def _friction_cells(subject: Subject) -> dict[str, Cell]:
     for name, figure, section, text in (
         ('peak current', 'peak_current_a', 'traces', lambda value: quantity_text(value, 'A')),
         ('damping switched on', 'damping_switched_on', 'switching', _times),
-        ('friction force error', 'tracking_error_rms', 'tracking', _percent),
+        ('friction force error', 'tracking_error_rms', 'tracking', error_text),
     ):
         known: Cell = 'not known' if figures[figure] is None else Link(text(figures[figure]), section)
         reason = subject.run.without_friction
@@ -86,12 +87,12 @@ def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 
 def _faults(subject: Subject) -> tuple[str, Sequence[Cell]]:
-    faults = subject.losses.faults
-    if not faults:
-        return GOOD, [Link('none', 'losses')]
-    first = faults[0]
+    found = subject.losses
+    if not found.faults:
+        return UNKNOWN if found.unjudged else GOOD, [Link(found.faults_text(), 'losses')]
+    first = found.faults[0]
     sentence = f'{first.node}: {first.sentence}' if first.node else first.sentence
-    return BAD, [Link(f'{len(faults)}, the first', 'losses'), 'at', moment(first.time), sentence]
+    return BAD, [Link(f'{len(found.faults)}, the first', 'losses'), 'at', moment(first.time), sentence]
 
 
 def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
@@ -148,7 +149,3 @@ def _change(value: float, reference: float) -> str:
 
 def _times(count: int) -> str:
     return 'once' if count == 1 else f'{count} times'
-
-
-def _percent(share: float) -> str:
-    return f'{100.0 * share:.1f} % rms of the peak wanted force'

@@ -35,14 +35,11 @@ def x_places(header: Header, width: int) -> list[int]:
     return {'One': [0], 'Multi': list(range(0, width, 2))}.get(header.get('X_Columns', ['No'])[0], [])
 
 
-def on_own_times(leaves: Sequence[Leaf], header: Header, columns: Mapping[int, FloatArray]) -> list[Leaf]:
-    """Return the channels with their units and times: of the nearest X column to the left, else by `Delta_X`.
-
-    `columns` are the samples by place, once they are read.
-    """
+def on_own_times(leaves: Sequence[Leaf], header: Header) -> list[Leaf]:
+    """Return the channels with units and times: of the nearest X column to the left, else by `Delta_X`."""
 
     def samples(place: int, x: int) -> FloatArray:
-        return columns[place][~np.isnan(columns[x])]
+        return _values(leaves[place])[~np.isnan(_values(leaves[x]))]
 
     @cache
     def clock(x: int) -> TimeBase:
@@ -50,7 +47,8 @@ def on_own_times(leaves: Sequence[Leaf], header: Header, columns: Mapping[int, F
 
     def even(channel: int, place: int) -> TimeBase:
         start, step = (float(header[key][channel].replace(',', '.')) for key in ('X0', 'Delta_X'))
-        return TimeBase(start + step * np.arange(columns[place].size), 0, 'X0 and Delta_X of its header')
+        count = _values(leaves[place]).size
+        return TimeBase(start + step * np.arange(count), 0, 'X0 and Delta_X of its header')
 
     places, units, found = x_places(header, len(leaves)), header.get('Y_Unit_Label', []), list(leaves)
     channels = [place for place in range(1, len(leaves)) if place not in places]
@@ -62,3 +60,7 @@ def on_own_times(leaves: Sequence[Leaf], header: Header, columns: Mapping[int, F
         else:
             found[place] = replace(leaf, clock=partial(even, channel, place))
     return found
+
+
+def _values(leaf: Leaf) -> FloatArray:
+    return leaf.read() if leaf.read else np.zeros(0)

@@ -119,22 +119,20 @@ def _samples(file: Any, path: Path, number: int, index: int, notes: list[str]) -
             )
     name = group.channels[index].name
     # asammdf itself would leave out invalid samples, but not their times
-    get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True)
-    signal = get()
-    if signal.samples.dtype.kind in 'SUO':
-        signal = get(raw=True)
-        if signal.samples.dtype.kind in 'fiub':
+    get = partial(file.get, group=number, index=index, ignore_invalidation_bits=True, samples_only=True)
+    samples, invalid = get()
+    if samples.dtype.kind in 'SUO':
+        samples, invalid = get(raw=True)
+        if samples.dtype.kind in 'fiub':
             notes.append(f'{name}: its conversion gives text, so its raw numbers are taken')
-    samples = signal.samples
     if samples.dtype.kind not in 'fiub' or samples.ndim != 1:
         raise NoNumbersError(
             f'{path}, channel {name!r}: {samples.dtype} of shape {samples.shape} is no number for each '
             'sample; choose another channel'
         )
-    values = np.array(samples, np.float64)
-    if signal.invalidation_bits is not None:
-        values[np.asarray(signal.invalidation_bits, bool)] = np.nan
-    return values
+    if invalid is None:
+        return np.asarray(samples, np.float64)
+    return np.where(np.asarray(invalid, bool), np.nan, samples)
 
 
 def _group_name(file: Any, number: int) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
@@ -42,6 +43,11 @@ class TimeBase:
     times: FloatArray
     begin: int
     told: str
+
+    @cached_property
+    def from_first(self) -> FloatArray:
+        """The times in s after the first, shared by the columns too."""
+        return self.times - self.times[0] if self.times[0] else self.times
 
 
 @dataclass(frozen=True)

@@ -57,29 +57,33 @@ def open_text(path: Path, stated: Stated) -> Content:
     notes += [f'{titles[place]}: one date for several samples, no times of these' for place in coarse]
     if len(titles) > 1 and not titles[-1] and dialect.kinds[-1] == 'missing':
         titles = titles[:-1]  # behind a delimiter at the end of each line
-    columns: dict[int, NDArray[Any]] = {}
+    # they grow in place: what is joined of blocks would be an hour twice
+    columns = [bytearray() for _ in dialect.kinds]
     times = x_places(header, len(kinds)) or [place for place, kind in enumerate(kinds) if kind == 'date'][:1]
 
     def prepare(numbers: Sequence[int]) -> None:
         places = list(dict.fromkeys([*numbers, *times]))
-        blocks = [
-            _in_bulk(block, dialect, places) or _cell_by_cell(path, number, block, dialect, places, titles)
-            for number, block in (_samples(path, codec, dialect, first) if places else ())
-        ]
-        if places and not blocks:
+        for number, block in _samples(path, codec, dialect, first) if places else ():
+            parts = _in_bulk(block, dialect, places) or _cell_by_cell(
+                path, number, block, dialect, places, titles
+            )
+            for place, part in zip(places, parts, strict=True):
+                columns[place] += part.tobytes()
+        if places and not columns[places[0]]:
             raise SignalError(f'{path} holds no samples; needed are lines below the titles')
-        columns.update(zip(places, map(np.concatenate, zip(*blocks, strict=True)), strict=True))
 
     leaves = [
         Leaf(
-            name, None if kind == 'text' else partial(columns.__getitem__, place), unit, header,
-            kind == 'date',
+            name,
+            None if kind == 'text'
+            else partial(np.frombuffer, columns[place], 'M8[ns]' if kind == 'date' else float),
+            unit, header, kind == 'date',
         )
         for place, ((name, header, unit), kind) in enumerate(
             zip(titles_and_units(titles, units), kinds, strict=False)
         )
     ]  # fmt: skip
-    leaves = on_own_times(leaves, header, columns) if header else with_dates(path, leaves)
+    leaves = on_own_times(leaves, header) if header else with_dates(path, leaves)
     notes.insert(0, f'read as {dialect.told}, {codec}')
     return Content(path, 'text table', 'engine_mount.signals', leaves, notes, prepare)
 
@@ -238,7 +242,10 @@ def _in_bulk(block: str, dialect: Dialect, places: Sequence[int]) -> list[NDArra
         return None
     if any(table.column(name).null_count for name, kind in types.items() if kind == date):
         return None
-    return [column.to_numpy() for column in table.columns]
+    return [  # `to_numpy` loads pandas, 40 MB
+        column.to_numpy() if column.null_count or column.type == date else np.from_dlpack(column.chunk(0))
+        for column in table.columns
+    ]
 
 
 def _cell_by_cell(

@@ -49,7 +49,7 @@ def _text(tree: Any, *keys: str) -> str:
     for key in keys if isinstance(tree, Mapping) else ():
         text = tree.get(key)
         text = text.decode(errors='replace') if isinstance(text, bytes) else text
-        if text and isinstance(text, str):
+        if isinstance(text, str) and text:
             return str(text)
     return ''
 
