@@ -11,7 +11,7 @@ setup(
         'engine_mount.faults': ['faults.yaml'],
         'engine_mount.fleet': ['*.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],
-        'engine_mount.view': ['page/*'],
+        'engine_mount.view': ['page/*', 'layouts/*'],
     },
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},

@@ -15,7 +15,6 @@ setup(
         ('share/mount_bringup', ['package.xml', 'README.md']),
         ('share/mount_bringup/launch', glob('launch/*.py')),
         ('share/mount_bringup/config', glob('config/*')),
-        ('share/mount_bringup/layouts', glob('layouts/*')),
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},  # by which colcon knows what passes the tests

@@ -4,13 +4,15 @@ import json
 import re
 from xml.etree import ElementTree
 
+import pytest
 from sources import SOURCES
 
+from engine_mount.view.model import BESIDE
 from mount_control.policy.contract import trace_fields
-from mount_control.policy.registry import DEFAULT, POLICIES
+from mount_control.policy.registry import POLICIES
 from mount_ros.topics import JOINT_STATE, TOPICS
 
-LAYOUTS = SOURCES / 'mount_bringup' / 'layouts'
+LAYOUTS = SOURCES / 'engine_mount' / 'engine_mount' / 'view' / 'layouts'
 OTHERS = {'sim/chassis_acceleration': 'linear_acceleration.z', 'sim/mount_force': 'wrench.force.z'}
 
 
@@ -18,7 +20,7 @@ def signals() -> set[tuple[str, str]]:
     """Return (topic, name of the scalar or path of the number)."""
     scalars = {
         (topic.name, scalar.name)
-        for topic in TOPICS
+        for topic in (*TOPICS, BESIDE)
         if topic.type == JOINT_STATE
         for scalar in (*topic.scalars, *topic.optional)
     }
@@ -34,10 +36,11 @@ def test_plotjuggler_s_curves_are_signals_of_a_drive():
     assert set(names) <= known
 
 
-def test_lichtblick_s_paths_are_the_signals_that_their_labels_name():
-    layout = json.loads((LAYOUTS / 'lichtblick.json').read_text())
-    order = {topic.name: topic.names for topic in TOPICS}
-    order['control_trace'] = tuple(trace_fields(POLICIES[DEFAULT]))
+@pytest.mark.parametrize('policy', POLICIES)
+def test_lichtblick_s_paths_are_the_signals_that_their_labels_name(policy):
+    layout = json.loads((LAYOUTS / f'lichtblick_{policy}.json').read_text())
+    order = {topic.name: topic.names for topic in (*TOPICS, BESIDE)}
+    order['control_trace'] = tuple(trace_fields(POLICIES[policy]))
     drawn = 0
     for panel in layout['configById'].values():
         for path in panel['paths']:

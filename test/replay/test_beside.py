@@ -13,6 +13,8 @@ from engine_mount.recordings.edit import cut
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
 from engine_mount.reports.drive.beside import BesideError, mounts_beside
+from engine_mount.reports.report import subjects_of
+from engine_mount.reports.sections import motion
 
 SHORT = ('--duration', '3', '--set', 'mount_sim.timeline.start=2.8', '--set', 'mount_sim.motorway.gap_time=1')
 
@@ -55,6 +57,24 @@ def test_each_is_the_drive_of_that_mount_which_has_the_other_one_beside_it(name,
     assert 0.5 < ours['this mount']['wear_j_per_km'] < 50.0
 
 
+@pytest.mark.parametrize(('gap_time', 'computed'), [(1, ['no current']), (1.3, [])])
+def test_recordings_share_the_event_and_the_other_mounts_where_they_share_the_road(
+    gap_time, computed, drive, tmp_path
+):
+    options = '--mount', 'hydro', '--set', f'mount_sim.motorway.gap_time={gap_time}'
+    recording = driven(tmp_path / 'hydro', *SHORT, *options)
+    subjects = subjects_of([drive, recording])
+    displacement, current = motion.traces(subjects).chart.panels
+    own = [f'displacement, {each.name}' for each in subjects]
+    assert [curve.name for curve in displacement.curves] == [*computed, *reversed(own)]  # the first on top
+    assert [curve.name for curve in current.curves] == [f'current, {subjects[0].name}']  # no coil, no current
+    for section in (motion.hysteresis(subjects), motion.spectra(subjects)):
+        names = [curve.name for curve in section.chart.panels[0].curves]
+        assert len(names) == 2 + len(computed)
+        assert names[: len(computed)] == computed
+    assert len(motion.hysteresis(subjects).words) == 2 - len(computed)  # one event, or one of each
+
+
 def test_the_report_on_a_drive_in_real_time_has_the_other_mounts_and_the_isolation(drive, tmp_path):
     # In real time the electronics sample on until the graph ends: `sim/truth` is longer than the run.
     longer = parameters_of(drive)
@@ -68,7 +88,7 @@ def test_the_report_on_a_drive_in_real_time_has_the_other_mounts_and_the_isolati
     assert '"name":"hydromount"' in html
     words = ' '.join(re.sub('<[^>]*>', ' ', html).split())
     assert re.search(
-        r'Isolation \(good\) peak displacement \S+ mm against hydromount \S+ mm \(-\d+ %\)', words
+        r'Isolation \(good\) peak displacement \S+ mm, better by \d+ % than hydromount \(\S+ mm\)', words
     )
 
 

@@ -178,8 +178,8 @@ with the hydromount {max(figures['high_frequency_ratio'][HYDRO].values()):.3f}.
         cases = [values for each in figures['engine'].values() for values in each[CONTINUOUS].values()]
         shaken, moved = np.transpose(cases)
         text += f"""- With a running engine on a road, 20 to 190 Hz, the acceleration rises up to \
-{shaken.max():.2f} times ({100.0 * np.mean(shaken > 1.05):.0f} % of the cases above 1.05), and the engine moves up to \
-{moved.max():.2f} times as far as on the hydromount.
+{shaken.max():.2f} times ({100.0 * np.mean(shaken > 1.05):.0f} % of the cases above 1.05), and the engine \
+moves up to {moved.max():.2f} times as far as on the hydromount.
 """
     return text
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from engine_mount.experiments.harness.closed_loop import drive_cases, paper_policy
-from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, new_panels
+from engine_mount.experiments.harness.drawing import BLUE, COLOURS, HYDRO_LINE, OFF_LINE, new_panels
 from engine_mount.experiments.harness.experiment import (
     NOT_COMPARABLE,
     OURS,
@@ -68,8 +68,7 @@ def run(order: Order) -> Findings:
         'switch_on_level_m': level,
         'runs': runs,
     }
-    pictures = {'sweep': draw_sweep(drives)}
-    return Findings(figures, pictures, [each.recording for each in drives.values()])
+    return Findings(figures, {'sweep': draw_sweep(drives)}, [each.recording for each in drives.values()])
 
 
 def _frequency(drive: DriveSignals) -> FloatArray:
@@ -161,7 +160,7 @@ def _on_noise(figures):
 
 
 def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
-    """Draw displacement and chassis acceleration over frequency, as envelopes, logarithmic, Fig. 14."""
+    """Draw displacement and chassis acceleration over frequency, as envelopes, Fig. 14."""
     figure, panels = new_panels(
         'Front wheels on a sweep of 1 Hz per second (Fig. 14)', 2, height=6.5, sharex=True
     )
@@ -169,10 +168,15 @@ def draw_sweep(drives: dict[str, DriveSignals]) -> Any:
         (panels[0], 'displacement, envelope (mm)', 1e3, 'displacement'),
         (panels[1], 'chassis acceleration,\nenvelope (m/s$^2$)', 1.0, 'chassis_acceleration'),
     ):
-        for mount, colour in ((HYDRO, HYDRO_LINE['color']), (FRICTION, BLUE)):
+        for mount, style in (
+            (OFF, OFF_LINE),
+            (HYDRO, HYDRO_LINE),
+            (ALWAYS, {'color': COLOURS[1]}),
+            (FRICTION, {'color': BLUE}),
+        ):
             drive = drives[mount]
             envelope = highest_per_band(_frequency(drive), scale * getattr(drive.truth, name), 0.25)
-            axes.semilogy(*envelope, color=colour, linewidth=1.2, label=mount)
+            axes.plot(*envelope, label=mount, **style)
         axes.set_ylabel(label)
     panels[1].set_xlabel('frequency of the road (Hz)')
     panels[0].legend(loc='upper right')

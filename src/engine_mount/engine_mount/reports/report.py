@@ -8,6 +8,7 @@ from typing import Any
 from engine_mount.recordings.compare import compare
 from engine_mount.recordings.matching import ComparisonError, share_stamps
 from engine_mount.recordings.recording import Recording, open_run
+from engine_mount.reports.drawing.chart import COLOURS, SOLID
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.sections import motion, overview, run
 from engine_mount.reports.sections.section import Section
@@ -146,7 +147,10 @@ def subjects_of(recordings: Sequence[Recording]) -> list[Subject]:
     subjects: list[Subject] = []
     for place, (recording, name) in enumerate(zip(recordings, _names(recordings), strict=True)):
         zero = subjects[0].zero if subjects and _shares_stamps(recordings[0], recording) else None
-        subjects.append(Subject(recording, name, place=place, several=len(recordings) > 1, zero=zero))
+        subject = Subject(recording, name, several=len(recordings) > 1, zero=zero)
+        if subject.mount in [each.mount for each in subjects]:
+            subject.look = COLOURS[place], SOLID  # the look of the mount is that of the first recording of it
+        subjects.append(subject)
     return subjects
 
 

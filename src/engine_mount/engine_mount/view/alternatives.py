@@ -1,7 +1,8 @@
 """Other mounts, simulated on the acceleration of the chassis that comes in.
 
 The acceleration is that of a chassis which carries the mount that is driven: what another mount would have
-done to the chassis itself is not in it. The engine is about an eighth of the car, so that this is little.
+done to the chassis itself is not in it. Over the gap of the motorway the hydromount moves 2.10 mm here, and
+1.74 mm in its own drive.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,6 @@ from mount_sim.parameters import SimParameters
 
 _LONGEST_PAUSE = 1_000_000_000  # ns, chosen: behind a longer one all begin anew, at rest
 _QUIET = np.zeros(5)  # no noise of the sensors
-_AVERAGED = 5_000_000_000  # ns, chosen: gravity and offset of an accelerometer are averaged over 5 s
 
 
 class Alternatives:
@@ -47,18 +47,14 @@ class Alternatives:
     def _begin(self) -> None:
         self._mounts = simulations_beside(self._plant, Seat.ACCELERATED_CHASSIS, STEP_TIME)
         self._last: tuple[int, float] | None = None
-        self._mean = 0.0
 
     def _excitation(self, stamp: int, acceleration: float) -> NDArray[np.float64]:
         """Return the excitation from the last sample to this one, at the plant's steps."""
         if self._last is None or not 0 < stamp - self._last[0] <= _LONGEST_PAUSE:
             if self._last is not None:
                 self._begin()
-            self._last, self._mean = (stamp, 0.0), acceleration
-            return np.zeros(self._steps)
+            self._last = stamp, acceleration
         before, last = self._last
-        self._mean += self._period / _AVERAGED * (acceleration - self._mean)
-        now = acceleration - self._mean
         steps = self._steps * max(1, round((stamp - before) / self._period))
-        self._last = stamp, now
-        return last + (now - last) * np.arange(1, steps + 1) / steps
+        self._last = stamp, acceleration
+        return last + (acceleration - last) * np.arange(1, steps + 1) / steps

@@ -38,6 +38,7 @@ class Feed(Protocol):
 
     topics: Mapping[str, Topic]
     title: str
+    zero: int | None  # the stamp (ns) at which time begins; None: the first that comes
 
     def start(self, receive: Receive, on_failure: Fail) -> None:
         """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
@@ -65,6 +66,7 @@ class RecordedFeed:
         self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
         self.title = f'{recording.short_name} at {rate:g} x'
         part.load(self.topics)
+        self.zero: int | None = part.time_axis.zero
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
         times = [series.receive_times for _, series in self._series]
         if not sum(map(len, times)):

@@ -1,10 +1,11 @@
 """The picture of a graph: takes messages from a feed, and once an interval makes of them what viewers get."""
 
 import contextlib
+import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,26 +14,41 @@ from numpy.typing import NDArray
 from engine_mount.recordings.layout import LayoutError
 from engine_mount.recordings.mcap_records import HEAD
 from engine_mount.recordings.series import Payloads, Series, SeriesError
-from engine_mount.reports.drawing.chart import COLOUR_OF, DASH_OF, SOLID, Chart, Curve, Panel, level_lines
+from engine_mount.reports.drawing.chart import COLOUR_OF, Chart, Curve, Panel, level_lines, look_of
 from engine_mount.reports.drawing.detail import browser_chart
-from engine_mount.reports.drive.beside import MOUNTS, THIS
+from engine_mount.reports.drive.beside import MOUNTS, THIS, name_of
 from engine_mount.reports.drive.evaluation import levels_of
 from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.view.alternatives import Alternatives
-from engine_mount.view.feed import Feed, Message
+from engine_mount.view.feed import Feed, Message, Receive
 from engine_mount.view.state import GraphState
+from mount_recorder.automatic_marks import PAUSE
+from mount_ros.messages.event import Mark
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import (
     COIL_RIPPLE,
     CONTROL_TRACE,
     CURRENT_SETPOINT,
     DISPLACEMENT,
+    JOINT_STATE,
     SIM_CHASSIS_ACCELERATION,
+    Delivery,
+    Scalar,
     Topic,
 )
+from mount_sim.plant.mounts import seat_of, without_friction
 
 WINDOW = 60.0  # s: kept for who comes later
 INTERVALS_PER_SECOND = 30
 _HIGHEST_STATE_RATE = 100.0  # Hz: above it a topic is a trace, not a state
+
+BESIDE = Topic(
+    'beside', JOINT_STATE, Delivery.STREAM, 0.0, 'displacements of the other mounts',
+    tuple(Scalar(name.replace(' ', '_'), 'm') for name in MOUNTS),
+)  # fmt: skip
+"""What a Foxglove server has beside the topics of the graph."""
+_OF_FRICTION = ('damping', 'current', 'friction force')  # panels
+_STILL = 3.0  # s, chosen: without a sample for so long a drive counts as ended
 
 Array = NDArray[np.float64]
 Extent = tuple[float, float]
@@ -88,19 +104,27 @@ class Model:
     called there.
     """
 
-    def __init__(self, feed: Feed, *, beside: bool = True, on_failure: Callable[[], None] = lambda: None):
+    def __init__(
+        self,
+        feed: Feed,
+        *,
+        beside: bool = True,
+        receivers: Sequence[Receive] = (),
+        on_failure: Callable[[], None] = lambda: None,
+    ):
         self.failure = ''
-        self.zero: int | None = None
-        """The stamp (ns) at which time begins."""
-        space = next((name for name, topic in feed.topics.items() if topic is DISPLACEMENT), '/displacement')
-        self.state = GraphState(namespace=space.removesuffix(f'/{DISPLACEMENT.name}'))
+        self.state = GraphState(namespace_of(feed), zero=feed.zero)
+        self._receivers, self._beside_layout = receivers, ScalarsLayout(BESIDE)
+        self._motion: dict[str, tuple[float, float, int]] = {}  # mm, mm^2 and samples by the mount
+        self._damped: int | None = None  # stamp of the last sample with damping, until it is off
+        self._sampled = time.monotonic()  # s, when the last samples came
         self.intervals: deque[Interval] = deque(maxlen=round(WINDOW * INTERVALS_PER_SECOND))
         self.alternatives: Alternatives | None = None
         self._beside = beside
         self._on_failure = on_failure
         self._arrived: deque[Message] = deque()
         self._made_with: Parameters = {}
-        self._time, self._number, self._newest = 0.0, 0, 0  # s, intervals, ns of arrival
+        self._number, self._newest = 0, 0  # intervals, ns of arrival
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._serve, name='view', daemon=True)
         self.on_interval: Callable[[Interval], None] = lambda interval: None
@@ -109,8 +133,13 @@ class Model:
             Alternatives({}).advance([0], np.zeros(1))  # loads the compiled laws before anything comes
 
     def take(self, message: Message) -> None:
-        """Take a message; cheap, from any thread."""
+        """Take a message, for the receivers too; cheap, from any thread."""
         self._arrived.append(message)
+        self._hand_on(message)
+
+    def _hand_on(self, message: Message) -> None:
+        for receive in self._receivers:
+            receive(message)
 
     def start(self) -> None:
         """Begin to make intervals."""
@@ -130,28 +159,39 @@ class Model:
     @property
     def traces(self) -> list[Trace]:
         """All lines in the order of their panels."""
-        beside = [Trace(f'beside.{name}', name, 'displacement') for name in MOUNTS]
-        return [TRACES[0], *(beside if self.alternatives is not None else []), *TRACES[1:], _LATENCY]
+        own = name_of(seat_of(self.state.parameters))
+        beside = [Trace(f'beside.{name}', name, 'displacement') for name in MOUNTS if name != own]
+        first = TRACES[0]._replace(label=own)
+        return [*(beside if self.alternatives is not None else []), first, *TRACES[1:], _LATENCY]
 
     def chart(self) -> dict[str, Any]:
         """Return the panels for the page's script; the `key` of a curve is that of an interval's extents."""
         panels = []
+        reason = self._without_friction
         for name, (unit, share, least) in PANELS.items():
+            if reason and name in _OF_FRICTION:
+                continue
             curves = []
             for label, key in ((trace.label, trace.key) for trace in self.traces if trace.panel == name):
-                look = COLOUR_OF[key.removeprefix('beside.')], DASH_OF.get(label, SOLID)
+                look = look_of(label, COLOUR_OF.get(key, ''))
                 curves.append(Curve(label, np.empty(0), np.empty(0), *look, key=key))
             levels = level_lines(self._levels()) if name == 'displacement' else ()
             label = f'{name} ({unit})' if unit else name
             panels.append(Panel(label, curves, levels=levels, share=share, least=least))
-        return browser_chart(Chart('view', 'view', 'time (s)', panels))
+        return browser_chart(Chart('view', 'view', 'time from the first sample (s)', panels))
 
     def state_json(self) -> dict[str, Any]:
-        """Return the state of the graph: nodes, gap, coil, losses, events."""
-        return self.state.as_json(self._newest, self.zero)
+        """Return the state: nodes, motion of the mounts, gap, coil, losses, events, whether it has ended."""
+        found, still = self.state.as_json(self._newest), time.monotonic() - self._sampled
+        motion = [
+            {'name': f'{name}: peak, rms', 'value': f'{peak:.2f}, {math.sqrt(squares / count):.3f} mm'}
+            for name, (peak, squares, count) in reversed(list(self._motion.items()))
+        ]
+        end = f'ended: no sample for {still:.0f} s' if still > _STILL else ''
+        return {**found, 'values': motion + found['values'], 'end': end}
 
     def interval(self, messages: list[Message]) -> Interval:
-        """Make an interval of what has arrived since the last one."""
+        """Make an interval of what has arrived since the last one, and keep it if it shows anything."""
         by_topic: dict[Topic, list[Message]] = {}
         for message in messages:
             by_topic.setdefault(message.topic, []).append(message)
@@ -164,17 +204,44 @@ class Model:
         found[_LATENCY.key] = 1e3 * _latencies(series)
         found |= {f'beside.{name}': 1e3 * moved for name, moved in self._moved_beside(series).items()}
         if DISPLACEMENT in series and (stamps := series[DISPLACEMENT].stamps).size:
-            self.zero = int(stamps[0]) if self.zero is None else self.zero
-            self._time = (int(stamps[-1]) - self.zero) * 1e-9
-        self._number += 1
+            zero = self.state.zero = int(stamps[0]) if self.state.zero is None else self.state.zero
+            self.state.time = (int(stamps[-1]) - zero) * 1e-9
+            self._sampled = time.monotonic()
+        self._watch_damping(series)
         known = {key: values[np.isfinite(values)] for key, values in found.items()}
         extents = {key: (float(v.min()), float(v.max())) for key, v in known.items() if v.size}
-        self.intervals.append(Interval(self._number, self._time, extents))
-        return self.intervals[-1]
+        for trace in self.traces:
+            if trace.panel == 'displacement' and trace.key in extents:
+                moved = np.abs(known[trace.key])
+                peak, squares, count = self._motion.get(trace.label, (0.0, 0.0, 0))
+                squares += float(np.sum(moved * moved))
+                self._motion[trace.label] = max(peak, float(moved.max())), squares, count + len(moved)
+        self._number += bool(extents)  # an empty one is no gap in a line
+        interval = Interval(self._number, self.state.time, extents)
+        if extents:
+            self.intervals.append(interval)
+        return interval
+
+    def _watch_damping(self, series: Mapping[Topic, Series]) -> None:
+        degrees = _column(series, CONTROL_TRACE, 'damping_active')
+        if not len(degrees) or self._without_friction:
+            return
+        for stamp, degree in zip(series[CONTROL_TRACE].stamps.tolist(), degrees.tolist(), strict=True):
+            if degree > 0.0:
+                if self._damped is None:
+                    self.state.add(Mark(stamp, 'damping', 'on'), 0)
+                self._damped = stamp
+            elif self._damped is not None and stamp - self._damped > PAUSE * 1e9:
+                self.state.add(Mark(self._damped, 'damping', 'off'), 0)
+                self._damped = None
+
+    @property
+    def _without_friction(self) -> str:
+        return without_friction(seat_of(self.state.parameters))
 
     def _levels(self) -> Mapping[str, float]:
         try:
-            return levels_of(*policy_of(self.state.parameters))
+            return {} if self._without_friction else levels_of(*policy_of(self.state.parameters))
         except ValueError:
             return {}
 
@@ -201,8 +268,19 @@ class Model:
                 self._beside, self.alternatives = False, None
                 return {}
         accelerations = _column(series, SIM_CHASSIS_ACCELERATION, 'linear_acceleration.z')
-        stamps = series[SIM_CHASSIS_ACCELERATION].stamps.tolist()
-        return self.alternatives.advance(stamps[: len(accelerations)], accelerations)
+        shaken = series[SIM_CHASSIS_ACCELERATION]
+        stamps = shaken.stamps.tolist()
+        moved = self.alternatives.advance(stamps[: len(accelerations)], accelerations)
+        columns = shaken.receive_times.tolist(), stamps, *(each.tolist() for each in moved.values())
+        for received, stamp, *row in zip(*columns, strict=False):
+            self._hand_on(Message(BESIDE, self._beside_layout.pack(stamp, row), received, stamp))
+        return moved
+
+
+def namespace_of(feed: Feed) -> str:
+    """Return the namespace of the mount of a feed, empty for the root."""
+    space = next((name for name, topic in feed.topics.items() if topic is DISPLACEMENT), '')
+    return space.removesuffix(f'/{DISPLACEMENT.name}')
 
 
 def _series(topic: Topic, messages: Iterable[Message]) -> Series:

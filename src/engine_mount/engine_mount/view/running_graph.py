@@ -32,6 +32,7 @@ class RunningGraph:
         self._collector: Collector | None = None
         self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
         self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
+        self.zero: int | None = None
         self._stopped = False
 
     def start(self, receive: Receive, on_failure: Fail) -> None:

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 from engine_mount.recordings.layout import decode, installed_definition
 from engine_mount.recordings.session import SessionError, session_content, session_parameters
 from engine_mount.view.feed import Message
+from mount_recorder.automatic_marks import MarkKind
 from mount_ros.messages.event import Mark, read_mark
 from mount_ros.messages.verdicts import verdicts_in
 from mount_ros.topics import AIR_GAP, COIL_TEMPERATURE, DIAGNOSTICS, EVENT, SESSION
 
 _EVENTS = 12  # chosen: the last ones
+_OTHER_CLOCK = 86_400.0  # s, chosen: a stamp so far off is of another clock
 _SILENT = 3_000_000_000  # ns, chosen: a node without diagnostics for so long is not there
 _LEVELS = ('ok', 'warning', 'error')
 _FIGURES = {
@@ -49,16 +51,21 @@ class NodeState(NamedTuple):
     received: int
 
 
+_UNKNOWN = NodeState(0, '', {}, 0)
+
+
 @dataclass
 class GraphState:
     """Everything about the graph that is no trace; `take` keeps it up to date."""
 
     namespace: str = ''
+    zero: int | None = None  # the stamp (ns) at which time begins
+    time: float = 0.0  # s, of the last sample
     nodes: dict[str, NodeState] = field(default_factory=dict)
     gap: dict[str, float] = field(default_factory=dict)
     coil_celsius: float = math.nan
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
-    events: deque[Mark] = field(default_factory=lambda: deque(maxlen=_EVENTS))
+    events: deque[tuple[float, Mark]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
 
     def take(self, message: Message) -> None:
         """Take a message of a topic that tells of state, and no other."""
@@ -70,10 +77,18 @@ class GraphState:
         elif message.topic is COIL_TEMPERATURE:
             self.coil_celsius = float(_decoded(message).temperature)
         elif message.topic is EVENT:
-            self.events.append(read_mark(_decoded(message).data, message.received))
+            mark = read_mark(_decoded(message).data, message.received)
+            if mark.kind != MarkKind.SWITCH_ON.value:  # what is shown here comes from the trace
+                self.add(mark, message.received)
         elif message.topic is SESSION:
             with suppress(SessionError):
                 self.parameters = session_parameters(session_content(_decoded(message).data))
+
+    def add(self, mark: Mark, received: int) -> None:
+        """Add an event, of its own stamp unless that is `received` (ns) or of another clock."""
+        time = math.nan if self.zero is None else (mark.time - self.zero) * 1e-9
+        own = mark.time != received and abs(time) < _OTHER_CLOCK
+        self.events.append((time if own else self.time, mark))
 
     def values(self) -> dict[str, str]:
         """Return the figures beside the charts, by name, with units."""
@@ -89,22 +104,19 @@ class GraphState:
                 found[name] = f'{text}{unit}'
         return found
 
-    def as_json(self, now: int, zero: int | None) -> dict[str, Any]:
-        """Return all of it, at `now` on the clock of the messages (ns); times in s from the stamp `zero`."""
+    def as_json(self, now: int) -> dict[str, Any]:
+        """Return all of it, at `now` on the clock of the messages (ns)."""
         nodes = []
         for name, node in sorted(self.nodes.items()):
             silent = now - node.received > _SILENT
-            level = 'silent' if silent else _LEVELS[min(node.level, 2)]
-            sentence = 'says nothing any more' if silent else node.sentence
             state = node.figures.get('state', '')
+            idle = silent or (not node.level and state not in ('', 'active'))
+            level = 'idle' if idle else _LEVELS[min(node.level, 2)]
+            sentence = 'no diagnostics any more' if silent else node.sentence
             nodes.append({'name': name, 'level': level, 'sentence': sentence, 'state': state})
         events = [
-            {
-                'time': 0.0 if zero is None else round((event.time - zero) * 1e-9, 3),
-                'kind': event.kind,
-                'text': event.text,
-            }
-            for event in reversed(self.events)
+            {'time': round(time, 3), 'kind': mark.kind, 'text': mark.text}
+            for time, mark in reversed(self.events)
         ]
         values = [{'name': name, 'value': value} for name, value in self.values().items()]
         return {'nodes': nodes, 'values': values, 'events': events}
@@ -114,10 +126,10 @@ class GraphState:
             space, _, name = verdict.node.rpartition('/')
             if space != self.namespace.strip('/'):
                 continue  # /diagnostics belongs to all mounts of the car
-            before = self.nodes.get(name)
+            before = self.nodes.get(name, _UNKNOWN)
             self.nodes[name] = NodeState(verdict.level, verdict.sentence, verdict.figures, message.received)
-            if verdict.level and (before is None or before.sentence != verdict.sentence):
-                self.events.append(Mark(message.received, name, verdict.sentence))
+            if (verdict.level or before.level) and before.sentence != verdict.sentence:
+                self.add(Mark(message.received, name, verdict.sentence), message.received)
 
 
 def _decoded(message: Message) -> Any:

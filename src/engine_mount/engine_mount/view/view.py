@@ -7,8 +7,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine_mount.view.feed import Feed, FeedError, Message, Receive, RecordedFeed
-from engine_mount.view.model import Model
+from engine_mount.view.feed import Feed, FeedError, Receive, RecordedFeed
+from engine_mount.view.model import BESIDE, Model, namespace_of
 from mount_bringup.graph.shutdown import ending_signals
 
 if TYPE_CHECKING:
@@ -49,14 +49,10 @@ def running_model(
     receivers: Sequence[Receive] = (),
     on_failure: Callable[[], None] = lambda: None,
 ) -> Iterator[Model]:
-    """Give the model of a feed that has begun; `receivers` get every message too."""
-    model = Model(feed, beside=beside, on_failure=on_failure)
+    """Give the model of a feed that has begun; `receivers` get every message too, and those of `BESIDE`."""
 
-    def receive(message: Message) -> None:
-        for take in (model.take, *receivers):
-            take(message)
-
-    feed.start(receive, model.fail)
+    model = Model(feed, beside=beside, receivers=receivers, on_failure=on_failure)
+    feed.start(model.take, model.fail)
     model.start()
     try:
         yield model
@@ -86,7 +82,8 @@ def serve_view(
         stack.enter_context(ending_signals(ending.set))
         receivers = []
         if foxglove_port:
-            server = FoxgloveServer(feed.topics, foxglove_port)
+            others = {f'{namespace_of(feed)}/{BESIDE.name}': BESIDE} if beside else {}
+            server = FoxgloveServer({**feed.topics, **others}, foxglove_port)
             stack.callback(server.stop)
             receivers.append(server.take)
             say(f'Foxglove   {server.address} (Foxglove or Lichtblick: open connection, Foxglove WebSocket)')
@@ -109,7 +106,7 @@ def wait_for_state(model: Model, limit: float) -> None:
         time.sleep(0.05)
 
 
-_STYLES = {'ok': 'green', 'warning': 'yellow', 'error': 'red', 'silent': 'bright_black'}
+_STYLES = {'ok': 'green', 'warning': 'yellow', 'error': 'red', 'idle': 'bright_black'}
 _EVENTS = 6  # chosen: the last ones
 
 

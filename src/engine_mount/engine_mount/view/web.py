@@ -13,6 +13,7 @@ from aiohttp import web
 from engine_mount.reports.drawing.page import asset
 from engine_mount.view.feed import FeedError
 from engine_mount.view.model import INTERVALS_PER_SECOND, WINDOW, Interval, Model
+from mount_control.policy.registry import DEFAULT
 
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 _CLOSE_LIMIT = 2.0  # s, chosen
@@ -61,7 +62,7 @@ class Web:
         """What to type into a browser."""
         self._thread = threading.Thread(target=self._serve, name='page', daemon=True)
         self._begun = threading.Event()
-        self._refusal = ''
+        self._refusal, self._count = '', 0
         model.on_interval = self._add
 
     def start(self) -> None:
@@ -105,12 +106,21 @@ class Web:
             sender.cancel()
         return socket
 
+    async def _layout(self, request: web.Request) -> web.Response:
+        """Answer with the layout for Lichtblick of the policy and the namespace of this drive."""
+        state = self._model.state
+        policy = state.parameters.get('mount_control', {}).get('policy', DEFAULT)
+        file = files('engine_mount.view') / 'layouts' / f'lichtblick_{policy}.json'
+        text = file.read_text(encoding='utf-8').replace('"/', f'"{state.namespace}/')
+        return web.Response(text=text, content_type='application/json')
+
     def _add(self, interval: Interval) -> None:
         """Take an interval from the thread of the model."""
         if not self._viewers:
             return
-        content: dict[str, Any] = {'intervals': [interval.as_json()]}
-        if interval.number % _STATE_EVERY == 0:
+        content: dict[str, Any] = {'intervals': [interval.as_json()] if interval.extents else []}
+        self._count += 1
+        if self._count % _STATE_EVERY == 0:
             content |= {'state': self._model.state_json(), 'chart': self._model.chart()}
         text = json.dumps(content)
         for viewer in self._viewers:
@@ -119,7 +129,13 @@ class Web:
     def _serve(self) -> None:
         asyncio.set_event_loop(self._loop)
         application = web.Application(middlewares=[self._guard])
-        application.router.add_routes([web.get('/stream', self._stream), web.get('/{name:.*}', _file)])
+        application.router.add_routes(
+            [
+                web.get('/stream', self._stream),
+                web.get('/layout.json', self._layout),
+                web.get('/{name:.*}', _file),
+            ]
+        )
         runner = web.AppRunner(application, access_log=None, shutdown_timeout=_CLOSE_LIMIT)
         try:
             self._loop.run_until_complete(runner.setup())

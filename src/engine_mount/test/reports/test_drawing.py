@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib import image
 
-from engine_mount.reports.drawing.chart import SHADING, Chart, Curve, Dots, Level, Panel
+from engine_mount.reports.drawing.chart import POINTS, SHADING, Chart, Curve, Level, Panel
 from engine_mount.reports.drawing.detail import NUMBERS, browser_chart, budget_of, even_numbers
 from engine_mount.reports.drawing.page import page
 from engine_mount.reports.drawing.picture import draw_chart
@@ -63,8 +63,8 @@ def test_the_numbers_of_a_page_are_shared_by_its_long_curves():
 def test_a_picture_shows_the_first_view_the_whole_below_and_a_shade_by_its_degree(tmp_path):
     x = np.arange(20_000.0)
     y = np.where(x == 7777.0, 50.0, np.sin(x))
-    dots = Dots('largest', x[:1], y[:1])
-    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y, steps=True)], [dots], [Level('on', 40.0)])
+    dots = Curve('largest', x[:1], y[:1], dash=POINTS)
+    panel = Panel('y (N)', [Curve('y', x, y), Curve('z', x, y), dots], [Level('on', 40.0)])
     shade = Curve('degree', x, np.where(x < 10_000.0, 0.5, 1.0), '#000000')
     chart = Chart('c', 'c', 'x (s)', [panel, Panel('z (N)', [Curve('z', x, y)])], shade, (0.0, 20_000.0))
     heights = []

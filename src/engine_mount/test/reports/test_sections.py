@@ -32,7 +32,7 @@ class Known(Subject):
 
     def __init__(self, place=0, run=Run(), **signals):  # noqa: B008
         self.name, self.prefix, self.missing, self.comparison = f'N{place}', '', [], None
-        self._place, self._several = place, True
+        self._several, self.look = True, ('#000000', 'solid')
         self._signals = dict.fromkeys(pair for pairs in QUANTITIES.values() for pair in pairs)
         self._signals |= {QUANTITIES[name][0]: signal for name, signal in signals.items()}
         self.run, self.beside, self.session = run, 'not known', ''
@@ -133,7 +133,7 @@ def test_displacements_are_drawn_in_mm_with_the_levels_of_the_policy_and_their_d
     b = Known(1, displacement=Signal(TIME + 5e-4, np.full(len(TIME), 1e-3)))
     b.comparison = object()
     above, below = motion.traces([a, b]).chart.panels
-    assert [curve.y[0] for curve in above.curves] == pytest.approx([0.0, 1.0])
+    assert [curve.y[0] for curve in above.curves] == pytest.approx([1.0, 0.0])  # the first one on top
     assert [level.value for level in above.levels] == pytest.approx([0.8, 0.35])
     (curve,) = below.curves
     assert curve.y[:-1] == pytest.approx(1.0)

@@ -4,7 +4,8 @@ import pytest
 
 import engine_mount
 from engine_mount.view.feed import Message, RecordedFeed
-from engine_mount.view.model import Model
+from engine_mount.view.model import BESIDE, Model
+from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.topics import DISPLACEMENT, EVENT
 
 
@@ -18,9 +19,11 @@ def messages_of(drive):
 def shown(drive):
     """Return the model behind the whole drive, in intervals of 250 messages."""
     feed, messages = messages_of(drive)
-    model = Model(feed)
+    beside = []
+    model = Model(feed, receivers=[beside.append])
     for begin in range(0, len(messages), 250):
         model.interval(messages[begin : begin + 250])
+    model.beside = ScalarsLayout(BESIDE), beside
     return model
 
 
@@ -35,7 +38,8 @@ def test_no_peak_is_lost_between_the_intervals(drive, shown):
     assert highest(shown, 'setpoint') == pytest.approx(3.0)
 
 
-def test_time_is_that_of_the_stamps(shown):
+def test_time_is_that_of_the_recording(drive, shown):
+    assert Model(RecordedFeed(drive, begin=5.0), beside=False).state.zero == shown.state.zero
     times = [interval.time for interval in shown.intervals]
     assert times == sorted(times)
     assert times[-1] == pytest.approx(6.999, abs=0.001)
@@ -45,12 +49,30 @@ def test_a_mount_without_current_swings_further_than_the_one_that_is_driven(show
     assert highest(shown, 'beside.no current') > 1.2 * highest(shown, 'displacement')
     assert 0.0 < highest(shown, 'beside.hydromount') < highest(shown, 'beside.no current')
     dashes = {curve['name']: curve['dash'] for curve in shown.chart()['panels'][0]['curves']}
-    assert dashes == {'this mount': 'solid', 'hydromount': 'dashed', 'no current': 'dotted'}
+    assert list(dashes.items()) == [
+        ('hydromount', 'dashed'),
+        ('no current', 'dotted'),
+        ('this mount', 'solid'),
+    ]
+    layout, messages = shown.beside
+    moved = [layout.unpack(message.raw)[1][0] for message in messages]
+    assert 1e3 * max(moved) == highest(shown, 'beside.hydromount')
 
 
-def test_gap_and_levels_are_told(shown):
+def test_a_hydromount_has_its_own_name_and_no_current(drive):
+    model = Model(messages_of(drive)[0])
+    model.state.parameters = {'mount_sim': {'mount': 'hydro'}}
+    panels = {
+        panel['label']: [curve['name'] for curve in panel['curves']] for panel in model.chart()['panels']
+    }
+    assert panels == {'displacement (mm)': ['hydromount'], 'latency (ms)': ['sample to setpoint']}
+
+
+def test_gap_levels_motion_and_damping_are_told(shown):
+    assert [event['text'] for event in shown.state_json()['events']][-2:] == ['off', 'on']
     values = {entry['name']: entry['value'] for entry in shown.state_json()['values']}
     assert values['contact gap'].startswith('349.')
+    assert values['no current: peak, rms'] > values['this mount: peak, rms']
     levels = shown.chart()['panels'][0]['levels']
     assert [level['name'] for level in levels] == ['damping half engaged, 0.13 mm']
 

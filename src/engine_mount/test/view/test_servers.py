@@ -18,6 +18,8 @@ from engine_mount.view.foxglove_server import FoxgloveServer
 from engine_mount.view.model import Model
 from engine_mount.view.view import open_feed, running_model, serve_view
 from engine_mount.view.web import Web
+from mount_control.policy.contract import trace_fields
+from mount_control.policy.registry import POLICIES
 
 LIMIT = 30.0  # s
 
@@ -67,10 +69,10 @@ async def told(address, count):
 
 def test_the_stream_tells_the_whole_and_then_each_interval(page):
     first, *others = run(told(page.address, 60))
-    keys = [panel['curves'][0]['key'] for panel in first['chart']['panels']]
+    keys = [panel['curves'][-1]['key'] for panel in first['chart']['panels']]
     assert keys[:2] == ['displacement', 'damping']
     numbers = [interval[0] for told_one in others for interval in told_one['intervals']]
-    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert numbers == sorted({*numbers})
     assert any('displacement' in interval[2] for one in others for interval in one['intervals'])
 
 
@@ -80,7 +82,9 @@ def test_a_viewer_that_does_not_read_holds_up_nobody(page):
         async with aiohttp.ClientSession() as session, session.ws_connect(f'{page.address}stream'):
             return await told(page.address, 200)
 
-    assert len(run(both())) == 200
+    found = run(both())
+    assert len(found) == 200
+    assert [one['state']['end'] for one in found if 'state' in one][-1].startswith('ended: no sample for ')
 
 
 def test_the_page_loads_nothing_from_elsewhere(page):
@@ -89,6 +93,13 @@ def test_the_page_loads_nothing_from_elsewhere(page):
         assert status == 200
         assert '://' not in text.replace('${scheme}://', '')
         assert "default-src 'self'" in headers['Content-Security-Policy']
+
+
+def test_the_layout_has_the_fields_of_the_policy_and_the_namespace(page):
+    page._model.state.namespace = '/right'
+    page._model.state.parameters = {'mount_control': {'policy': 'switched_viscous'}}
+    place = [*trace_fields(POLICIES['switched_viscous'])].index('magnitude')
+    assert f'"/right/control_trace.position[{place}]"' in request('GET', f'{page.address}layout.json')[1]
 
 
 @pytest.mark.parametrize(

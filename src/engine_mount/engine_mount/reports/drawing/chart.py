@@ -37,27 +37,26 @@ COLOUR_OF = {
 Array = NDArray[np.float64]
 Limits = tuple[float, float]
 
-SOLID, DASHED, DOTTED = 'solid', 'dashed', 'dotted'
+SOLID, DASHED, DOTTED, POINTS = 'solid', 'dashed', 'dotted', 'point'
 DASH_OF = {'hydromount': DASHED, 'no current': DOTTED}
 """Of the mounts that are not solid: with their colours, their look everywhere."""
 
 
+def look_of(mount: str, colour: str = COLOURS[0]) -> tuple[str, str]:
+    """Return colour and dash of a mount, `colour` where it has none of its own."""
+    return COLOUR_OF.get(mount, colour), DASH_OF.get(mount, SOLID)
+
+
 @dataclass(frozen=True)
 class Curve:
-    """A line through points; NaN interrupts it."""
+    """A line through points, or these alone; NaN interrupts it."""
 
     name: str
     x: Array
     y: Array
     colour: str = COLOURS[0]
     dash: str = SOLID
-    steps: bool = False  # holds each value until the next point
-    width: float = 1.6  # pixels
     key: str = ''  # of the signal that the live view adds
-
-
-class Dots(Curve):
-    """Single values `y` at the places `x`."""
 
 
 @dataclass(frozen=True)
@@ -72,15 +71,14 @@ class Level:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; `label` holds the unit, as in `displacement (mm)`."""
+    """One pair of axes; `label` holds the unit, as in `displacement (mm)`. The last curve lies on top."""
 
     label: str
     curves: Sequence[Curve] = ()
-    dots: Sequence[Dots] = ()
     levels: Sequence[Level] = ()
     log: bool = False
     share: float = 1.0  # of the height, against the other panels
-    least: Sequence[float] = ()  # values that the page always shows
+    least: Sequence[float] = ()  # values that are always shown
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,6 @@ class Chart:
     shade: Curve | None = None
     limits: Limits | None = None
     view: Limits | None = None
-    ticks: Sequence[float] = ()  # of the x axis; empty: chosen by the drawing
 
 
 def level_lines(levels: Mapping[str, float]) -> list[Level]:

@@ -29,7 +29,6 @@ def browser_chart(chart: Chart, budget: int = NUMBERS) -> dict[str, Any]:
         {
             **vars(panel),
             'curves': [_browser_curve(curve, budget) for curve in panel.curves],
-            'dots': [_browser_curve(dots, budget) for dots in panel.dots],
             'levels': [vars(level) for level in panel.levels],
         }
         for panel in chart.panels

@@ -49,9 +49,8 @@ def _section(section: Section, budget: int) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    judged = finding.judgement.replace('look', 'have a look')
-    text = ' '.join(map(_cell, finding.text))
-    return f'<li class="{finding.judgement}"><b>{escape(finding.what)} <i>({judged})</i></b>{text}</li>'
+    text, judged = ' '.join(map(_cell, finding.text)), finding.judgement
+    return f'<li class="{judged}"><b>{escape(finding.what)} <i>({judged})</i></b>{text}</li>'
 
 
 def _cell(cell: Cell) -> str:
@@ -65,7 +64,8 @@ def _table(table: Table) -> str:
     head = ''.join(f'<th>{escape(name)}</th>' for name in table.head)
     rows = [f'<tr>{head}</tr>\n']
     for place, row in enumerate(table.rows):
-        cells = ''.join(f'<td>{_cell(cell)}</td>' for cell in row)
+        named = zip(table.head, row, strict=True)
+        cells = ''.join(f'<td data-head="{escape(head)}">{_cell(cell)}</td>' for head, cell in named)
         rows.append(f'<tr{" class=marked" if place in table.marked else ""}>{cells}</tr>\n')
     title = escape(table.title)
     caption = f'<caption>{title}</caption>' if title and not table.folded else ''

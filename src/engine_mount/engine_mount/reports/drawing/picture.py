@@ -12,10 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.chart import SHADING, Array, Chart, Curve, Limits, Panel
+from engine_mount.reports.drawing.chart import POINTS, SHADING, Array, Chart, Curve, Limits, Panel
 from engine_mount.reports.drawing.detail import ranges
 
 _POINTS = 4000  # of a curve, chosen: 2 to a pixel of both kinds, lowest and highest
+_LINE = 1.6  # points, chosen
 _SHADES = 2000  # of the width, chosen: 2 to a pixel
 
 
@@ -41,8 +42,6 @@ def draw_chart(chart: Chart, *files: Path) -> None:
             _name_lines(axes, panel)
         else:
             axes.axvspan(*chart.view, fill=False)
-        if chart.ticks:
-            axes.set_xticks(list(chart.ticks))
         if place < len(chart.panels) - 1:
             axes.tick_params(labelbottom=False)
     rows[-1].set_xlabel(chart.x_label)
@@ -55,15 +54,16 @@ def draw_chart(chart: Chart, *files: Path) -> None:
 def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | None) -> None:
     for curve in panel.curves:
         x, y = _shown(curve, limits)
-        steps = 'steps-post' if curve.steps else 'default'
-        style: Any = {'linestyle': curve.dash, 'linewidth': curve.width, 'drawstyle': steps}
+        style: Any = {'linestyle': curve.dash, 'linewidth': _LINE}
+        if curve.dash == POINTS:
+            style = {'linestyle': 'none', 'marker': 'o', 'markersize': 5}
         axes.plot(x, y, color=curve.colour, label=curve.name, **style)
-    for dots in panel.dots:
-        axes.plot(dots.x, dots.y, 'o', color=dots.colour, markersize=5, label=dots.name)
     for level in panel.levels:
         for value in (level.value, -level.value):
             style = {'linestyle': level.dash, 'linewidth': 1.0}
             axes.axhline(value, color=level.colour, label=level.name, **style)
+    for value in panel.least:
+        axes.axhline(value, linewidth=0.0)
     if limits is not None:
         axes.set_xlim(*limits)
     if panel.log:
@@ -81,7 +81,7 @@ def _draw_panel(axes: Axes, panel: Panel, limits: Limits | None, shade: Curve | 
 
 def _name_lines(axes: Axes, panel: Panel) -> None:
     """Name what is drawn above the axes, in its own colour; a single curve is named by its axis."""
-    names = {curve.name for curve in (*panel.curves, *panel.dots)}
+    names = {curve.name for curve in panel.curves}
     handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     kept = {name: handle for name, handle in handles.items() if len(names) > 1 or name not in names}
     if not kept:

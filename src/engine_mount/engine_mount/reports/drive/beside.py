@@ -30,7 +30,7 @@ THIS = 'this mount'
 _OWN = {'hydro': 'hydromount', 'friction_off': 'no current', 'elastomer': 'no current'}
 LONGEST = 300.0  # s of a run, chosen: 3 s of computing
 EXCITED = ('road_height', 'chassis_acceleration')  # of sim/truth; the first that is not 0 throughout
-_KEPT = ('displacement', *EXCITED, 'velocity', 'friction_force', 'coil_current')
+_KEPT = ('displacement', *EXCITED, 'velocity', 'mount_force', 'friction_force', 'coil_current')
 _QUIET = np.zeros(5)  # no noise of the sensors
 
 Array = NDArray[np.float64]
@@ -44,11 +44,13 @@ class Beside(NamedTuple):
     """{name: truth} of the other mounts at the recorded stamps (ns) within the run.
 
     A truth has the columns `_KEPT` of sim/truth (SI). `begin` (ns): where the excitation begins.
+    `road` (n,): the first of `EXCITED` that moves.
     """
 
     stamps: NDArray[np.int64]
     truths: dict[str, NDArray[np.void]]
     begin: int
+    road: Array
 
 
 class _Simulated(NamedTuple):
@@ -98,9 +100,10 @@ def mounts_beside(recording: Recording, parameters: Parameters) -> Beside:
     places = first + _samples(stamps, simulated.sample_time)
     within = places < simulated.truths.shape[1]  # electronics in real time go on behind the end of the run
     truths = dict(zip(MOUNTS, simulated.truths[:, places[within]], strict=True))
+    road = next(truths['hydromount'][name] for name in EXCITED if excited[name].any())
     truths.pop(name_of(seat_of(parameters)), None)
     begin = int(stamps[0]) + (simulated.start - first) * simulated.sample_time
-    return Beside(stamps[within], truths, begin)
+    return Beside(stamps[within], truths, begin, road)
 
 
 def _recorded(recording: Recording) -> tuple[NDArray[np.int64], dict[str, Array]]:

@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine_mount.reports.drawing.chart import COLOURS, DASHED, Array, Chart, Curve, Panel
-from engine_mount.reports.fleet.looks import handy_unit, number
-from engine_mount.reports.sections.section import Section, Table
+from engine_mount.reports.fleet.looks import handy_unit
+from engine_mount.reports.sections.section import Section
 
 if TYPE_CHECKING:
     import pyarrow
 
-_MOST_BINS = 30  # chosen
-_QUANTILES = (('smallest', 0.0), ('median', 0.5), ('90 %', 0.9), ('99 %', 0.99), ('largest', 1.0))
 _OF_ONE_SIDE = re.compile(r',?( simulated)? as recorded( \(--closed-loop\))?')
 """What the meaning of a column says that stands for both sides here."""
+_MOST_BINS = 30  # chosen
 
 
 @dataclass(frozen=True)
@@ -66,19 +65,16 @@ def spread(pair: Pair) -> Section:
     looks = (('as recorded', COLOURS[0], 'solid'), ('changed', COLOURS[1], DASHED))
     curves = []
     for (name, colour, dash), values in zip(looks, both, strict=True):
-        counts = np.append(np.histogram(values, edges)[0].astype(np.float64), 0.0)
-        curves.append(Curve(name, edges, counts, colour, dash, steps=True))
-    panels, limits = [Panel('number of rows', curves)], (edges[0], edges[-1])
+        counts = np.histogram(values, edges)[0].astype(np.float64)
+        curves.append(Curve(name, np.repeat(edges, 2)[1:-1], np.repeat(counts, 2), colour, dash))
+    panels, limits = [Panel('number of rows', curves, least=[0.0])], (edges[0], edges[-1])
     chart = Chart(pair.name, _capital(title), f'{title}{behind}', panels, limits=limits)
-    form = '{:g}'.format if pair.whole else number
-    rows = [(word, *(form(np.quantile(values, share)) for values in both)) for word, share in _QUANTILES]
-    table = Table((f'value{behind}', 'as recorded', 'changed'), rows, title='Quantiles', folded=True)
     moved = np.count_nonzero(both[0] != both[1])
     words = [
         f'{_capital(_OF_ONE_SIDE.sub("", pair.meaning))}, in the column {pair.name}. '
         f'{moved} of {len(pair.before)} rows have another value with the change.'
     ]
-    return Section(pair.name, _capital(title), words, chart, [table], half=True)
+    return Section(pair.name, _capital(title), words, chart, half=True)
 
 
 def _capital(text: str) -> str:

@@ -12,11 +12,9 @@ from engine_mount.reports.drawing.chart import (
     COLOURS,
     DASHED,
     DIFFERENCE_COLOUR,
-    LEVEL_COLOUR,
     Array,
     Chart,
     Curve,
-    Dots,
     Panel,
 )
 from engine_mount.reports.sections.section import Cell, Link, Section, Table
@@ -50,38 +48,25 @@ def quantity(value: float, unit: str, *, signed: bool = False) -> str:
     return ' '.join(filter(None, (number(factor * value, signed=signed), shown)))
 
 
-_AT = 'at'  # a time is told to 1 ms, as samples are
-_SWITCHINGS = ('switchings_appeared', 'switchings_vanished', 'switchings_moved')
-_DAMPING = (
-    ('switchings appeared, vanished, moved', '', _SWITCHINGS),
-    ('energy in the pads', 'J', ('pad_energy_j', 'pad_energy_changed_j')),
-)
-_SETPOINT, _MOTION = 'setpoint_difference', 'displacement_difference'
 _COLUMNS = {
-    'setpoints': (
-        ('largest difference of the setpoints', 'A', (f'{_SETPOINT}_largest_a',)),
-        (_AT, 's', (f'{_SETPOINT}_largest_at_s',)),
-        ('rms of it', 'A', (f'{_SETPOINT}_rms_a',)),
-        *_DAMPING,
-    ),
-    'displacement': (
-        ('largest difference of the displacements', 'm', (f'{_MOTION}_largest_m',)),
-        (_AT, 's', (f'{_MOTION}_largest_at_s',)),
-        ('rms of it', 'm', (f'{_MOTION}_rms_m',)),
-        ('largest displacement', 'm', ('peak_displacement_m', 'peak_displacement_changed_m')),
-        ('largest force', 'N', ('peak_mount_force_n', 'peak_mount_force_changed_n')),
-        *_DAMPING,
-    ),
+    'setpoints': {
+        'setpoint_difference_largest_a': ('largest difference of the setpoints', 'A'),
+        'setpoint_difference_largest_at_s': ('at', 's'),
+    },
+    'displacement': {
+        'displacement_difference_largest_m': ('largest difference of the displacements', 'm'),
+        'displacement_difference_largest_at_s': ('at', 's'),
+    },
 }
-"""What is told of a row, by what was asked: head, unit in the result, columns (two: before and after)."""
+"""{question: {column of the result: head, unit}} of the worst; few, so that they fit a narrow page."""
 
 
-def _text(value: float | int | None, factor: float, name: str, is_time: bool) -> str:
-    if value is None:
-        return ''
-    if isinstance(value, int):
-        return str(value)
-    return f'{value:.3f}' if is_time else number(factor * value, signed='difference_largest' in name)
+def _text(value: float | int | None, factor: float, name: str) -> str:
+    if value is None or isinstance(value, int):
+        return '' if value is None else str(value)
+    if name.endswith('_at_s'):  # to 1 ms, as samples are
+        return f'{value:.3f}'
+    return number(factor * value, signed='difference_largest' in name)
 
 
 AROUND = 1.0
@@ -142,57 +127,39 @@ def _chart(name: str, title: str, signals: Signals) -> Chart:
     size = np.abs(after - before)
     place = np.nanargmax(size) if np.isfinite(size).any() else 0
     part = slice(*np.searchsorted(time, [time[place] - AROUND, time[place] + AROUND]))
-    largest = slice(place, place + 1 if size[place] > 0.0 else place)
     x, given = time[part], signals.given[part]
+
+    def compared(label: str, unit: str, pair: tuple[Array, Array]) -> list[Panel]:
+        """Return two panels: both, and the difference."""
+        one, other = (each[part] for each in pair)
+        (factor, shown), (scale, small) = handy_unit(unit, [*one, *other]), handy_unit(unit, other - one)
+        curves = [
+            Curve('as recorded', x, factor * one, COLOURS[0]),
+            Curve('changed', x, factor * other, COLOURS[1], DASHED),
+        ]
+        left = [Curve('difference', x, scale * (other - one), DIFFERENCE_COLOUR)]
+        title = f'{label}, changed minus as recorded ({small})'
+        return [Panel(f'{label} ({shown})', curves), Panel(title, left, share=0.7)]
+
     if moved is None:
         curve = Curve('displacement', x, _MM * given, COLOUR_OF['displacement'])
         panels = [
             Panel('recorded displacement (mm)', [curve]),
-            *_compared('setpoint', 'A', 1.0, time, signals.setpoints, part, largest),
+            *compared('setpoint', 'A', signals.setpoints),
         ]
     else:
         curve = Curve('acceleration', x, given, COLOURS[2])
-        setpoints = _compared('setpoint in the simulation', 'A', 1.0, time, signals.setpoints, part)
         panels = [
             Panel('recorded acceleration of the chassis (m/s²)', [curve]),
-            *_compared('simulated displacement', 'mm', _MM, time, moved, part, largest),
-            setpoints[0],
+            *compared('simulated displacement', 'm', moved),
+            compared('setpoint in the simulation', 'A', signals.setpoints)[0],
         ]
-    origin = 'first displacement sample' if moved is None else 'beginning of the recorded acceleration'
+    origin = 'sample' if moved is None else 'acceleration'
     # at first what is around the difference is seen, and nothing beyond the ends of the recording
     begin = min(time[place] - AT_FIRST, time[-1] - 2.0 * AT_FIRST)
     begin = max(begin, time[0])
     view = begin, min(begin + 2.0 * AT_FIRST, time[-1])
-    return Chart(name, title, f'seconds from the {origin}', panels, view=view)
-
-
-def _compared(
-    label: str,
-    unit: str,
-    factor: float,
-    time: Array,
-    pair: tuple[Array, Array],
-    part: slice,
-    largest: slice | None = None,
-) -> list[Panel]:
-    """Return two panels of a part of two signals: both, with a dot at the `largest`, and the difference."""
-    x, before, after = time[part], factor * pair[0][part], factor * pair[1][part]
-    curves = [
-        Curve('as recorded', x, before, COLOURS[0]),
-        Curve('changed', x, after, COLOURS[1], DASHED),
-    ]
-    dots = []
-    if largest is not None and largest.start < largest.stop:
-        dots = [Dots('largest difference', time[largest], factor * pair[1][largest], LEVEL_COLOUR)]
-    difference, scale, shown = after - before, 1.0, unit
-    if unit == 'mm':
-        scale, shown = handy_unit('m', difference / _MM)
-        scale /= _MM
-    curve = Curve('difference', x, scale * difference, DIFFERENCE_COLOUR)
-    return [
-        Panel(f'{label} ({unit})', curves, dots),
-        Panel(f'{label}, changed minus as recorded ({shown})', [curve], share=0.7),
-    ]
+    return Chart(name, title, f'seconds from the first {origin}', panels, view=view)
 
 
 def worst_section(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> Section:
@@ -205,23 +172,18 @@ def worst_section(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> S
         (str(place), Link(look.name, f'look_{place}'), *cells)
         for place, (look, *cells) in enumerate(zip(looks, *columns, strict=True), 1)
     ]
-    words = [f'The largest absolute values of {by}; a → b: as recorded and with the change.']
+    words = [f'The largest absolute values of {by}.']
     return Section('worst', 'Worst', words, tables=[Table(('', 'recording', *heads), rows)])
 
 
 def _columns(looks: Sequence[Look], by: str, schema: 'pyarrow.Schema') -> Iterator[tuple[str, list[str]]]:
     """Yield head and cells of each column, that by which the worst were chosen first."""
     rows = [look.row for look in looks]
-    columns = _COLUMNS.get(rows[0].get('asked', ''), _DAMPING)
-    if all(names != (by,) for _, _, names in columns):
-        columns = ((by, (schema.field(by).metadata or {}).get(b'unit', b'').decode(), (by,)), *columns)
-    for head, unit, names in columns:
-        values = [row[name] for row in rows for name in names if row.get(name) is not None]
-        if not values:
-            continue
-        factor, shown = handy_unit(unit, values)
-        between = ', ' if names is _SWITCHINGS else '\u00a0→\u00a0'
-        cells = [
-            between.join(_text(row.get(name), factor, name, head == _AT) for name in names) for row in rows
-        ]
-        yield f'{head} ({shown})' if shown else head, cells
+    unit = (schema.field(by).metadata or {}).get(b'unit', b'').decode()
+    columns = {by: (by, unit), **_COLUMNS.get(rows[0].get('asked', ''), {})}
+    for name, (head, unit) in columns.items():
+        values = [row[name] for row in rows if row.get(name) is not None]
+        if values:
+            factor, shown = handy_unit(unit, values)
+            cells = [_text(row.get(name), factor, name) for row in rows]
+            yield f'{head} ({shown})' if shown else head, cells

@@ -43,6 +43,13 @@ _ASKED = {
         'the real mount did is not in these figures.',
     ),
 }
+_ANSWERS = {
+    'peak_displacement_m': 'largest displacement',
+    'rms_displacement_m': 'rms displacement',
+    'mean_current_a': 'mean current',
+    'pad_energy_j': 'wear',
+}
+"""{figure: its word}; their sums over all rows are the answer above the page. Wear: the work in the pads."""
 _OF_MOTION = ('displacement', 'mount_force')  # in names of figures: what is looked for in a closed loop
 _LISTED = 20  # recordings that are named beside their reason, chosen
 
@@ -58,8 +65,14 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: 
     others = [row for row in rows if row.get('outcome') == _ANOTHER_POLICY]
     failed = [row for row in rows if row['reason'] and row.get('outcome') != _ANOTHER_POLICY]
     done = [row for row in rows if not row['reason']]
+    known = {pair.name: pair for pair in pairs_of(result)}
+    answers = [
+        f'{word} {100.0 * (pair.after.sum() / pair.before.sum() - 1.0):+.0f} %'
+        for name, word in _ANSWERS.items()
+        if (pair := known.get(name)) and pair.before.any()
+    ]
     pairs = sorted(
-        (pair for pair in pairs_of(result) if pair.moved),
+        (pair for pair in known.values() if pair.moved),
         key=lambda pair: not any(word in pair.name for word in _OF_MOTION),
     )
     sections = [
@@ -73,7 +86,7 @@ def fleet_report(result: 'pyarrow.Table', looks: Sequence[Look], by: str, name: 
         sections.append(Section('another_policy', 'Another policy', [words], tables=[_reasons(others)]))
     tables = [_reasons(failed)] if failed else []
     sections.append(Section('failures', 'Failed', [] if failed else ['Nothing failed.'], tables=tables))
-    return Report(f'Fleet {name}: {question}', sections)
+    return Report(f'Fleet {name}: {", ".join(answers) or question}', sections)
 
 
 def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Section:
@@ -86,8 +99,7 @@ def _overview(rows: Rows, done: Rows, failed: Rows, words: Sequence[str]) -> Sec
     is_simulated = {row['asked'] for row in rows} == {DISPLACEMENT}
     findings = [
         _recordings(rows, done, failed, 'simulated' if is_simulated else 'replayed'),
-        _differing(done),
-        _motion(rows) if is_simulated else _trusted(rows),
+        *([] if is_simulated else [_trusted(rows)]),
     ]
     tables = [Table(('parameter', 'changed to'), parameters)] if parameters else []
     return Section('overview', 'Overview', words, findings=findings, tables=tables)
@@ -105,14 +117,6 @@ def _recordings(rows: Rows, done: Rows, failed: Rows, verb: str) -> Finding:
     return Finding('Recordings', LOOK if failed or not replayed else GOOD, text)
 
 
-def _differing(done: Rows) -> Finding:
-    differing = sum(bool(row['setpoints_differing']) for row in done)
-    kinds = [f'switchings_{what}' for what in ('appeared', 'vanished', 'moved')]
-    switched = sum(any(row[kind] for kind in kinds) for row in done)
-    text = f'{differing} of {len(done)} rows have other setpoints, {switched} are damped at other times;'
-    return Finding('Difference', LOOK if differing else GOOD, [text, Link('the worst', 'worst')])
-
-
 def _trusted(rows: Rows) -> Finding:
     """Judge whether the replay without the change gives what was recorded."""
     known = [row for row in rows if row.get('as_recorded') is not None]
@@ -128,24 +132,6 @@ def _trusted(rows: Rows) -> Finding:
             f'{quantity(largest, "A")}: they were recorded with other parameters, another version, or losses',
         )
     return Finding('Replay without the change', judgement, [text])
-
-
-def _motion(rows: Rows) -> Finding:
-    """Tell in how many drives the change makes the largest displacement larger, and where most."""
-    grown = {
-        _name(row): after - before
-        for row in rows
-        if (before := row.get('peak_displacement_m')) is not None
-        and (after := row.get('peak_displacement_changed_m')) is not None
-    }
-    larger, smaller = (sum(sign * by > 0.0 for by in grown.values()) for sign in (1.0, -1.0))
-    judgement, text = GOOD, f'larger in {larger}, smaller in {smaller} of {len(grown)} rows'
-    if not grown:
-        judgement, text = UNKNOWN, 'no drive could be simulated'
-    elif larger:
-        most = max(grown, key=lambda name: grown[name])
-        judgement, text = LOOK, f'{text}; grows most in {most}: {quantity(grown[most], "m", signed=True)}'
-    return Finding('Largest displacement', judgement, [text])
 
 
 def _reasons(rows: Rows) -> Table:

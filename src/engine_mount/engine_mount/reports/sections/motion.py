@@ -9,16 +9,14 @@ import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.reports.drawing.chart import (
-    COLOUR_OF,
-    DASH_OF,
     DIFFERENCE_COLOUR,
+    POINTS,
     Array,
     Chart,
     Curve,
-    Dots,
-    Level,
     Panel,
     level_lines,
+    look_of,
 )
 from engine_mount.reports.drive.beside import BesideError, peaks_text
 from engine_mount.reports.drive.felt import FIGURES, felt_beside, value_text
@@ -34,7 +32,13 @@ from engine_mount.reports.sections.periodic import (
     harmonics as harmonics_of,
 )
 from engine_mount.reports.sections.section import Cell, Link, Section, Table
-from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
+from engine_mount.reports.sections.subject import (
+    Signal,
+    Subject,
+    other_mounts,
+    share_road,
+    shared_sentences,
+)
 
 TIME_LABEL = 'time from the first sample (s)'
 BEFORE, AFTER = 0.4, 0.6  # s, chosen: shown first, round the largest displacement or force
@@ -51,51 +55,44 @@ _HIGHEST = 60.0  # Hz, of a spectrum
 def traces(subjects: Sequence[Subject]) -> Section:
     """Return displacement with the levels of its policy above current, over time, as in Fig. 15.
 
-    With the displacement stands that of other mounts on the road of the first recording. Where two recordings
-    are compared, the second less the first stands below each.
+    With the displacement stands that of other mounts on the same road. Where two recordings are compared, the
+    second less the first stands below each.
     """
     first, last, several = subjects[0], subjects[-1], len(subjects) > 1
-    shade = next(filter(None, (each.shade for each in subjects)), None)
+    shaded = next((each for each in subjects if each.shade), first)
     levels: dict[str, float] = next((each.run.levels for each in subjects if each.run.levels), {})
-    words = [f'Shaded: the degree of damping in {first.name}.'] if several and shade else []
+    words = [f'Shaded: the degree of damping in {shaded.name}.'] if several and shaded.shade else []
     if first.run.unknown:
         words.append(f'The levels of the policy are not drawn: {first.run.unknown}.')
     panels: list[Panel] = []
     ends: list[float] = []
-    for quantity, what, unit, factor, share in (
-        ('displacement', 'displacement', 'mm', _MM, 1.5),
-        ('setpoint', 'current', 'A', 1.0, 1.0),
+    for quantity, what, unit, factor, share, lines, least in (
+        ('displacement', 'displacement', 'mm', _MM, 1.5, level_lines(levels), ()),
+        ('setpoint', 'current', 'A', 1.0, 1.0, (), (0.0,)),
     ):
-        signals = [(each, signal) for each in subjects if (signal := each[quantity]) is not None]
+        shown = [each for each in subjects if quantity != 'setpoint' or not each.run.without_friction]
+        signals = [(each, signal) for each in shown if (signal := each[quantity]) is not None]
         if not signals:
             continue
         ends += [signal.time[place] for _, signal in signals for place in (0, -1)]
-        lines: list[Level] = []
-        name, beside = what, []
-        if quantity == 'displacement':
-            lines = level_lines(levels)
-            name = what if several else first.mount
-            beside = [
-                Curve(other, moved.time, _MM * moved.values, COLOUR_OF[other], DASH_OF[other])
-                for other, moved in first.displacements.items()
-                if other != first.mount
-            ]
+        name = first.mount if quantity == 'displacement' and not several else what
         curves = [each.curve(name, signal.time, factor * signal.values) for each, signal in signals]
-        panels.append(Panel(f'{what} ({unit})', [*beside, *curves], levels=lines, share=share))
+        curves = [*_others(subjects, quantity, factor), *reversed(curves)]
+        panels.append(Panel(f'{what} ({unit})', curves, levels=lines, share=share, least=least))
         if last.comparison is not None and len(signals) > 1:
             panels.append(_difference(f'{what}, B - A ({unit})', signals[0][1], signals[-1][1], factor))
     if not panels:
         return Section('traces', 'Displacement and current', words)
-    if not isinstance(first.beside, str):
-        of = f' of {first.name}' if several else ''
-        words.append(f'Computed on the same road{of}: {", ".join(first.beside.truths)}.')
+    if others := other_mounts(subjects, 'displacement'):
+        words.append(f'Computed on the same road: {", ".join(others)}.')
     if last.comparison is not None:
         words.append(f'B - A: {last.name} less {first.name}.')
     title, limits = 'Displacement and current', (min(ends), max(ends))
-    chart = Chart('time_traces', title, TIME_LABEL, panels, shade, limits)
-    peaks = {name: moved.peak() for name, moved in first.displacements.items()}
-    _, at = peaks.get(first.mount, (0.0, math.nan))
-    if not several and math.isfinite(at):
+    chart = Chart('time_traces', title, TIME_LABEL, panels, shaded.shade, limits)
+    moved = {each.name if several else each.mount: each['displacement'] for each in subjects}
+    peaks = {name: each.peak() for name, each in {**moved, **others}.items() if each is not None}
+    _, at = next(iter(peaks.values()), (0.0, math.nan))
+    if share_road(subjects) and math.isfinite(at):
         told = f'Largest displacement: {peaks_text({name: peak for name, (peak, _) in peaks.items()})}'
         words.insert(0, f'{told}. One second round it is shown first.')
         view = max(limits[0], at - BEFORE), min(limits[1], at + AFTER)
@@ -139,17 +136,23 @@ def hysteresis(subjects: Sequence[Subject]) -> Section:
     """Return mount force and friction force over displacement, as in Fig. 13 left."""
     groups: dict[str, list[Curve]] = {'mount force': [], 'friction force': []}
     said = []
+    event, same_road = _loop_stretch(subjects[0]), share_road(subjects)
     for subject in subjects:
-        stretch, how = _loop_stretch(subject)
+        stretch, how = event if same_road else _loop_stretch(subject)  # on one road the same event
         drawn = False
         for what, curves in groups.items():
             force = None if what == 'friction force' and subject.run.without_friction else subject[what]
             x, y, _ = _together(subject['true displacement'], force, stretch)
             if len(x) > 2:
-                curves.append(subject.curve(what, _MM * x, y))
+                name = what if len(subjects) > 1 else subject.mount
+                curves.append(subject.curve(name, _MM * x, y))
                 drawn = True
         said.append((subject, how if drawn else 'no force was recorded'))
-    panels = [Panel(f'{what} (N)', curves) for what, curves in groups.items() if curves]
+    for force in _others(subjects, 'mount force'):
+        moved = other_mounts(subjects, 'displacement')[force.name]
+        x, y, _ = _together(moved, Signal(force.x, force.y), event[0])
+        groups['mount force'].append(replace(force, x=_MM * x, y=y))
+    panels = [Panel(f'{what} (N)', curves[::-1]) for what, curves in groups.items() if curves]
     title = 'Loss hysteresis'
     chart = Chart('hysteresis', title, 'displacement (mm)', panels) if panels else None
     return Section('hysteresis', title, shared_sentences(subjects, said), chart)
@@ -172,7 +175,7 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
         amplitudes = harmonics_of(time[inside], y[inside], sine.frequency)
         numbers = np.arange(1.0, len(amplitudes) + 1.0)
         curve = subject.curve('mount force', numbers, decibels(amplitudes))
-        dots.append(Dots(curve.name, curve.x, curve.y, curve.colour))
+        dots.append(replace(curve, dash=POINTS))
         rows.append(
             (
                 subject.name,
@@ -180,19 +183,17 @@ def harmonics(subjects: Sequence[Subject]) -> Section:
                 f'{_MM * sine.amplitude:.3f}',
                 f'{cycle_work(x[inside], y[inside], periods):.3f}',
                 f'{100.0 * distortion(amplitudes):.1f}',
-                *(f'{value:.2f}' for value in amplitudes),
             )
         )
         said.append((subject, f'over the last {periods} periods until {time[inside][-1]:.2f} s'))
     head = (
         'recording', 'frequency (Hz)', 'amplitude (mm)', 'work per cycle (J)', 'distortion (%)',
-        *(f'h{number} (N)' for number in range(1, 9)),
     )  # fmt: skip
     title, words = 'Harmonics of the mount force', shared_sentences(subjects, said)
     if not rows:
         return Section('harmonics', title, words)
-    panels = [Panel('amplitude above 1 N (dB)', dots=dots)]
-    chart = Chart('harmonics', title, 'harmonic', panels, ticks=dots[0].x.tolist())
+    limits = 0.9, len(dots[0].x) + 0.1
+    chart = Chart('harmonics', title, 'harmonic', [Panel('amplitude above 1 N (dB)', dots)], limits=limits)
     return Section('harmonics', title, words, chart, [Table(head, rows)])
 
 
@@ -204,12 +205,13 @@ def spectra(subjects: Sequence[Subject]) -> Section:
         ('mount force', 'mount force', 'N', 1.0),
         ('acceleration', 'chassis acceleration', 'm/s²', 1.0),
     ):
-        label, curves = f'{what}\n({unit}/√Hz)', []
-        for subject in subjects:
-            if (signal := subject[quantity]) is None:
-                continue
-            inside = signal.time >= subject.active_from
-            _, values, made_up = evenly(signal.time[inside], signal.values[inside], subject.sample_rate)
+        label, curves = f'{what} ({unit}/√Hz)', []
+        name = what if len(subjects) > 1 else subjects[0].mount
+        signals = [(each, each.curve(name, *signal)) for each in subjects if (signal := each[quantity])]
+        signals += [(subjects[0], curve) for curve in _others(subjects, quantity)]
+        for subject, curve in signals:
+            inside = curve.x >= subject.active_from
+            _, values, made_up = evenly(curve.x[inside], curve.y[inside], subject.sample_rate)
             if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0.0:  # too short, or nothing moves
                 continue
             if made_up > _LEAST_LOST * len(values):
@@ -217,9 +219,9 @@ def spectra(subjects: Sequence[Subject]) -> Section:
                 said.append((subject, f'{share} are missing and were replaced by straight lines'))
             frequency, density = amplitude_density(values, subject.sample_rate)
             shown = (frequency > 0.0) & (frequency <= _HIGHEST)
-            curves.append(subject.curve(label, frequency[shown], factor * density[shown]))
+            curves.append(replace(curve, x=frequency[shown], y=factor * density[shown]))
         if curves:
-            panels.append(Panel(label, curves, log=True))
+            panels.append(Panel(label, curves[::-1], log=True))
     words = ['From where control was active; Hann windows of 2.048 s that overlap by half.']
     words += shared_sentences(subjects, said)
     limits = (0.0, _HIGHEST)
@@ -233,6 +235,12 @@ def peak_cell(signal: Signal | None, unit: str, begin: float = -math.inf, end: f
         return 'not recorded'
     value, time = signal.peak(begin, end)
     return 'unknown' if math.isnan(value) else Link(quantity_text(value, unit), 'traces', time)
+
+
+def _others(subjects: Sequence[Subject], quantity: str, factor: float = 1.0) -> list[Curve]:
+    """Return the curves of the computed mounts."""
+    others = other_mounts(subjects, quantity)
+    return [Curve(name, moved.time, factor * moved.values, *look_of(name)) for name, moved in others.items()]
 
 
 def _difference(label: str, a: Signal, b: Signal, factor: float) -> Panel:

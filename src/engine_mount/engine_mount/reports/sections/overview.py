@@ -14,6 +14,7 @@ from engine_mount.reports.sections.section import (
     BAD,
     GOOD,
     LOOK,
+    NOT_APPLICABLE,
     UNKNOWN,
     Cell,
     Finding,
@@ -22,7 +23,7 @@ from engine_mount.reports.sections.section import (
     Table,
     moment,
 )
-from engine_mount.reports.sections.subject import Signal, Subject, shared_sentences
+from engine_mount.reports.sections.subject import Signal, Subject, other_mounts, shared_sentences
 
 
 def overview(subjects: Sequence[Subject]) -> Section:
@@ -73,7 +74,7 @@ def _friction_cells(subject: Subject) -> dict[str, Cell]:
 
 def _switching(subject: Subject) -> tuple[str, Sequence[Cell]]:
     if subject.run.without_friction:
-        return UNKNOWN, [f'not applicable: {subject.run.without_friction}']
+        return NOT_APPLICABLE, [subject.run.without_friction]
     spans = subject.damping
     if spans is None:
         return UNKNOWN, ['when damping was switched was not recorded']
@@ -108,42 +109,42 @@ def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
     unknown = 'against other mounts unknown:'
-    beside, moved, shaken = subject.beside, subject['displacement'], subject['acceleration']
+    beside, moved = subject.beside, subject['displacement']
     if isinstance(beside, str):
         return UNKNOWN, [f'{unknown} {beside}']
     if moved is None:
         return UNKNOWN, [f'{unknown} no displacement was recorded']
-    time, begin = subject.seconds(beside.stamps), (beside.begin - subject.zero) / 1e9
+    begin = (beside.begin - subject.zero) / 1e9
     peak, at = moved.peak(begin)
     if math.isnan(peak):
         return UNKNOWN, [f'{unknown} the recording ends before the excitation begins']
-
-    def against(signal: Signal, quantity: str, unit: str, figure: Callable[[Signal], float]) -> list[str]:
-        value, words = figure(signal), []
-        for name, truth in beside.truths.items():
-            other = figure(Signal(time, truth[quantity]))
-            words.append(f'{name} {quantity_text(other, unit)} ({_change(value, other)})')
-        return [quantity_text(value, unit), f'against {" and ".join(words)}']
 
     def rms(signal: Signal) -> float:
         known = signal.values[(signal.time >= begin) & np.isfinite(signal.values)]
         return float(np.std(known)) if len(known) else math.nan
 
-    largest, *words = against(moved, 'displacement', 'm', lambda signal: signal.peak(begin)[0])
-    text: list[Cell] = ['peak displacement', Link(largest, 'traces', at), *words]
-    text += ['· rms', *against(moved, 'displacement', 'm', rms)]
-    if shaken is not None:
-        text += ['·', Link('acceleration of the chassis', 'spectra'), 'rms']
-        text += against(shaken, 'chassis_acceleration', 'm/s²', rms)
-    least = min(each.peak(begin)[0] for each in subject.displacements.values())
-    return (GOOD if peak <= least else LOOK), text
+    def against(own: Signal, quantity: str, unit: str, figure: Callable[[Signal], float]) -> str:
+        others = {name: figure(signal) for name, signal in other_mounts([subject], quantity).items()}
+        changes = (
+            f'{_change(figure(own), other)} {name} ({quantity_text(other, unit)})'
+            for name, other in others.items()
+        )
+        return f'{quantity_text(figure(own), unit)}, {", ".join(changes)}'
+
+    of_peak = against(moved, 'displacement', 'm', lambda signal: signal.peak(begin)[0])
+    words = [of_peak, f'· rms {against(moved, "displacement", "m", rms)}']
+    text: list[Cell] = [Link('peak displacement', 'traces', at), *words]
+    if (shaken := subject['acceleration']) is not None:
+        words.append(f'rms {against(shaken, "acceleration", "m/s²", rms)}')
+        text += ['·', Link('acceleration of the chassis', 'spectra'), words[-1]]
+    return (LOOK if any('worse' in each for each in words) else GOOD), text
 
 
 def _change(value: float, reference: float) -> str:
     if not reference > 0.0 or math.isnan(value):
-        return 'unknown'
+        return 'against'
     percent = round(100.0 * (value / reference - 1.0))
-    return f'{percent:+d} %' if percent else 'no change'
+    return f'{"worse" if percent > 0 else "better"} by {abs(percent)} % than' if percent else 'as'
 
 
 def _times(count: int) -> str:

@@ -11,7 +11,7 @@ from engine_mount.recordings.losses import as_table
 from engine_mount.recordings.losses import sentences as audit_sentences
 from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.drawing.chart import COLOUR_OF, COLOURS, DASHED, Array, Chart, Curve, Panel
+from engine_mount.reports.drawing.chart import COLOUR_OF, DASHED, Array, Chart, Curve, Panel
 from engine_mount.reports.sections.motion import AFTER, BEFORE, TIME_LABEL
 from engine_mount.reports.sections.section import Section, Table, moment
 from engine_mount.reports.sections.subject import Signal, Subject, Tracking, shared_sentences
@@ -104,12 +104,10 @@ def tracking(subjects: Sequence[Subject]) -> Section:
             strongest = found.time[np.nanargmax(np.abs(found.wanted))]
             view = strongest - BEFORE, strongest + AFTER
         shade = shade or subject.shade
-        place = len(wanted)
-        colour = COLOURS[(place + 1) % len(COLOURS)] if place else COLOUR_OF['desired_force']
         force = subject.curve('true', found.time, found.actual)
         name = force.name.replace('true', 'wanted', 1)
         forces.append(force)
-        wanted.append(Curve(name, found.time, found.wanted, colour, DASHED))
+        wanted.append(Curve(name, found.time, found.wanted, COLOUR_OF['desired_force'], DASHED))
         errors.append(subject.curve('error', found.time, found.actual - found.wanted))
     chart = None
     if wanted and shade:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 from engine_mount.recordings.difference import time_text
 from engine_mount.reports.drawing.chart import Chart
 
-GOOD, LOOK, BAD, UNKNOWN = 'good', 'look', 'bad', 'unknown'
+GOOD, LOOK, BAD, UNKNOWN, NOT_APPLICABLE = 'good', 'have a look', 'bad', 'unknown', 'not applicable'
+"""Judgements; their words are classes of the style."""
 
 
 class Link(NamedTuple):

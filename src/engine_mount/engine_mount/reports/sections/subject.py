@@ -24,13 +24,10 @@ from engine_mount.recordings.session import (
 )
 from engine_mount.recordings.times import Times, each_once
 from engine_mount.reports.drawing.chart import (
-    COLOUR_OF,
-    COLOURS,
-    DASH_OF,
-    SOLID,
     SPAN_COLOUR,
     Array,
     Curve,
+    look_of,
 )
 from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
 from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
@@ -124,17 +121,16 @@ class Subject:
         recording: Recording,
         name: str = '',
         *,
-        place: int = 0,
         several: bool = False,
         zero: int | None = None,
     ):
-        """Take what the report calls a recording, its place among `several`, and the stamp (ns) of time 0."""
+        """Take the name of a recording, whether there are `several`, and the stamp (ns) of time 0."""
         self.recording = recording
         self.name = name or recording.short_name
         self.prefix = f'{self.name}: ' if several else ''
         self.missing: list[str] = []
         self.comparison: Comparison | None = None  # of the first recording with this one
-        self._place, self._several = place, several
+        self._several = several
         self._signals: dict[tuple[str, str], Signal | None] = {}
         recording.load_columns({topic: names for topic, names in _NEEDED.items() if topic in recording})
         self.zero = recording.time_axis.zero if zero is None else zero
@@ -156,10 +152,14 @@ class Subject:
         return (stamps - self.zero) / 1e9
 
     def curve(self, what: str, x: Array, y: Array) -> Curve:
-        """Return a curve in the colour of this recording, with its name where there are several."""
+        """Return a curve in the look of this recording, with its name where there are several."""
         label = f'{what}, {self.name}' if self._several else what
-        colour = COLOUR_OF.get(self.mount, COLOURS[self._place % len(COLOURS)])
-        return Curve(label, x, y, colour, DASH_OF.get(self.mount, SOLID))
+        return Curve(label, x, y, *self.look)
+
+    @functools.cached_property
+    def look(self) -> tuple[str, str]:
+        """Colour and dash of its curves."""
+        return look_of(self.mount)
 
     @property
     def mount(self) -> str:
@@ -173,15 +173,6 @@ class Subject:
         if self.run.without_friction or degree is None or not self.damping:
             return None
         return Curve('degree of damping', degree.time, degree.values, SPAN_COLOUR)
-
-    @functools.cached_property
-    def displacements(self) -> dict[str, Signal]:
-        """{name: displacement} of its own mount and, where they can be computed, of those beside it."""
-        found = {} if (own := self['displacement']) is None else {self.mount: own}
-        if not isinstance(beside := self.beside, str):
-            time = self.seconds(beside.stamps)
-            found |= {name: Signal(time, truth['displacement']) for name, truth in beside.truths.items()}
-        return found
 
     @functools.cached_property
     def session(self) -> str:
@@ -208,13 +199,14 @@ class Subject:
         try:
             parameters = with_recorded_policy(parameters)
             mount = seat_of(parameters)
+            reason = without_friction(mount)
             return Run(
                 parameters=parameters,
-                levels=levels_of(*policy_of(parameters)),
+                levels={} if reason else levels_of(*policy_of(parameters)),
                 current_limit=control_parameters(parameters).highest_current,
                 resistance=with_flattened(RippleCoil(), parameters.get('mount_sim', {}), 'coil').resistance,
                 mount=mount,
-                without_friction=without_friction(mount),
+                without_friction=reason,
             )
         except (ValueError, TypeError, AttributeError) as error:
             return Run(f'the parameters of the session cannot be used: {error}')
@@ -352,6 +344,26 @@ class Subject:
         if lack not in self.missing:
             self.missing.append(lack)
         return None
+
+
+def share_road(subjects: Sequence[Subject]) -> bool:
+    """Return whether all are on one road, as far as each was recorded; one is on its own."""
+    roads = [each.beside.road for each in subjects if not isinstance(each.beside, str)]
+    count = min(map(len, roads), default=0)
+    same = len(roads) == len(subjects) and all(
+        np.array_equal(each[:count], roads[0][:count]) for each in roads
+    )
+    return same or len(subjects) == 1
+
+
+def other_mounts(subjects: Sequence[Subject], quantity: str) -> dict[str, Signal]:
+    """Return {name: signal} of the computed mounts on the road of all recordings that none of these has."""
+    beside, column = subjects[0].beside, dict(QUANTITIES[quantity]).get(_TRUTH)
+    if isinstance(beside, str) or column is None or not share_road(subjects):
+        return {}
+    time, recorded = subjects[0].seconds(beside.stamps), {each.mount for each in subjects}
+    others = beside.truths.items()
+    return {name: Signal(time, truth[column]) for name, truth in others if name not in recorded}
 
 
 def shared_sentences(subjects: Sequence[Subject], remarks: Sequence[tuple[Subject, str]]) -> list[str]:

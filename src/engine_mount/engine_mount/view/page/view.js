@@ -35,7 +35,8 @@ function takeChart(data) {
   seen.chart = Object.assign(build(element('panels'), data), { live: true });
 }
 
-function takeState({ nodes, values, events }) {
+function takeState({ nodes, values, events, end }) {
+  say('connection', end);
   for (const name of ['nodes', 'values', 'events']) element(name).replaceChildren();
   for (const { name, level, state, sentence } of nodes) {
     const item = add(element('nodes'), 'li', '');
@@ -52,10 +53,10 @@ function takeState({ nodes, values, events }) {
 function show() {
   if (!seen.chart || document.hidden) return;
   const known = seen.frozen || seen.intervals, end = known.length ? known[known.length - 1][1] : 0;
-  const begin = end - Number(element('span').value);
+  const begin = Math.max(end - Number(element('span').value), known.length ? known[0][1] : 0);
   const visible = known.filter(([, time]) => time >= begin);
   for (const { spec, lines } of seen.chart.panels) lines.forEach((line, place) => fill(line, spec.curves[place].key, visible));
-  seen.chart.shown = [begin, end > begin ? end : begin + 1];
+  seen.chart.shown = [begin, Math.max(end, begin + 1)];
   draw(seen.chart);
 }
 

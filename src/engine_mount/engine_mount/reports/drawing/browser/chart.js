@@ -47,6 +47,16 @@ function niceStep(span, count) {
   return power * [1, 2, 5, 10].find((factor) => factor * power >= rough * 0.999);
 }
 
+function ticksOf(low, high, count, log) { // at least three; of logarithms those of 1, 2, 5, or of decades
+  const factors = high - low > 2.5 ? [1] : [1, 2, 5], logs = [];
+  for (let decade = Math.floor(low); log && decade <= high; decade += 1) logs.push(...factors.map((factor) => decade + Math.log10(factor)));
+  const inside = logs.filter((place) => place >= low && place <= high);
+  if (inside.length > 1) return inside;
+  const few = niceStep(high - low, count), step = Math.floor(high / few) - Math.ceil(low / few) < 2 ? niceStep(few / 2.5, 1) : few;
+  const first = Math.ceil(low / step);
+  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, place) => (first + place) * step);
+}
+
 function written(value, span, log) { // digits that tell apart a two-thousandth of what is shown
   if (!isFinite(value)) return '–';
   if (log) return value.toPrecision(3);
@@ -75,7 +85,7 @@ function build(place, spec) {
 function builtPanel(chart, spec) {
   const legend = add(chart.place, 'div', 'legend');
   add(legend, 'b', '', spec.label);
-  const lines = [...spec.curves.map(withNumbers), ...spec.dots.map((dots) => ({ ...withNumbers(dots), dash: 'point' }))];
+  const lines = spec.curves.map(withNumbers);
   for (const line of lines) {
     line.chip = add(legend, 'button', 'chip');
     line.chip.type = 'button';
@@ -103,8 +113,7 @@ function wholeOf({ spec, panels }) {
   let low = Infinity, high = -Infinity;
   for (const { lines } of panels) for (const { x } of lines) for (const value of x) { low = Math.min(low, value); high = Math.max(high, value); }
   if (!(low < high)) return isFinite(low) ? [low - 0.5, low + 0.5] : [0, 1];
-  const room = spec.panels.some(({ dots }) => dots.length) ? 0.02 * (high - low) : 0;
-  return [low - room, high + room];
+  return [low, high];
 }
 
 // ---- drawing
@@ -163,8 +172,7 @@ function paintPanel(chart, panel, width, ink) {
   paintFrame(paint, chart, spec, area);
   paint.save();
   paint.beginPath(); paint.rect(LEFT, 0, right - LEFT, bottom + 1); paint.clip();
-  const ordered = chart.live ? [...lines].reverse() : lines; // the first line of a live view lies above the others
-  for (const line of ordered) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
+  for (const line of lines) if (!line.hidden) (line.dash === 'point' ? paintDots : paintCurve)(paint, line, area, chart.shown);
   paintLevels(paint, levels, area);
   if (chart.spike !== null) {
     const at = Math.round(x(chart.spike)) + 0.5;
@@ -194,21 +202,15 @@ function paintFrame(paint, chart, spec, { x, down, right, bottom, low, high, las
   paint.globalAlpha = 1;
   paint.strokeStyle = ink('--line'); paint.fillStyle = ink('--quiet'); paint.lineWidth = 1;
   paint.textAlign = 'right'; paint.textBaseline = 'middle';
-  const step = spec.log && high - low > 1 ? Math.ceil((high - low) / 6) : niceStep(high - low, Math.max(3, (bottom - TOP) / 42));
-  for (let place = Math.ceil(low / step); place * step <= high; place += 1) {
-    const value = place * step, y = Math.round(down(value)) + 0.5;
+  for (const value of ticksOf(low, high, Math.max(3, (bottom - TOP) / 42), spec.log)) {
+    const y = Math.round(down(value)) + 0.5;
     stroke(paint, LEFT, y, right, y);
     paint.fillText(Number(spec.log ? (10 ** value).toPrecision(2) : value.toPrecision(6)), LEFT - 6, y);
   }
-  const stepX = niceStep(to - from, width / 90), ticks = [...chart.spec.ticks];
-  if (!ticks.length || ticks.length > width / 40) {
-    ticks.length = 0;
-    for (let place = Math.ceil(from / stepX); place * stepX <= to; place += 1) ticks.push(place * stepX);
-  }
   paint.textBaseline = 'top';
-  for (const tick of ticks) {
+  for (const tick of ticksOf(from, to, width / 90)) {
     const at = Math.round(x(tick)) + 0.5, edge = at > right - 8; // of the page, where the number is whole too
-    if (at < LEFT || at > right + 1 || (chart.live && tick < 0)) continue;
+    if (at < LEFT || at > right + 1) continue;
     stroke(paint, at, TOP, at, bottom);
     paint.textAlign = edge ? 'right' : 'center';
     if (last) paint.fillText(Number(tick.toPrecision(8)), edge ? width : at, bottom + 4);
@@ -230,21 +232,21 @@ function paintLevels(paint, levels, { y, right }) {
 
 function paintCurve(paint, curve, area, [from, to]) {
   paint.strokeStyle = colourOf(curve.colour);
-  paint.lineWidth = curve.width; paint.lineJoin = 'round';
+  paint.lineWidth = 1.6; paint.lineJoin = 'round';
   paint.setLineDash(DASHES[curve.dash]);
   paint.beginPath();
   const { x, y, rising } = curve, begin = rising ? Math.max(0, placeOf(x, from) - 2) : 0;
   const end = rising ? Math.min(x.length, placeOf(x, to) + 2) : x.length;
-  let drawn = false, before = 0, column = NaN, highest = 0, lowest = 0;
+  let drawn = false, column = NaN, highest = 0, lowest = 0;
   for (let place = begin; place < end; place += 1) {
     if (isNaN(y[place])) { drawn = false; continue; }
     const across = area.x(x[place]), down = area.y(y[place]);
     if (!drawn) paint.moveTo(across, down);
     else if (rising && Math.floor(across) === column && down >= highest && down <= lowest) continue; // covered in this column of pixels
-    else { if (curve.steps) paint.lineTo(across, before); paint.lineTo(across, down); }
+    else paint.lineTo(across, down);
     if (Math.floor(across) !== column || !drawn) { column = Math.floor(across); highest = lowest = down; }
     highest = Math.min(highest, down); lowest = Math.max(lowest, down);
-    before = down; drawn = true;
+    drawn = true;
   }
   paint.stroke();
   paint.setLineDash([]);

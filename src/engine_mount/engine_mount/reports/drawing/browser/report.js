@@ -9,16 +9,6 @@ function show(chart, from, to) { // at most all of it, at least a ten-thousandth
   draw(chart);
 }
 
-function zoom(chart, factor, about = (chart.shown[0] + chart.shown[1]) / 2) {
-  const [from, to] = chart.shown;
-  show(chart, about - (about - from) * factor, about + (to - about) * factor);
-}
-
-function pan(chart, [from, to], share) {
-  const by = share * (to - from);
-  show(chart, from + by, to + by);
-}
-
 function read(chart, x) { // one line through all panels over the same axis
   for (const other of charts) {
     if (other !== chart && !(other.spec.x_label === chart.spec.x_label && chart.spec.x_label.startsWith('time'))) continue;
@@ -26,26 +16,22 @@ function read(chart, x) { // one line through all panels over the same axis
   }
 }
 
-function shareAt(chart, event) { // of the width of the drawing area
-  const box = chart.panels[0].canvas.getBoundingClientRect();
-  return Math.min(1, Math.max(0, (event.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT)));
-}
-
 function listen(chart) {
-  const { place } = chart, at = (event) => chart.shown[0] + shareAt(chart, event) * (chart.shown[1] - chart.shown[0]);
+  const { place } = chart;
+  const at = (event) => {
+    const box = chart.panels[0].canvas.getBoundingClientRect(), [from, to] = chart.shown;
+    return Math.min(to, Math.max(from, from + ((to - from) * (event.clientX - box.left - LEFT)) / (box.width - LEFT - RIGHT)));
+  };
   const onCanvas = (kind, act) => place.addEventListener(kind, (event) => { if (event.target.tagName === 'CANVAS') act(event); });
   let begun = null;
   onCanvas('pointerdown', (event) => {
     if (event.button > 0) return;
     event.target.setPointerCapture(event.pointerId);
-    begun = { shown: chart.shown, share: shareAt(chart, event), at: at(event), x: event.clientX };
+    begun = { at: at(event), x: event.clientX };
   });
   onCanvas('pointermove', (event) => {
-    if (begun && event.shiftKey) pan(chart, begun.shown, begun.share - shareAt(chart, event));
-    else {
-      if (begun) chart.dragged = [begun.at, at(event)].sort((a, b) => a - b);
-      read(chart, at(event));
-    }
+    if (begun) chart.dragged = [begun.at, at(event)].sort((a, b) => a - b);
+    read(chart, at(event));
   });
   const lift = (event) => {
     const { dragged } = chart, far = begun && Math.abs(event.clientX - begun.x) > 5;
@@ -57,20 +43,16 @@ function listen(chart) {
   for (const kind of ['pointerup', 'pointercancel']) onCanvas(kind, lift);
   place.addEventListener('pointerleave', (event) => { if (event.pointerType === 'mouse' && !begun) read(chart, null); });
   onCanvas('dblclick', () => show(chart, ...chart.whole));
-  place.addEventListener('wheel', (event) => {
-    if (!event.ctrlKey && !event.shiftKey) return; // the page scrolls
-    event.preventDefault();
-    zoom(chart, Math.exp(0.003 * (event.deltaY || event.deltaX)), at(event));
-  }, { passive: false });
   place.addEventListener('keydown', (event) => press(chart, event));
 }
 
 function press(chart, event) {
   if (event.target !== chart.place || event.ctrlKey || event.metaKey || event.altKey) return;
   const [from, to] = chart.shown, spike = chart.spike === null ? (from + to) / 2 : chart.spike;
-  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : pan(chart, chart.shown, 0.2 * way));
+  const move = (first, second) => show(chart, from + first * (to - from), to + second * (to - from));
+  const step = (way) => (event.shiftKey ? read(chart, Math.min(to, Math.max(from, spike + (way * (to - from)) / 200))) : move(0.2 * way, 0.2 * way));
   const acts = {
-    ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => zoom(chart, 0.5), '=': () => zoom(chart, 0.5), '-': () => zoom(chart, 2),
+    ArrowLeft: () => step(-1), ArrowRight: () => step(1), '+': () => move(0.25, -0.25), '-': () => move(-0.5, 0.5),
     0: () => show(chart, ...chart.whole), Escape: () => read(chart, null),
   };
   if (!acts[event.key]) return;
