@@ -131,10 +131,8 @@ def faded(values: Array, rate: float = SAMPLE_RATE) -> Array:
 
     A jump from the last to the first would add to all bands.
     """
-    from scipy.signal.windows import tukey  # loads long
-
-    window: Array = tukey(len(values), 2.0 * _FADED * rate / len(values))
-    return window * (values - values.mean())
+    edge = np.sin(0.5 * np.pi * np.minimum(1.0, np.arange(0.5, len(values)) / (_FADED * rate)))
+    return (values - values.mean()) * (edge * edge[::-1]) ** 2
 
 
 def vertical_weighting(frequency: Array) -> Array:
