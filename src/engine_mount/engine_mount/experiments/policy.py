@@ -215,7 +215,9 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             other is not point and all(other[cost] <= point[cost] for cost in costs) for other in points
         )
     return figures | {
-        'high_bands': {f'{key[1]}, {key[2]}': each for key, each in found.items() if key[0] == 'high'},
+        'high_bands': {
+            f'{key[1]}, {key[2]}': found[key] for key in sorted(key for key in found if key[0] == 'high')
+        },
         'robustness': {
             engine: {
                 **{name: worst(CONTINUOUS, plant, name) for name in DISTURBANCES},

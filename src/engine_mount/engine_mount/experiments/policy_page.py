@@ -310,4 +310,4 @@ def by_name(corner: str, rows: Values, form: str = '.2f') -> str:
         )
         for name, values in rows.items()
     ]
-    return table((corner, *next(iter(rows.values()))), cells)
+    return table((corner, *max(rows.values(), key=len)), cells)
