@@ -26,7 +26,7 @@ import engine_mount
 driven = engine_mount.drive(core=True, scenario='bench', duration=2.0, out='drive')
 recording = engine_mount.open(driven.recording)
 replayed = engine_mount.replay(driven.recording)
-stiff = engine_mount.replay(driven.recording, {'continuous_viscous.damping_coefficient': 3200.0}, out='stiff')
+stiff = engine_mount.replay(driven.recording, {'continuous_viscous.damping_coefficient': 3500.0}, out='stiff')
 print(json.dumps({
     'samples': len(recording['displacement']),
     'table': recording.latched('current_force_table').data[0],

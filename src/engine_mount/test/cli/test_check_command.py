@@ -97,4 +97,4 @@ def test_a_worse_controller_fails_by_name(check, setting, caught):
 def test_the_manoeuvres_are_listed():
     listed = command('check', '--list').splitlines()
     assert listed[0].split()[:2] == ['rest', 'Standing,']
-    assert len(listed) == 15
+    assert len(listed) == 16

@@ -18,14 +18,14 @@ def test_without_a_change_the_answers_are_those_recorded_and_nothing_is_written(
 
 @pytest.mark.parametrize('name', ['mount_control.continuous_viscous.damping_coefficient', 'nested'])
 def test_a_changed_parameter_changes_the_answers_and_the_recorded_ones_stay_to_compare_with(name):
-    change = {name: 3200.0}
+    change = {name: 3500.0}
     if name == 'nested':
-        change = {'mount_control': {'continuous_viscous.damping_coefficient': 3200.0}}
+        change = {'mount_control': {'continuous_viscous.damping_coefficient': 3500.0}}
     outcome = replay(str(REFERENCE), change)
     (run,) = outcome.replayed.runs
     assert outcome.agreement.setpoints.differing
     assert run.setpoints.shape == run.stamps.shape == run.traces.shape
-    assert 'damping_coefficient = 3200.0 (recorded' in ' '.join(outcome.sentences())
+    assert 'damping_coefficient = 3500.0 (recorded' in ' '.join(outcome.sentences())
 
 
 def test_a_parameter_that_would_have_no_effect_is_refused_with_both_policies_and_the_remedy():

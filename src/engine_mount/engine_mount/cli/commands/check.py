@@ -22,7 +22,7 @@ Examples:
 
 `engine-mount check` - the shipped suite, without middleware
 
-`engine-mount check --set continuous_viscous.damping_coefficient=3200` - with a change
+`engine-mount check --set continuous_viscous.damping_coefficient=3500` - with a change
 
 `engine-mount check --only gap_20mm,rack` - two manoeuvres
 
