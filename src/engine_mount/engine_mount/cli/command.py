@@ -17,6 +17,7 @@ from engine_mount.cli.commands import (
     cut,
     drive,
     experiment,
+    export,
     faults,
     fleet,
     identify,
@@ -127,6 +128,7 @@ app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
 app.add_typer(road.app, rich_help_panel=_RECORDINGS)
+app.add_typer(export.app, rich_help_panel=_MOUNT)
 
 
 def main(arguments: list[str] | None = None) -> None:
