@@ -144,7 +144,10 @@ class _Function:
                 else getattr(each, 'value', getattr(each, 'test', None))
             )
             self._root, self._first = value, None if isinstance(each, ast.While) else _first(value)
-            getattr(self, f'_on_{type(each).__name__}', self._refuse)(each)
+            try:
+                getattr(self, f'_on_{type(each).__name__}', self._refuse)(each)
+            except (AttributeError, LookupError, NameError, TypeError) as error:
+                self._refuse(each, f'no law has such a statement ({error})')
         self._depth -= 1
         if last:
             self._write(last)
