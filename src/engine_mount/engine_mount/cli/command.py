@@ -17,7 +17,7 @@ from engine_mount.cli.commands import (
     cut,
     drive,
     experiment,
-    export,
+    export_c,
     faults,
     fleet,
     identify,
@@ -31,7 +31,7 @@ from engine_mount.cli.commands import (
     view,
 )
 from engine_mount.cli.commands.options import with_repeated_options
-from engine_mount.cli.help import Command, Group
+from engine_mount.cli.help import Command, Group, group
 from engine_mount.cli.terminal import refuse, terminal
 from mount_ros.environment import prepare_environment
 
@@ -128,7 +128,9 @@ app.add_typer(fleet.app, rich_help_panel=_RECORDINGS)
 app.add_typer(calibrate.app, rich_help_panel=_MOUNT)
 app.add_typer(identify.app, rich_help_panel=_MOUNT)
 app.add_typer(road.app, rich_help_panel=_RECORDINGS)
-app.add_typer(export.app, rich_help_panel=_MOUNT)
+_EXPORT = group('export', 'Export for other programs and for the electronics.')
+_EXPORT.command('c', cls=Command, epilog=export_c.EPILOG)(export_c.c)
+app.add_typer(_EXPORT, rich_help_panel=_MOUNT)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine_mount.export.c_functions import Unit, literal
 from engine_mount.export.c_types import FLOAT, MEMORY, WHOLE, Array, Declarations, Pointer, Tables
-from engine_mount.settings.chosen import Parameters, chosen_control, policy_of
+from engine_mount.settings.chosen import Parameters, chosen_control, chosen_specimen, policy_of
 from mount_control.control_loop import ControlLoop, missing_samples
 from mount_control.controller import ControlLaw
 from mount_control.force_maker import FORCE_STEP, CurrentTable, fill_table, places_of, table_fault
@@ -23,6 +23,7 @@ from mount_recorder.versions import versions
 
 NAME = 'engine_mount_controller'
 SELF_TEST_SAMPLES = 2000  # chosen: gaps, a change of the law and displacements out of range are among them
+_WITHOUT_EFFECT = {'displacement_velocity', 'displacement_noise', 'displacement_stuck'}  # of `plausibility`
 _TABLE_PLACES = int(HIGHEST_NORMAL_FORCE / FORCE_STEP)
 _TEST_FORCES = (0.0, 20.0, 60.0, 120.0, 250.0)  # N, chosen
 _TEST_SHARES = (0.1, 0.3, 0.5, 0.8, 1.0)  # chosen, of the highest current
@@ -127,6 +128,7 @@ def _sources(parameters: Parameters) -> tuple[str, str]:
     functions = '\n'.join(unit.functions)
     words: dict[str, object] = {
         'VERSION': versions()['mount_bringup'],
+        'SPECIMEN': chosen_specimen(parameters, 'mount_control').name,
         'POLICY': settings.parameters.policy,
         'PARAMETERS': _parameter_lines(settings, parameters),
         'RECORDS': '\n'.join(types.records),
@@ -165,11 +167,13 @@ def _helpers(functions: str) -> str:
 
 def _parameter_lines(settings: ControlSettings, parameters: Parameters) -> str:
     rows: list[Any] = [settings.parameters, policy_of(parameters)[1], settings.friction, settings.contact]
-    return '\n'.join(
+    lines = (
         f' *   {name} {getattr(each, name)} {quantity.unit} ({quantity.limits}): {quantity.meaning}'
         for each in rows
         for name, quantity in quantities(each).items()
+        if name not in _WITHOUT_EFFECT
     )
+    return '\n'.join(line.replace('*/', '* /').replace('/*', '/ *') for line in lines)
 
 
 def _longest_window(parameters: Parameters) -> int:

@@ -46,7 +46,7 @@ def export(request, tmp_path_factory):
 def drive_of(policy: str, count: int) -> SimpleNamespace:
     random = np.random.default_rng(7)
     steps = np.where(random.random(count) < 0.003, random.integers(2, 40, count), 1) * 1_000_000
-    stamps = np.cumsum(steps) + random.integers(-100_000, 100_000, count)
+    stamps = np.cumsum(steps) + random.choice([-100_000, 0, 0, 70_000], count)
     seconds = stamps * 1e-9
     sway = 1.2e-3 * np.sin(2 * np.pi * 8.0 * seconds) * (np.sin(2 * np.pi * 0.15 * seconds) > -0.3)
     idle = 4e-5 * np.sin(2 * np.pi * 27.3 * seconds) * (np.sin(2 * np.pi * 0.05 * seconds) > 0.0)

@@ -1,4 +1,4 @@
-"""`engine-mount export`: what other programs and the electronics take from this project."""
+"""`engine-mount export c`: the control law for electronics that compute the current themselves."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,11 +6,9 @@ from typing import Annotated
 import typer
 
 from engine_mount.cli.commands.options import changes_of, option
-from engine_mount.cli.help import Command, group, named, setting
+from engine_mount.cli.help import named, setting
 
-app = group('export', 'Export for other programs and for the electronics.')
-
-_C_EPILOG = """Exit code: 0 when both files are written, 1 with the reason when not.
+EPILOG = """Exit code: 0 when both files are written, 1 with the reason when not.
 
 Examples:
 
@@ -20,7 +18,6 @@ Examples:
 """
 
 
-@app.command(cls=Command, epilog=_C_EPILOG)
 def c(
     out: Annotated[Path, option('folder of both files, which are overwritten', 'FOLDER')],
     policy: Annotated[str, option('policy instead of that of the parameters', 'NAME', named('policy'))] = '',
