@@ -254,7 +254,8 @@ class _Function:
 
     def _store_all(self, target: Any, array: Text, value: Text) -> None:
         """Write a number, or the numbers of an array, into each place of an array."""
-        place = self._hold(literal(0)).text
+        self._held += 1
+        place = f'value_{self._held}'
         self._loop(place, 'INT64_C(0)', self._length(target, array), ())
         self._depth += 1
         closing = self._lines.pop()

@@ -139,6 +139,8 @@ def _sources(parameters: Parameters) -> tuple[str, str]:
         'TABLE_PLACES': _TABLE_PLACES,
         'FORCE_STEP': f'{FORCE_STEP:g}',
         'WINDOW': _longest_window(parameters),
+        'STATE_NUMBERS': state.length,
+        'TRACE_NUMBERS': trace.length,
         'SELF_TEST_SAMPLES': SELF_TEST_SAMPLES,
         'TEST_CURRENTS': ', '.join(repr(share * highest) for share in _TEST_SHARES),
         'TEST_FORCES': ', '.join(map(repr, _TEST_FORCES)),
