@@ -7,7 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from c_controller import FLAGS, WARNINGS, CController, built, compiler, exported
+from typer.testing import CliRunner
 
+from engine_mount.cli.command import app
 from engine_mount.export.controller_in_c import NAME, sequence_hash
 from engine_mount.settings.chosen import chosen_control
 from mount_control.control_loop import ControlLoop
@@ -185,6 +187,39 @@ def test_a_build_that_would_compute_otherwise_is_refused(export, options):
         [compiler('gcc'), *options, '-fsyntax-only', export.folder / f'{NAME}.c'], capture_output=True
     )
     assert b'#error' in done.stderr
+
+
+def test_the_example_of_the_page_compiles(export, tmp_path):
+    page = (Path(__file__).parents[4] / 'docs' / 'how-to' / 'law_in_the_electronics.md').read_text()
+    example = tmp_path / 'example.c'
+    example.write_text(page.split('```c\n')[1].split('```')[0])
+    command = [compiler('gcc'), *FLAGS, '-Wall', '-Werror', '-fsyntax-only', '-I', export.folder, example]
+    subprocess.run(command, check=True)
+
+
+def test_the_command_writes_what_python_writes(export, tmp_path):
+    changes = [f'--set={name}={value}' for name, value in export.values.items() if name != 'policy']
+    written = invoked('--out', str(tmp_path), '--policy', export.policy, *changes)
+    assert written.exit_code == 0
+    for suffix in ('.h', '.c'):
+        assert (tmp_path / f'{NAME}{suffix}').read_bytes() == (export.folder / f'{NAME}{suffix}').read_bytes()
+
+
+@pytest.mark.parametrize(
+    ('options', 'sentence'),
+    [
+        (['--set', 'mount_sim.seed=1'], 'mount_control'),
+        (['--policy', 'switched_viscous', '--set', 'continuous_viscous.quality=1.0'], 'no effect'),
+    ],
+)
+def test_the_command_refuses_what_has_no_effect(tmp_path, options, sentence):
+    done = invoked('--out', str(tmp_path), *options)
+    assert done.exit_code != 0
+    assert sentence in f'{done.output} {done.exception}'
+
+
+def invoked(*options: str):
+    return CliRunner().invoke(app, ['export', 'c', *options])
 
 
 @pytest.mark.skipif(
