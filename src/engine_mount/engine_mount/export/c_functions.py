@@ -28,9 +28,10 @@ from engine_mount.export.c_types import (
     comment,
 )
 
-_KEYWORDS = {'auto', 'case', 'char', 'const', 'default', 'do', 'double', 'enum', 'extern', 'float', 'goto',
-             'inline', 'int', 'long', 'register', 'short', 'signed', 'sizeof', 'static', 'struct', 'switch',
-             'typedef', 'union', 'unsigned', 'void', 'volatile'}  # fmt: skip
+_KEYWORDS = (
+    'auto case char const default do double enum extern float goto inline int long register short signed '
+    'sizeof static struct switch typedef union unsigned void volatile'
+)
 _SIGNS = {ast.Add: '+', ast.Sub: '-', ast.Mult: '*', ast.Div: '/', ast.And: '&&', ast.Or: '||',
           ast.Lt: '<', ast.LtE: '<=', ast.Gt: '>', ast.GtE: '>=', ast.Eq: '==', ast.NotEq: '!='}  # fmt: skip
 _OF_WHOLE = {ast.FloorDiv: 'quotient', ast.Mod: 'remainder', ast.LShift: 'left', ast.RShift: 'right',
@@ -89,15 +90,13 @@ class _Function:
     def __init__(self, unit: Unit, function: Any, arguments: Sequence[Type], name: str):
         self._unit, self._function, self._name = unit, function, name
         source, self._line = inspect.getsourcelines(function)
-        tree: Any = ast.parse(textwrap.dedent(''.join(source))).body[0]
-        self._tree = tree
+        module: Any = ast.parse(textwrap.dedent(''.join(source)))
+        self._tree = module.body[0]
         self._names = [each for each in ast.walk(self._tree) if isinstance(each, ast.Name)]
         self._arguments = dict(zip((each.arg for each in self._tree.args.args), arguments, strict=True))
         self._types = dict(self._arguments)
         self._own = {each.id for each in self._names if isinstance(each.ctx, ast.Store)} | {*self._types}
-        self._constants: dict[
-            str, Any
-        ] = {}  # tuples of the module, by the names that the function gives them
+        self._constants: dict[str, Any] = {}  # {local name: tuple of the module}
         self._result: Type = 'void'
         self._writes = False
 
@@ -113,11 +112,9 @@ class _Function:
         unused = {*self._arguments} - {each.id for each in self._names}
         lines = [f'    {names[name]};' for name in names if name not in self._arguments]
         lines += [f'    (void)({_c_name(name)});' for name in self._arguments if name in unused]
-        about = (
-            f'{self._function.__module__}.{self._function.__name__}:\n{inspect.getdoc(self._function) or ""}'
-        )
+        about = f'{self._function.__module__}.{self._function.__name__}:\n{inspect.getdoc(self._function)}'
         head = (
-            f'static {kind(self._result)} {self._name}({", ".join(names[name] for name in self._arguments)})'
+            f'static {kind(self._result)} {self._name}({", ".join(names[each] for each in self._arguments)})'
         )
         body = '\n'.join(lines + self._lines)
         self._unit.functions.append(f'{comment(about)}{_wrapped(head, "")}\n{{\n{body}\n}}\n')
@@ -138,14 +135,11 @@ class _Function:
             self._write(first)
         self._depth += 1
         for each in statements:
-            value = (
-                None
-                if isinstance(each, ast.AugAssign)
-                else getattr(each, 'value', getattr(each, 'test', None))
-            )
-            self._root, self._first = value, None if isinstance(each, ast.While) else _first(value)
+            late = isinstance(each, ast.AugAssign)  # the target is read first
+            self._root = None if late else getattr(each, 'value', getattr(each, 'test', None))
+            self._first = None if isinstance(each, ast.While) else _first(self._root)
             try:
-                getattr(self, f'_on_{type(each).__name__}', self._refuse)(each)
+                getattr(self, f'_on_{type(each).__name__.lower()}', self._refuse)(each)
             except (AttributeError, LookupError, NameError, TypeError) as error:
                 self._refuse(each, f'no law has such a statement ({error})')
         self._depth -= 1
@@ -160,28 +154,28 @@ class _Function:
         self._write(f'{name} = {_bare(value.text)};')
         return Text(name, value.type)
 
-    def _on_Expr(self, node: Any) -> None:  # noqa: N802 - names of syntax trees
+    def _on_expr(self, node: Any) -> None:
         if not isinstance(node.value, ast.Constant):  # a docstring
             value = self._text(node.value)
             self._write(f'{"" if value.type == "void" else "(void)"}{value.text};')
 
-    def _on_Return(self, node: Any) -> None:  # noqa: N802
+    def _on_return(self, node: Any) -> None:
         if node.value is None:
             return self._write('return;')
         value = self._text(node.value)
         self._result = value.type if self._result == 'void' else self._common(node, self._result, value.type)
         return self._write(f'return {_bare(self._as(node, value, self._result))};')
 
-    def _on_If(self, node: Any) -> None:  # noqa: N802
+    def _on_if(self, node: Any) -> None:
         self._block(node.body, f'if ({_bare(self._truth(node.test))}) {{', '}')
         if node.orelse:
             self._lines[-1] += ' else {'
             self._block(node.orelse, '', '}')
 
-    def _on_While(self, node: Any) -> None:  # noqa: N802
+    def _on_while(self, node: Any) -> None:
         self._block(node.body, f'while ({_bare(self._truth(node.test))}) {{', '}')
 
-    def _on_For(self, node: Any) -> None:  # noqa: N802
+    def _on_for(self, node: Any) -> None:
         target, limits = node.target, node.iter.args
         inside = [each for each in ast.walk(node) if isinstance(each, ast.Name) and each.id == target.id]
         outside = len([each for each in self._names if each.id == target.id]) - len(inside)
@@ -197,14 +191,14 @@ class _Function:
         limit = (end if end.text.startswith('INT64_C') else self._hold(end)).text
         self._block(body, f'for ({name} = {begin}; {name} < {limit}; {name} += INT64_C(1)) {{', '}')
 
-    def _on_Break(self, node: Any) -> None:  # noqa: N802
+    def _on_break(self, node: Any) -> None:
         self._write('break;')
 
-    def _on_AugAssign(self, node: Any) -> None:  # noqa: N802
+    def _on_augassign(self, node: Any) -> None:
         value = self._arithmetic(node, node.op, self._text(node.target), self._text(node.value))
         self._store(node.target, value)
 
-    def _on_Assign(self, node: Any) -> None:  # noqa: N802
+    def _on_assign(self, node: Any) -> None:
         target = node.targets[0]
         if not isinstance(target, ast.Tuple):
             value = self._text(node.value)
@@ -289,13 +283,14 @@ class _Function:
 
     def _value(self, node: Any) -> Any:
         """Return what a name of the module means: a function, a type."""
-        return eval(compile(ast.Expression(node), '', 'eval'), self._function.__globals__)
+        known = {**self._function.__globals__, **dict.fromkeys(self._own)}
+        return eval(compile(ast.Expression(node), '', 'eval'), known)
 
     def _text(self, node: Any) -> Text:
         constant = self._constant(node)
         if constant is not None and not isinstance(constant, tuple):
             return literal(constant)
-        return getattr(self, f'_text_{type(node).__name__}', self._refuse)(node)
+        return getattr(self, f'_text_{type(node).__name__.lower()}', self._refuse)(node)
 
     def _truth(self, node: Any) -> str:
         value = self._text(node)
@@ -313,26 +308,23 @@ class _Function:
         """Return a value as one of another type, which must be able to hold it."""
         if (value.type, kind) == (WHOLE, FLOAT):
             return f'(double){value.text}'
-        return (
-            value.text if value.type == kind else self._refuse(node, f'{value.type} where {kind} is needed')
-        )
+        self._common(node, kind, value.type)
+        return value.text if value.type == kind else self._refuse(node, f'{kind} is needed')
 
-    def _text_Name(self, node: Any) -> Text:  # noqa: N802
+    def _text_name(self, node: Any) -> Text:
         return Text(_c_name(node.id), self._types.get(node.id) or self._refuse(node, 'it has no value here'))
 
-    def _text_Attribute(self, node: Any) -> Text:  # noqa: N802
+    def _text_attribute(self, node: Any) -> Text:
         value = self._text(node.value)
         if isinstance(value.type, Tables):
             return Text(f'{value.text}.{node.attr}', getattr(value.type, node.attr))
         if node.attr == 'size':
             return self._length(node, value)
-        if not isinstance(value.type, Pointer):
-            self._refuse(node)
         kind, inner = value.type.field(node.attr), value.text.startswith('&')
         access = f'{value.text[1:]}.{node.attr}' if inner else f'{value.text}->{node.attr}'
         return Text(f'&{access}' if isinstance(kind, Pointer) else access, kind)
 
-    def _text_Subscript(self, node: Any) -> Text:  # noqa: N802
+    def _text_subscript(self, node: Any) -> Text:
         value, part = self._text(node.value), node.slice
         if isinstance(part, ast.Slice):
             begin = self._text(part.lower).text if part.lower else 'INT64_C(0)'
@@ -350,12 +342,11 @@ class _Function:
     def _item(self, node: Any, value: Text, place: str) -> Text:
         if isinstance(value.type, Array):
             return Text(f'engine_mount_{value.type.kind}_item({value.text}, {_bare(place)})', FLOAT)
-        kind = value.type
-        if kind.seen == RECORD:  # `memory.view(TYPE)[0]`
+        if value.type.seen == RECORD:  # `memory.view(TYPE)[0]`
             return value
-        return Text(f'{value.text}->{_ROWS[kind.seen]}[{_bare(place)}]', kind.seen)
+        return Text(f'{value.text}->{_ROWS[value.type.seen]}[{_bare(place)}]', value.type.seen)
 
-    def _text_Tuple(self, node: Any) -> Text:  # noqa: N802
+    def _text_tuple(self, node: Any) -> Text:
         values = [self._text(each) for each in node.elts]
         kinds = tuple(each.type for each in values)
         if type(self._result) is tuple and node is self._root:
@@ -363,13 +354,13 @@ class _Function:
         texts = [_bare(self._as(node, value, kind)) for value, kind in zip(values, kinds, strict=True)]
         return Text(f'({self._unit.declarations.name(kinds)}){{ {", ".join(texts)} }}', kinds)
 
-    def _text_UnaryOp(self, node: Any) -> Text:  # noqa: N802
+    def _text_unaryop(self, node: Any) -> Text:
         if isinstance(node.op, ast.Not):
             return Text(f'(!{self._truth(node.operand)})', TRUTH)
         value = self._text(node.operand)
         return Text(f'(-{value.text})', value.type) if isinstance(node.op, ast.USub) else self._refuse(node)
 
-    def _text_BinOp(self, node: Any) -> Text:  # noqa: N802
+    def _text_binop(self, node: Any) -> Text:
         return self._arithmetic(node, node.op, self._text(node.left), self._text(node.right))
 
     def _arithmetic(self, node: Any, operator: ast.operator, left: Text, right: Text) -> Text:
@@ -387,10 +378,10 @@ class _Function:
         texts = ', '.join(_bare(self._as(node, each, kind)) for each in values)
         return Text(f'engine_mount_{name}({texts})', result)
 
-    def _text_BoolOp(self, node: Any) -> Text:  # noqa: N802
+    def _text_boolop(self, node: Any) -> Text:
         return Text(f'({f" {_SIGNS[type(node.op)]} ".join(map(self._truth, node.values))})', TRUTH)
 
-    def _text_Compare(self, node: Any) -> Text:  # noqa: N802
+    def _text_compare(self, node: Any) -> Text:
         values, parts = [self._text(each) for each in (node.left, *node.comparators)], []
         for operator, left, right in zip(node.ops, values, values[1:], strict=False):
             sign, kind = _SIGNS.get(type(operator)), self._common(node, left.type, right.type)
@@ -399,14 +390,14 @@ class _Function:
             )
         return Text(parts[0] if len(parts) == 1 else f'({" && ".join(parts)})', TRUTH)
 
-    def _text_IfExp(self, node: Any) -> Text:  # noqa: N802
+    def _text_ifexp(self, node: Any) -> Text:
         yes, no = self._text(node.body), self._text(node.orelse)
         kind = self._common(node, yes.type, no.type)
         return Text(
             f'({self._truth(node.test)} ? {self._as(node, yes, kind)} : {self._as(node, no, kind)})', kind
         )
 
-    def _text_Call(self, node: Any) -> Text:  # noqa: N802
+    def _text_call(self, node: Any) -> Text:
         if isinstance(node.func, ast.Attribute) and node.func.attr == 'view':
             return self._view(node)
         if isinstance(node.func, ast.Attribute) and node.func.attr == 'max':
@@ -432,11 +423,7 @@ class _Function:
         text = Text(f'{known.name}({", ".join(_bare(each.text) for each in values)})', known.result)
         if not known.writes or node is self._root:
             return text
-        return (
-            self._hold(text)
-            if node is self._first
-            else self._refuse(node, 'it writes into memory amid others')
-        )
+        return self._hold(text) if node is self._first else self._refuse(node, 'it writes amid other parts')
 
     def _view(self, node: Any) -> Text:
         """Return what is at a `Pointer` seen otherwise, or the bits of a number as one of the other kind."""
@@ -485,4 +472,4 @@ def _wrapped(text: str, indent: str) -> str:
 
 
 def _c_name(name: str) -> str:
-    return 'unused' if name == '_' else name + '_' * (name in _KEYWORDS)
+    return 'unused' if name == '_' else name + '_' * (name in _KEYWORDS.split())

@@ -78,23 +78,32 @@ def sequence_hash(settings: ControlSettings, samples: int) -> int:
     assert loop.controller is not None
     trace = loop.controller.trace_record.view(np.uint64)
     period = sample_time_ns(settings.parameters.sample_rate)
-    stamp, random, hashed = 0, 1, 14695981039346656037
+    stamp, random, hashed = 0, 1, 14695981039346656037  # of FNV-1a, and its factor below
     for n in range(samples):
-        place = n % 125
-        wave = (place if place < 63 else 125 - place) - 31
-        random = (random * 6364136223846793005 + 1442695040888963407) % 2**64
-        displacement = (wave if n % 4000 < 3000 else int(wave / 10)) * 4e-5
-        displacement += ((random >> 48) - 32768) * 1e-10
-        if n % 997 == 996:
-            displacement = 1.5
-        if n % 1501 == 1500:
+        random, periods, displacement, changed = built_in_sample(n, random)
+        stamp += periods * period
+        if changed:
             loop.change(settings)
-        stamp += period * (4 if n % 499 == 498 else 200 if n % 1999 == 1998 else 1)
         if loop.step(stamp, displacement) is not None and loop.trace is None:
             loop.controller.step(displacement)
         for number in trace.tolist():
             hashed = (hashed ^ number) * 1099511628211 % 2**64
     return hashed
+
+
+def built_in_sample(n, random):
+    """Return the new random number, periods since the last sample, displacement (m), whether the law changes.
+
+    At 1 kHz sample `n` sways at 8 Hz, and hardly for a quarter of the time; 1.5 m is out of every range.
+    """
+    random = (random * 1103515245 + 12345) % 2147483648
+    place = n % 125
+    wave = (place if place < 63 else 125 - place) - 31
+    displacement = (wave if n % 4000 < 3000 else wave // 10) * 4e-5 + (random // 65536 - 16384) * 2e-10
+    if n % 997 == 996:
+        displacement = 1.5
+    periods = 4 if n % 499 == 498 else 200 if n % 1999 == 1998 else 1
+    return random, periods, displacement, n % 1501 == 1500
 
 
 def _test_table(settings: ControlSettings) -> CurrentTable:
@@ -122,13 +131,15 @@ def _sources(parameters: Parameters) -> tuple[str, str]:
         (places_of, (constants,)),
         (fill_table, (array, constants, constants)),
         (missing_samples, (WHOLE, WHOLE)),
+        (built_in_sample, (WHOLE, WHOLE)),
     ):
-        unit.translated(function, arguments)
+        sample = unit.translated(function, arguments)
     highest = settings.parameters.highest_current
     functions = '\n'.join(unit.functions)
     words: dict[str, object] = {
         'VERSION': versions()['mount_bringup'],
         'SPECIMEN': chosen_specimen(parameters, 'mount_control').name,
+        'SAMPLE': types.name(sample.result),
         'POLICY': settings.parameters.policy,
         'PARAMETERS': _parameter_lines(settings, parameters),
         'RECORDS': '\n'.join(types.records),
