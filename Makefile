@@ -26,10 +26,10 @@ RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test test-all check faults experiments identify pages bench lint format setup setup-desk setup-dev clean
+.PHONY: help drive test test-all test-arm64 test-cortex-m check faults experiments identify pages bench lint format setup setup-desk setup-dev clean
 
 help: ## list the commands
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
+	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
 
 drive: $(VENV)/.ready ## drive the simulated car over a gap in the motorway and record it
 	@$(BIN)/engine-mount drive $(DRIVE_OPTIONS)
@@ -43,6 +43,12 @@ test: $(VENV)/.ready-dev ## pass the tests that take 5 minutes on two cores
 
 test-all: test ## pass these and all others, which take 10 minutes more
 	@$(call pass_tests,slow)
+
+test-arm64: $(VENV)/.ready-dev ## compare the law in C on an emulated aarch64 with Python
+	@$(BIN)/python test/targets/law_in_c.py arm64
+
+test-cortex-m: $(VENV)/.ready-dev ## compare the law in C on an emulated Cortex-M7 without a library with Python
+	@$(BIN)/python test/targets/law_in_c.py cortex-m
 
 check: $(VENV)/.ready ## drive the manoeuvre suite and judge it by its limits, before a change goes into the car
 	@$(BIN)/engine-mount check $(CHECK_OPTIONS)

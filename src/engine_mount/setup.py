@@ -8,6 +8,7 @@ setup(
     packages=find_packages(exclude=['test', 'test.*']),
     package_data={
         'engine_mount.experiments': ['*.yaml', 'check/*.yaml'],
+        'engine_mount.export': ['*.in'],
         'engine_mount.faults': ['faults.yaml'],
         'engine_mount.fleet': ['*.yaml'],
         'engine_mount.reports': ['drawing/browser/*'],

@@ -89,8 +89,8 @@ def test_every_command_that_a_page_names_exists_with_its_options(page):
 
 @pytest.mark.parametrize('page', PAGES, ids=name_of)
 def test_every_target_of_make_that_a_page_names_exists(page):
-    targets = re.findall(r'^([a-z-]+):', (REPOSITORY / 'Makefile').read_text(), re.MULTILINE)
-    named = re.findall(r'(?:^|`)make ([a-z-]+)', page.read_text(encoding='utf-8'), re.MULTILINE)
+    targets = re.findall(r'^([a-z0-9-]+):', (REPOSITORY / 'Makefile').read_text(), re.MULTILINE)
+    named = re.findall(r'(?:^|`)make ([a-z0-9-]+)', page.read_text(encoding='utf-8'), re.MULTILINE)
     assert set(named) <= set(targets)
 
 

@@ -141,7 +141,7 @@ class ControlLoop:
             self._horizon = self._period + self._period // 2  # before the look at what other threads change
             if judgement := self._refusal(stamp, displacement, elapsed):
                 return self._refuse(judgement)
-            unseen = self._missing(stamp - self._compared)
+            unseen = missing_samples(stamp - self._compared, self._period)
         self._compared = stamp
         if doubt_of(self.plausibility.limits, self.plausibility.memory, displacement, unseen):
             self.counts.implausible += 1
@@ -159,7 +159,7 @@ class ControlLoop:
                 self.counts.restarts += 1
                 controller.restart(displacement)
             else:
-                missing = self._missing(elapsed)
+                missing = missing_samples(elapsed, self._period)
                 self.counts.bridged += missing
         self.trace = controller.trace_record
         return controller.advance(displacement, missing)
@@ -205,10 +205,6 @@ class ControlLoop:
             if self.controller is None:
                 self.steps.append(stamp - self.last)
             self.last = stamp
-
-    def _missing(self, elapsed: int) -> int:
-        """Return how many samples are missing between two that are `elapsed` ns apart."""
-        return max(0, (elapsed + self._period // 2) // self._period - 1)
 
     def _note_intrusion(self, stamp: int) -> None:
         found = self._intruded
@@ -308,3 +304,8 @@ class ControlLoop:
     def faults(self) -> int:
         """How often the controller's memory was found spoiled since the activation."""
         return self.controller.faults if self.controller is not None else 0
+
+
+def missing_samples(elapsed: int, period: int) -> int:
+    """Return how many samples are missing between two that are `elapsed` ns apart, one a `period`."""
+    return max(0, (elapsed + period // 2) // period - 1)

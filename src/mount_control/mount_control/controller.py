@@ -236,7 +236,9 @@ def _advance(mount, trace, displacement):
 
 def _rest(mount, displacement):
     law, _, state, bits, window = mount
-    bits[:-1] = 0  # all but the count of faults
+    faults = state.faults
+    bits[:] = 0
+    state.faults = faults
     window[:] = 0.0
     policy.start(law.policy, state.policy, window, displacement)
     state.displacement = displacement

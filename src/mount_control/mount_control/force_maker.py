@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mount_models.arithmetic.compiled import compiled
 from mount_models.arithmetic.record import record_type
-from mount_models.arithmetic.sums import each_interpolated
+from mount_models.arithmetic.sums import interpolated
 from mount_models.friction.coefficient import FrictionCoefficients
 from mount_models.friction.contact import FrictionContact
 from mount_models.friction.simplified import normal_force_for, simplified_step_with, speed_terms
@@ -24,6 +24,7 @@ what the new law asks for then falls evenly to zero."""
 FORCE_STEP = 0.5  # N, chosen: the table's own step
 _FIRST_TOUCH = 1.0  # N, chosen
 _HIGHEST_FORCE = 1e4  # N, chosen: far beyond any magnet of this size; the table has a place for every 0.5 N
+_BEYOND, _FALLING, _OFFSET = 1, 2, 3  # what is wrong with a table
 
 
 class ForceTableError(ValueError):
@@ -77,27 +78,54 @@ def resample(
     Raises `ForceTableError` where it does not rise from the first touch, reaches beyond any magnet, or the
     offset current lies outside.
     """
-    if not (0.0 <= normal_force[0] <= _FIRST_TOUCH and normal_force[-1] <= _HIGHEST_FORCE):
+    forces = np.array(normal_force, float)  # copies: one type to compile
+    currents = np.array(current, float)
+    fault = table_fault(currents, forces, offset_current, highest_current)
+    if fault == _BEYOND:
         raise ForceTableError(
             f'current_force_table reaches from {normal_force[0]:.2f} to {normal_force[-1]:g} N (limits: '
             f'first touch of the pads within 0 .. {_FIRST_TOUCH:g} N, end up to {_HIGHEST_FORCE:g} N); '
             'activate mount_init again'
         )
-    if not (np.all(np.diff(normal_force) > 0.0) and np.all(np.diff(current) > 0.0)):
+    if fault == _FALLING:
         raise ForceTableError(
             'current and normal force of the current_force_table must rise strictly; '
             'activate mount_init again'
         )
-    if not 0.0 < offset_current < highest_current:
+    if fault == _OFFSET:
         raise ForceTableError(
             f'offset_current ({offset_current:.3f} A) must lie within 0 .. {highest_current:g} A; '
             'activate mount_init again, or raise highest_current'
         )
-    forces = np.arange(0.0, normal_force[-1], FORCE_STEP)
-    return CurrentTable(
-        each_interpolated(forces, np.array(normal_force), np.array(current)),  # copies: one type to compile
-        CurrentLimits(float(offset_current), float(highest_current)),
-    )
+    even = np.empty(places_of(forces))
+    fill_table(even, currents, forces)
+    return CurrentTable(even, CurrentLimits(float(offset_current), float(highest_current)))
+
+
+@compiled
+def table_fault(current, normal_force, offset_current, highest_current):
+    """Return 0 for a table (A over N, (n,)) that can be used, else what is wrong: `_BEYOND` and so on."""
+    last = len(normal_force) - 1
+    if not (0.0 <= normal_force[0] <= _FIRST_TOUCH and normal_force[last] <= _HIGHEST_FORCE):
+        return _BEYOND
+    for place in range(1, len(normal_force)):
+        if not (normal_force[place] > normal_force[place - 1] and current[place] > current[place - 1]):
+            return _FALLING
+    return 0 if 0.0 < offset_current < highest_current else _OFFSET
+
+
+@compiled
+def places_of(normal_force):
+    """Return how many forces `FORCE_STEP` apart lie below the last of `normal_force` (N)."""
+    last = normal_force[len(normal_force) - 1] / FORCE_STEP
+    return int(last) + (1 if int(last) < last else 0)
+
+
+@compiled
+def fill_table(even, current, normal_force):
+    """Fill `even` with the currents (A) at 0, `FORCE_STEP`, 2 `FORCE_STEP`, ... N."""
+    for place in range(len(even)):
+        even[place] = interpolated(place * FORCE_STEP, normal_force, current)
 
 
 @compiled

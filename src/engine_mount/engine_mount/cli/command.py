@@ -16,6 +16,7 @@ from engine_mount.cli.commands import (
     cut,
     drive,
     experiment,
+    export_c,
     export_signals,
     faults,
     fleet,
@@ -90,7 +91,7 @@ def prepare() -> None:
 
 
 _DEV = group('dev', 'This project on this machine: speed, faults, references, compilation.')
-_EXPORT = group('export', 'Export for other programs: signals of a recording as a table.')
+_EXPORT = group('export', 'Export for other programs and for the electronics.')
 _EDIT = group('edit', 'Change recordings: cut a piece out, recover a damaged one.')
 
 for _group, _panel, _functions in (
@@ -104,7 +105,7 @@ for _group, _panel, _functions in (
         ),
     ),
     (app, _MOUNT, (experiment.experiment,)),
-    (_EXPORT, None, (export_signals.signals,)),
+    (_EXPORT, None, (export_signals.signals, export_c.c)),
     (_EDIT, None, (cut.cut, recover.recover)),
     (_DEV, None, (faults.faults, bench.bench, accept.accept, prepare)),
 ):

@@ -88,6 +88,7 @@ KINDS = {
     'scenario': 'mount_sim.excitation.scenario:SCENARIO_NAMES',
     'mount': 'mount_sim.plant.mounts:MOUNTS',
     'place': 'mount_sim.plant.mounts:PLACES',
+    'policy': 'mount_control.policy.registry:POLICIES',
     'on_full': 'mount_recorder.diagnosis:OnFull',
     'fault': 'mount_sim.electronics.faults:FAULTS',
     'case': 'engine_mount.faults.case:MATRIX',

@@ -1,0 +1,1 @@
+"""What runs elsewhere, made from this project: the control law as C for the electronics."""

@@ -1,0 +1,21 @@
+/* What tests need beside the functions of the header. */
+#include "engine_mount_controller.h"
+
+int64_t size_of_controller(void)
+{
+    return (int64_t)sizeof(engine_mount_controller_t);
+}
+
+engine_mount_state_memory_t *state_of(engine_mount_controller_t *controller)
+{
+    return &controller->state;
+}
+
+void run(engine_mount_controller_t *controller, const int64_t *stamps, const double *displacements, int64_t count,
+         double *currents, engine_mount_trace_memory_t *traces)
+{
+    for (int64_t n = 0; n < count; n++) {
+        currents[n] = engine_mount_controller_step(controller, stamps[n], displacements[n]);
+        traces[n] = controller->trace;
+    }
+}
