@@ -30,6 +30,7 @@ REFUSED = {
     'record': ('--split', MISSING),
     'replay': (MISSING,),
     'report': (MISSING,),
+    'export c': ('--parameters', MISSING, '--out', 'law'),
     'road invert': (MISSING, '--column', 'az:m/s^2', '--speed', '20', '--out', 'made.csv'),
     'road show': (MISSING,),
     'view': (MISSING,),
