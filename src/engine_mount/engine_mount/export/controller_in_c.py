@@ -80,10 +80,12 @@ def sequence_hash(settings: ControlSettings, samples: int) -> int:
     period = sample_time_ns(settings.parameters.sample_rate)
     stamp, random, hashed = 0, 1, 14695981039346656037  # of FNV-1a, and its factor below
     for n in range(samples):
-        random, periods, displacement, changed = built_in_sample(n, random)
+        random, periods, displacement, event = built_in_sample(n, random)
         stamp += periods * period
-        if changed:
+        if event == 1:
             loop.change(settings)
+        if event == 2:
+            loop.controller.counts[0] = 0x7FF8000000000000
         if loop.step(stamp, displacement) is not None and loop.trace is None:
             loop.controller.step(displacement)
         for number in trace.tolist():
@@ -92,9 +94,10 @@ def sequence_hash(settings: ControlSettings, samples: int) -> int:
 
 
 def built_in_sample(n, random):
-    """Return the new random number, periods since the last sample, displacement (m), whether the law changes.
+    """Return the new random number, periods since the last sample, displacement (m), event.
 
     At 1 kHz sample `n` sways at 8 Hz, and hardly for a quarter of the time; 1.5 m is out of every range.
+    Event 1 is a change of the law, event 2 a memory that becomes NaN.
     """
     random = (random * 1103515245 + 12345) % 2147483648
     place = n % 125
@@ -103,7 +106,8 @@ def built_in_sample(n, random):
     if n % 997 == 996:
         displacement = 1.5
     periods = 4 if n % 499 == 498 else 200 if n % 1999 == 1998 else 1
-    return random, periods, displacement, n % 1501 == 1500
+    event = 1 if n % 1501 == 1500 else 2 if n % 1201 == 1200 else 0
+    return random, periods, displacement, event
 
 
 def _test_table(settings: ControlSettings) -> CurrentTable:

@@ -18,6 +18,7 @@ WRONG = {
     'edit cut ? --from 1s --to 2s --out ?': MISSING,
     'edit recover ?': MISSING,
     'experiment ?': MISSING,
+    'export c --parameters ? --out made': MISSING,
     'export signals ? --out made.csv': MISSING,
     'fleet index ? --out made': MISSING,
     'fleet query ? select': MISSING,
