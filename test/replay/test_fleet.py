@@ -99,7 +99,7 @@ def test_a_store_of_objects_gives_the_bytes_of_the_disk(drives, local, tmp_path,
 def test_the_commands_ask_and_report(local):
     result, found, page = (local / name for name in ('result', 'worst.json', 'page.html'))
     sql = "select recording, setpoint_difference_rms_a as rms from result where reason = '' order by rms desc"
-    rows = json.loads(command('fleet', 'query', result, sql, '--json'))
+    rows = json.loads(command('fleet', 'query', result, sql, '--format', 'json'))
     assert command('fleet', 'query', result, sql, '--format', 'csv').splitlines()[0] == '"recording","rms"'
     table = command('fleet', 'query', result, f'{sql} limit 1')
     assert rows[0]['recording'] in table

@@ -77,7 +77,7 @@ def test_the_page_on_differences_tells_the_harmonics_of_the_law_and_of_this_rack
         assert float(told_law) == pytest.approx(exact, abs=0.001)
         here = rack.figures['runs'][f'viscous_{damping}']['friction_harmonics_n'][int(order) - 1]
         assert float(told_here) == pytest.approx(here, abs=0.01)
-        # the light pressure of 2 N fills the dead zone a little, the fitted force law bends the rest
+        # the light pressure fills the dead zone a little, the fitted force law bends the rest
         assert here == pytest.approx(exact, rel=0.1)
 
 
