@@ -113,5 +113,5 @@ def test_the_commands_ask_and_report(local):
     text = page.read_text(encoding='utf-8')
     assert 'is no MCAP file' in text
     assert 'No picture' not in text
-    said = refused('fleet', 'query', result, 'select nothing from result', codes=(1,))
+    said = refused('fleet', 'query', result, 'select nothing from result', codes=(2,))
     assert 'result has recording, mount, reason' in said
