@@ -38,7 +38,7 @@ _SMALLEST_SQUARE = 1e-14  # m^2: of 0.1 um, keeps 0 / 0 away
 
 
 class Parameters(NamedTuple):
-    """Parameters of tracker, band-pass, opening and damper."""
+    """Parameters of tracker, band-pass, degree of damping, damper and line of the engine."""
 
     eigenfrequency: Annotated[
         float,

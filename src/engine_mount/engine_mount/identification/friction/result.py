@@ -119,8 +119,11 @@ class FrictionIdentification:
 
     def all_cases(self) -> list[Case]:
         """Return the cases of the recordings and of the ladder."""
+        return [*self.cases, *self._cases_of_ladder()]
+
+    def _cases_of_ladder(self) -> list[Case]:
         case = ladder_case(self.ladder, self.best) if self.ladder else None
-        return [*self.cases, *([case] if case else [])]
+        return [case] if case else []
 
     def figures(self) -> dict[str, Any]:
         """Return everything as plain numbers and texts, for JSON; SI units but where the name has another."""
@@ -197,7 +200,7 @@ class FrictionIdentification:
         if self.ladder:
             screen.table(_ladder_table(self.ladder))
             screen.say(f'best: {self.best}')
-        if self.ladder and (case := ladder_case(self.ladder, self.best)):
+        for case in self._cases_of_ladder():
             screen.note(case.sentence, 'warning')
 
     def specimen(self, name: str = '') -> Specimen:
