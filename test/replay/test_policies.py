@@ -48,7 +48,8 @@ def drives(tmp_path_factory):
 def test_a_recording_names_the_policy_and_what_it_traced(drives):
     recording = engine_mount.open(drives['viscous_example'])
     trace = recording['control_trace']
-    assert trace.names[:4] == ('displacement', 'velocity', 'predicted_velocity', 'damping_active')
+    names = ('displacement', 'velocity', 'crank_frequency', 'predicted_velocity', 'damping_active')
+    assert trace.names[:5] == names
     np.testing.assert_array_equal(trace['desired_force'], 800.0 * trace['predicted_velocity'])
     assert trace.unit('predicted_velocity') == 'm/s'
     assert 'policy: viscous_example' in recording.latched('session').data

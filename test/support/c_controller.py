@@ -83,18 +83,18 @@ class CController:
     def transfer(self, values: dict) -> int:
         return self._c.engine_mount_controller_transfer(self._at, self._law(values))
 
-    def step(self, stamp: int, displacement: float) -> float:
-        return self._c.engine_mount_controller_step(
-            self._at, ctypes.c_int64(stamp), ctypes.c_double(displacement)
-        )
+    def step(self, stamp: int, displacement: float, crank_frequency: float = 0.0) -> float:
+        numbers = map(ctypes.c_double, (displacement, crank_frequency))
+        return self._c.engine_mount_controller_step(self._at, ctypes.c_int64(stamp), *numbers)
 
-    def run(self, stamps: np.ndarray, displacements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return currents (A) and traces of n samples."""
-        stamps, displacements = np.ascontiguousarray(stamps), np.ascontiguousarray(displacements)
+    def run(self, stamps: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return currents (A) and traces of n samples; columns: displacements (m) and, perhaps, Hz."""
+        stamps = np.ascontiguousarray(stamps)
+        given = np.array([*columns, np.zeros(len(stamps))][:2])
         currents = np.zeros(len(stamps))
         traces = np.zeros(len(stamps), self._compiled.trace)
-        pointers = [ctypes.c_void_p(each.ctypes.data) for each in (stamps, displacements, currents, traces)]
-        self._c.run(self._at, *pointers[:2], ctypes.c_int64(len(stamps)), *pointers[2:])
+        pointers = [ctypes.c_void_p(each.ctypes.data) for each in (stamps, *given, currents, traces)]
+        self._c.run(self._at, *pointers[:3], ctypes.c_int64(len(stamps)), *pointers[3:])
         return currents, traces
 
     def sequence_hash(self, samples: int) -> int:

@@ -132,8 +132,11 @@ class ControlLoop:
         self.writer_doubt = suspected
         self._horizon = 0
 
-    def step(self, stamp: int, displacement: float) -> float | None:
-        """Return the current (A) that answers a sample (ns, m), None where it is not to be answered."""
+    def step(self, stamp: int, displacement: float, crank_frequency: float = 0.0) -> float | None:
+        """Return the current (A) that answers a sample (ns, m), None where it is not to be answered.
+
+        `crank_frequency`: turns of the crankshaft in a second (Hz), 0 where they are not known.
+        """
         elapsed = stamp - self._used
         usual = self._closest <= elapsed < self._horizon and abs(displacement) <= self._range
         unseen = 0  # samples missing since the last one that was compared
@@ -162,7 +165,7 @@ class ControlLoop:
                 missing = missing_samples(elapsed, self._period)
                 self.counts.bridged += missing
         self.trace = controller.trace_record
-        return controller.advance(displacement, missing)
+        return controller.advance(displacement, missing, crank_frequency)
 
     def _refusal(self, stamp: int, displacement: float, elapsed: int) -> Judgement | None:
         """Return why a sample that is not the usual next one is not to be controlled, None where it is."""
@@ -229,13 +232,15 @@ class ControlLoop:
         stamps: NDArray[np.int64],
         displacements: NDArray[np.float64],
         changes: Mapping[int, Sequence[ControlSettings]] | None = None,
+        crank_frequency: NDArray[np.float64] | float = 0.0,
     ) -> Answers:
-        """Return the answers to n samples, ns and m, to the bit those of n calls of `step`.
+        """Return the answers to n samples, ns, m and Hz, to the bit those of n calls of `step`.
 
         Samples that follow each other without a doubt pass the compiled controller at once. `changes` are
         made known before the samples at their places. Only between `begin` and `end`.
         """
         count, changes = len(stamps), changes or {}
+        frequencies = np.broadcast_to(crank_frequency, (count,))
         answers = Answers(np.full(count, np.nan), np.zeros(count, bool), np.zeros(count, self.trace_type))
         begins = sorted({*np.flatnonzero(~self._following(stamps, displacements)).tolist(), *changes})
         for begin, end in zip(begins, [*begins[1:], count], strict=True):
@@ -243,13 +248,15 @@ class ControlLoop:
                 self.change(settings)
             place = begin
             while place < end:
-                current = self.step(int(stamps[place]), float(displacements[place]))
+                sample = int(stamps[place]), float(displacements[place]), float(frequencies[place])
+                current = self.step(*sample)
                 answers.currents[place] = np.nan if current is None else current
                 place += 1
                 if self.trace is not None:
                     answers.traced[place - 1] = True
                     answers.traces[place - 1] = self.trace.view(self.trace_type)[0]
-                    place += self._run(stamps[place:end], displacements[place:end], answers, place)
+                    part = slice(place, end)
+                    place += self._run(stamps[part], displacements[part], frequencies[part], answers, place)
         answers.currents[answers.traced] = answers.traces['current'][answers.traced]
         return answers
 
@@ -273,12 +280,13 @@ class ControlLoop:
         follows[1:] = valid[1:] & (steps >= self._closest) & (steps < self._period + self._period // 2)
         return follows
 
-    def _run(self, stamps, displacements, answers: Answers, place: int) -> int:
+    def _run(self, stamps, displacements, frequencies, answers: Answers, place: int) -> int:
         """Answer samples that follow each other up to the first in doubt; return how many."""
         count = self.plausibility.believed(displacements)
         if count and self.controller is not None:
             self.follow(int(stamps[count - 1]), count)
-            self.controller.run(displacements[:count], answers.traces[place : place + count])
+            traces = answers.traces[place : place + count]
+            self.controller.run(displacements[:count], traces, frequencies[:count])
             answers.traced[place : place + count] = True
         return count
 

@@ -106,27 +106,33 @@ class Controller:
         self.compiled.transfer(old, law.record, state, window, law.window)
         self._use(Memory(law.record, law.tables, state, law.window))
 
-    def step(self, displacement: float, bridged_samples: int = 0) -> float:
+    def step(self, displacement: float, bridged_samples: int = 0, crank_frequency: float = 0.0) -> float:
         """Take one displacement sample in m and return the current setpoint in A.
 
-        `bridged_samples` samples missing before it are replaced by a straight line. NaN and displacements
+        `bridged_samples` samples missing before it are replaced by a straight line. `crank_frequency`: turns
+        of the crankshaft in a second (Hz), unknown where it is not finite and above 0. NaN and displacements
         beyond `FARTHEST_DISPLACEMENT` are answered with 0 A and leave no trace in the memory. Where the
         memory itself holds NaN or infinity, the answer is 0 A, the memory is cleared as by `restart`, and
         `faults` counts it.
         """
-        return self.advance(displacement, bridged_samples)
+        return self.advance(displacement, bridged_samples, crank_frequency)
 
     def run(
-        self, displacement: NDArray[np.float64], traces: NDArray[np.void] | None = None
+        self,
+        displacement: NDArray[np.float64],
+        traces: NDArray[np.void] | None = None,
+        crank_frequency: NDArray[np.float64] | float = 0.0,
     ) -> NDArray[np.void]:
         """Take n displacement samples in m and return n traces; bit-identical to n calls of `step`.
 
         They are written into `traces`, n records `compiled.trace` in a row, where it is given.
+        `crank_frequency` (n,) or one for all, in Hz.
         """
         if traces is None:
             traces = np.zeros(len(displacement), self.compiled.trace)
         samples = np.ascontiguousarray(displacement, dtype=float)
-        self.compiled.run(*self.memory, traces.view(np.uint8), samples)
+        frequencies = np.array(np.broadcast_to(crank_frequency, samples.shape), dtype=float)
+        self.compiled.run(*self.memory, traces.view(np.uint8), samples, frequencies)
         return traces
 
 
@@ -176,51 +182,53 @@ def _transfer(law, new_law, state, window, new_window):
     force_maker.begin_fade(new_law.view(LAW)[0].maker, memory.maker)
 
 
-def _single(law, tables, state, window, trace, displacement, bridged_samples):
-    """Take one displacement sample (m), fill `trace`, return the current setpoint in A.
+def _single(law, tables, state, window, trace, displacement, bridged_samples, crank_frequency):
+    """Take one displacement sample (m) and the Hz of the crankshaft, fill `trace`, return the setpoint in A.
 
     `law`, `state` and `trace` are the bytes of their records.
     """
     mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
     sound = _all_finite(mount[3])
-    return _step(mount, sound, trace.view(np.float64), trace.view(TRACE)[0], displacement, bridged_samples)
+    numbers, record = trace.view(np.float64), trace.view(TRACE)[0]
+    return _step(mount, sound, numbers, record, displacement, bridged_samples, crank_frequency)
 
 
-def _run(law, tables, state, window, traces, displacements):
-    """Fill `traces` with one step for each displacement; arguments as for `_single`."""
+def _run(law, tables, state, window, traces, displacements, frequencies):
+    """Fill `traces` with one step for each displacement (m) and frequency (Hz); see `_single`."""
     mount = law.view(LAW)[0], tables, state.view(STATE)[0], state.view(np.int64), window
     sound = _all_finite(mount[3])
     records, numbers = traces.view(TRACE), traces.view(np.float64)
     for place in range(len(displacements)):
         of_sample = numbers[place * OF_TRACE : (place + 1) * OF_TRACE]
-        _step(mount, sound, of_sample, records[place], displacements[place], 0)
+        _step(mount, sound, of_sample, records[place], displacements[place], 0, frequencies[place])
         sound = sound or abs(displacements[place]) <= FARTHEST_DISPLACEMENT
 
 
-def _step(mount, sound, numbers, trace, displacement, bridged_samples):
+def _step(mount, sound, numbers, trace, displacement, bridged_samples, crank_frequency):
     """Take one sample; `numbers` are those of `trace`, `sound`: whether all of the state are finite."""
     _, _, state, bits, _ = mount
+    known = _known(crank_frequency)
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
-        return _refuse(numbers, trace, displacement)
+        return _refuse(numbers, trace, displacement, known)
     if not sound:
-        return _clear(mount, numbers, trace, displacement)
+        return _clear(mount, numbers, trace, displacement, known)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
-        _advance(mount, trace, state.displacement + rise)
-    trace.bridged_samples = bridged_samples
-    if not (_advance(mount, trace, displacement) and _all_finite(bits)):
-        return _clear(mount, numbers, trace, displacement)
+        _advance(mount, trace, state.displacement + rise, known)
+    trace.crank_frequency, trace.bridged_samples = known, bridged_samples
+    if not (_advance(mount, trace, displacement, known) and _all_finite(bits)):
+        return _clear(mount, numbers, trace, displacement, known)
     return trace.current
 
 
-def _advance(mount, trace, displacement):
+def _advance(mount, trace, displacement, crank_frequency):
     """Let policy and force maker take one sample; return whether all results are finite numbers."""
     law, tables, state, _, window = mount
     trace.displacement = displacement
     trace.velocity = (displacement - state.displacement) / law.maker.sample_time
     state.displacement = displacement
     force, velocity, active = policy.step(
-        law.policy, tables.policy, state.policy, window, trace, displacement
+        law.policy, tables.policy, state.policy, window, trace, displacement, crank_frequency
     )
     normal_force, coefficient, current = force_maker.make(
         law.maker, tables.current, state.maker, force, velocity, active
@@ -244,20 +252,26 @@ def _rest(mount, displacement):
     state.displacement = displacement
 
 
-def _clear(mount, numbers, trace, displacement):
+def _clear(mount, numbers, trace, displacement, crank_frequency):
     """Begin afresh with a memory that was spoiled: whatever the cause, no current is made of it."""
     _rest(mount, displacement)
     mount[2].faults += 1
-    return _refuse(numbers, trace, displacement)
+    return _refuse(numbers, trace, displacement, crank_frequency)
 
 
-def _refuse(numbers, trace, displacement):
-    """Trace that nothing is known of a step, and 0 A."""
+def _refuse(numbers, trace, displacement, crank_frequency):
+    """Trace that nothing but its inputs is known of a step, and 0 A."""
     numbers[:] = np.nan
-    trace.displacement = displacement
+    trace.displacement, trace.crank_frequency = displacement, _known(crank_frequency)
     trace.damping_active = trace.desired_force = trace.normal_force = trace.current = 0.0
     trace.bridged_samples = 0.0
     return 0.0
+
+
+@compiled
+def _known(crank_frequency):
+    """Return a frequency (Hz), 0.0 for what is none: NaN, negative or infinite."""
+    return crank_frequency if crank_frequency > 0.0 and math.isfinite(crank_frequency) else 0.0
 
 
 @compiled

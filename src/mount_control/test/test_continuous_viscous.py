@@ -32,7 +32,7 @@ def _follow(law_bytes, table, state_bytes, window, displacement, answers, trace_
     law, state, traces = law_bytes.view(LAW)[0], state_bytes.view(STATE)[0], trace_bytes.view(TRACE)
     policy.start(law, state, window, displacement[0])
     for k in range(displacement.size):
-        answers[k] = policy.step(law, table, state, window, traces[k], displacement[k])
+        answers[k] = policy.step(law, table, state, window, traces[k], displacement[k], 0.0)
 
 
 def sine(frequency: float, amplitude: float, time: np.ndarray = TIME) -> np.ndarray:

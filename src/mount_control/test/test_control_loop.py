@@ -56,11 +56,13 @@ def test_many_answers_are_single_answers_to_the_bit(make_loop, given_samples, pl
     stamps, displacements = given_samples
     changes = {place: [make_settings('viscous_4000', quality=0.7)] for place in places if place < len(stamps)}
     single, many = make_loop(**limits), make_loop(**limits)
-    answers = many.step_many(stamps, displacements, changes)
-    for place, (stamp, displacement) in enumerate(zip(stamps.tolist(), displacements.tolist(), strict=True)):
+    frequencies = 20.0 + np.arange(len(stamps))
+    answers = many.step_many(stamps, displacements, changes, frequencies)
+    columns = (each.tolist() for each in (stamps, displacements, frequencies))
+    for place, sample in enumerate(zip(*columns, strict=True)):
         for changed in changes.get(place, ()):
             single.change(changed)
-        current = single.step(stamp, displacement)
+        current = single.step(*sample)
         expected = math.nan if current is None else current
         np.testing.assert_equal(answers.currents[place], expected)
         assert answers.traced[place] == (single.trace is not None)

@@ -47,12 +47,16 @@ def test_single_steps_equal_a_run_to_the_bit(spoiled):
     for controller in (single, whole) if spoiled else ():
         currents = controller.memory.tables.current
         currents[len(currents) // 4 :] = math.nan  # met within the run, again and again
-    traces = whole.run(displacement)
+    frequencies = np.linspace(-5.0, 50.0, len(displacement))
+    frequencies[[200, 300]] = math.nan, math.inf
+    traces = whole.run(displacement, crank_frequency=frequencies)
     assert (whole.faults > 0) == spoiled
     for number, x in enumerate(displacement):
-        current = single.step(x)
+        current = single.step(x, crank_frequency=frequencies[number])
         assert current == traces['current'][number]
         assert single.trace_record.tobytes() == traces[number].tobytes()
+    known = (frequencies > 0.0) & (frequencies < math.inf)
+    np.testing.assert_array_equal(traces['crank_frequency'], np.where(known, frequencies, 0.0))
 
 
 def test_the_desired_force_is_the_damper_s_at_the_predicted_velocity():

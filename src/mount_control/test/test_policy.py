@@ -55,7 +55,7 @@ def test_a_trace_has_a_predicted_velocity_and_no_name_that_all_have(policy):
     own = POLICIES[policy].TRACE
     common = len(trace_fields(viscous_example)) - len(viscous_example.TRACE)
     assert 'predicted_velocity' in own
-    assert len(trace_fields(POLICIES[policy])) == common + len(own) == 9 + len(own)
+    assert len(trace_fields(POLICIES[policy])) == common + len(own) == 10 + len(own)
 
 
 def test_the_example_makes_the_force_that_it_wants(make):
@@ -64,7 +64,8 @@ def test_the_example_makes_the_force_that_it_wants(make):
     made = traces['normal_force'] * traces['friction_coefficient']
     within = traces['current'] < 2.9
     np.testing.assert_allclose(made[within], np.abs(traces['desired_force'][within]), rtol=1e-9)
-    assert traces.dtype.names[:4] == ('displacement', 'velocity', 'predicted_velocity', 'damping_active')
+    names = ('displacement', 'velocity', 'crank_frequency', 'predicted_velocity', 'damping_active')
+    assert traces.dtype.names[:5] == names
     assert (traces['damping_active'] == 1.0).all()
 
 

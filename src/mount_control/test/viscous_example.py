@@ -47,7 +47,7 @@ def transfer(law, new_law, state, window, new_window):
 
 
 @compiled
-def step(law, table, state, window, trace, displacement):
+def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N), velocity (m/s), and that damping is on."""
     velocity = (displacement - state.displacement) / law.sample_time
     state.displacement = displacement

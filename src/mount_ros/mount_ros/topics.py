@@ -133,10 +133,11 @@ CONTROL_TRACE = Topic(
     JOINT_STATE,
     Delivery.STREAM,
     SAMPLE_RATE,
-    'every intermediate of one control step; between velocity and damping_active those of the policy',
+    'every intermediate of one control step; between crank_frequency and damping_active those of the policy',
     (
         Scalar('displacement', 'm'),
         Scalar('velocity', 'm/s'),
+        Scalar('crank_frequency', 'Hz'),
         Scalar('damping_active', '1'),
         Scalar('desired_force', 'N'),
         Scalar('friction_deflection', 'm'),

@@ -91,7 +91,7 @@ def replay_in_core(given: ReplayInput, parameters: Parameters) -> Replayed:
         gap = measured if measured is not None and measured.stamp == part.gap.stamp else part.gap
         begin = time.perf_counter()
         replay = ControlReplay(int(part.stamps[0]), gap, parameters, given.changes)
-        replayed.parts.append(replay.answer(part.stamps, part.displacement))
+        replayed.parts.append(replay.answer(part.stamps, part.displacement, part.crank_frequency))
         replayed.control_time += time.perf_counter() - begin
         replayed.gaps.append(gap)
     return replayed
@@ -139,13 +139,13 @@ class ControlReplay:
         self._loop.note(activation)
         self._loop.begin(settings, table, activation)
 
-    def answer(self, stamps: Times, displacement: Column) -> ControlAnswers:
-        """Return the answers to the samples that follow (ns, m); counts and refusal are those until now."""
+    def answer(self, stamps: Times, displacement: Column, crank_frequency: Column) -> ControlAnswers:
+        """Return the answers to the samples that follow (ns, m, Hz); counts and refusal: until now."""
         changes: dict[int, list[ControlSettings]] = {}
         while self._later and self._later[0][0] <= stamps[-1]:
             time_of_change, settings = self._later.pop(0)
             changes.setdefault(int(np.searchsorted(stamps, time_of_change)), []).append(settings)
-        answers = self._loop.step_many(stamps, displacement, changes)
+        answers = self._loop.step_many(stamps, displacement, changes, crank_frequency)
         refusal = self._loop.refusal and f'0 A: {self._loop.refusal}'
         return ControlAnswers(
             stamps, answers.currents, answers.traced, answers.traces, self._loop.counts, refusal

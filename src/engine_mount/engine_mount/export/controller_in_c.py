@@ -80,24 +80,25 @@ def sequence_hash(settings: ControlSettings, samples: int) -> int:
     period = sample_time_ns(settings.parameters.sample_rate)
     stamp, random, hashed = 0, 1, 14695981039346656037  # of FNV-1a, and its factor below
     for n in range(samples):
-        random, periods, displacement, event = built_in_sample(n, random)
+        random, periods, displacement, frequency, event = built_in_sample(n, random)
         stamp += periods * period
         if event == 1:
             loop.change(settings)
         if event == 2:
             loop.controller.counts[0] = 0x7FF8000000000000
-        if loop.step(stamp, displacement) is not None and loop.trace is None:
-            loop.controller.step(displacement)
+        if loop.step(stamp, displacement, frequency) is not None and loop.trace is None:
+            loop.controller.step(displacement, 0, frequency)
         for number in trace.tolist():
             hashed = (hashed ^ number) * 1099511628211 % 2**64
     return hashed
 
 
 def built_in_sample(n, random):
-    """Return the new random number, periods since the last sample, displacement (m), event.
+    """Return the new random number, periods since the last sample, m, Hz of the crankshaft, event.
 
     At 1 kHz sample `n` sways at 8 Hz, and hardly for a quarter of the time; 1.5 m is out of every range.
-    Event 1 is a change of the law, event 2 a memory that becomes NaN.
+    The Hz rise, and are not known for a third of the time: 0 or less. Event 1 is a change of the law, event 2
+    a memory that becomes NaN.
     """
     random = (random * 1103515245 + 12345) % 2147483648
     place = n % 125
@@ -107,7 +108,8 @@ def built_in_sample(n, random):
         displacement = 1.5
     periods = 4 if n % 499 == 498 else 200 if n % 1999 == 1998 else 1
     event = 1 if n % 1501 == 1500 else 2 if n % 1201 == 1200 else 0
-    return random, periods, displacement, event
+    frequency = (n % 600 - 200) * 0.1
+    return random, periods, displacement, frequency, event
 
 
 def _test_table(settings: ControlSettings) -> CurrentTable:
@@ -130,7 +132,7 @@ def _sources(parameters: Parameters) -> tuple[str, str]:
     for function, arguments in (
         (compiled.start, (law, tables, state, array, FLOAT)),
         (compiled.transfer, (law, law, state, array, array)),
-        (compiled.step, (law, tables, state, array, trace, FLOAT, WHOLE)),
+        (compiled.step, (law, tables, state, array, trace, FLOAT, WHOLE, FLOAT)),
         (table_fault, (constants, constants, FLOAT, FLOAT)),
         (places_of, (constants,)),
         (fill_table, (array, constants, constants)),

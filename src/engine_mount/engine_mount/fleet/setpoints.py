@@ -133,7 +133,7 @@ def compare_setpoints(recorded: Recorded, changes: Parameters) -> Compared:
         for begin in range(0, len(run.stamps), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             for each, replay in zip(figures, replays, strict=True):
-                each.add(replay.answer(run.stamps[part], run.displacement[part]))
+                each.add(replay.answer(run.stamps[part], run.displacement[part], run.crank_frequency[part]))
     stamps = np.concatenate([run.stamps for run in runs])
     displacement = np.concatenate([run.displacement for run in runs])
     zero = recording.time_axis.zero
@@ -152,7 +152,7 @@ def _recorded_answers(recording: Recording, parameters: Parameters) -> RecordedA
     wanted: dict[Topic, tuple[str, ...]] = {
         DISPLACEMENT: DISPLACEMENT.names,
         CURRENT_SETPOINT: CURRENT_SETPOINT.names,
-        CONTROL_TRACE: tuple(dict.fromkeys(('displacement', 'bridged_samples', *quiet))),
+        CONTROL_TRACE: tuple(dict.fromkeys(('displacement', 'crank_frequency', 'bridged_samples', *quiet))),
     }
     there = {topic.name: names for topic, names in wanted.items() if has(recording, topic)}
     recording.load_columns(there)

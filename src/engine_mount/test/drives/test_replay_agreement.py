@@ -35,7 +35,7 @@ def judged(setpoints=CURRENT, steps=None, *, stamps=STAMPS, from_its_beginning=T
     """Compare a replay with these answers to a recording of `CURRENT` and its traces."""
     recorded = traces()
     answers = RecordedAnswers(STAMPS, CURRENT, STAMPS, {name: recorded[name] for name in TRACE.names})
-    run = ControlRun(STAMPS, np.zeros(COUNT), None, from_its_beginning)
+    run = ControlRun(STAMPS, np.zeros(COUNT), np.zeros(COUNT), None, from_its_beginning)
     given = ReplayInput('a drive', [run], {}, answers, {}, zero=ZERO)
     steps = traces() if steps is None else steps
     count = len(stamps)

@@ -53,6 +53,8 @@ def drive_of(policy: str, count: int) -> SimpleNamespace:
     sway = 1.2e-3 * np.sin(2 * np.pi * 8.0 * seconds) * (np.sin(2 * np.pi * 0.15 * seconds) > -0.3)
     idle = 4e-5 * np.sin(2 * np.pi * 27.3 * seconds) * (np.sin(2 * np.pi * 0.05 * seconds) > 0.0)
     displacements = sway + idle + random.normal(0.0, 3e-6, count)
+    frequencies = np.repeat(random.uniform(-5.0, 50.0, count // 100), 100)
+    frequencies[random.integers(0, count, count // 1000)] = np.nan
     for fault in (np.nan, np.inf, -0.021, 3.0):
         displacements[random.integers(0, count, count // 4000)] = fault
     places = np.sort(random.choice(count, count // 5000, replace=False)).tolist()
@@ -63,10 +65,11 @@ def drive_of(policy: str, count: int) -> SimpleNamespace:
     loop.measured_before = True
     loop.begin(settings, settings.table(CURRENT, FORCE, OFFSET), 0)
     of_law = {place: [chosen_control({'mount_control': law})] for place, law in changes.items()}
-    answers = loop.step_many(stamps, displacements, of_law)
+    answers = loop.step_many(stamps, displacements, of_law, frequencies)
     assert 0.0005 < np.mean(~answers.traced) < 0.01
     assert np.mean(answers.currents > OFFSET) > 0.1
-    return SimpleNamespace(stamps=stamps, displacements=displacements, changes=changes, answers=answers)
+    columns = stamps, displacements, frequencies
+    return SimpleNamespace(columns=columns, changes=changes, answers=answers)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +90,7 @@ def test_c_answers_to_the_bit_as_python(export, name, level, count):
     assert controller.set_table(CURRENT, FORCE, OFFSET) == 0
     drive, begin, currents, traces = export.drive, 0, [], []
     for place in [*(each for each in drive.changes if each < count), count]:
-        answers = controller.run(drive.stamps[begin:place], drive.displacements[begin:place])
+        answers = controller.run(*(column[begin:place] for column in drive.columns))
         currents.append(answers[0])
         traces.append(answers[1])
         begin = place

@@ -203,7 +203,7 @@ def transfer(law, new_law, state, window, new_window):
 
 
 @compiled
-def step(law, table, state, window, trace, displacement):
+def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N), velocity (m/s) at which it acts, and the degree 0 .. 1."""
     line_now, line_ahead, line_velocity = engine_line.step(law.line, table, state.line, window, displacement)
     engine = displacement - line_now

@@ -28,9 +28,11 @@ and compiled, with the records of `Law` and `STATE`:
     State and window are 0: set what is not in a mount at rest at `displacement` (m), damping off.
 `transfer(law, new_law, state, window, new_window)`
     Make the memory that of other parameters, without a jump.
-`step(law, table, state, window, trace, displacement) -> (force, velocity, active)`
-    Take one sample (m) and fill the own fields of `trace`. `force` (N) is the wanted friction force, signed
-    like `velocity` (m/s); `active` lies within 0 .. 1, and at exactly 0 the current is exactly 0 A.
+`step(law, table, state, window, trace, displacement, crank_frequency) -> (force, velocity, active)`
+    Take one sample (m) and fill the own fields of `trace`. `crank_frequency` (Hz): turns of the crankshaft
+    in a second, 0.0 where they are not known, never NaN or negative. `force` (N) is the wanted friction
+    force, signed like `velocity` (m/s); `active` lies within 0 .. 1, and at exactly 0 the current is exactly
+    0 A.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,7 +43,7 @@ from numpy.typing import NDArray
 
 from mount_models.arithmetic.record import record_type
 
-_BEFORE = {'displacement': 'm', 'velocity': 'm/s'}
+_BEFORE = {'displacement': 'm', 'velocity': 'm/s', 'crank_frequency': 'Hz'}
 _BEHIND = {
     'damping_active': '1',
     'desired_force': 'N',

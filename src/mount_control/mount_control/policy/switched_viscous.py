@@ -136,7 +136,7 @@ def transfer(law, new_law, state, window, new_window):
 
 
 @compiled
-def step(law, table, state, window, trace, displacement):
+def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N), velocity (m/s) at which it acts, and damping active 0 or 1."""
     banded, velocity, predicted = band_pass.step(law.band, state.band, displacement)
     magnitude, active = switching.step(law.switching, state.switching, window, banded)

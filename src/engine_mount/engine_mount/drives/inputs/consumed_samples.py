@@ -93,12 +93,14 @@ class Ramp:
 class ControlRun:
     """The displacement samples that mount_control took from one activation to its end, stamps rising.
 
-    `gap` is what it was activated with; `from_its_beginning` whether the first sample is the first that it
-    ever took, so that its memory was empty.
+    `crank_frequency`: what it knew of the engine at each, 0 where nothing is recorded. `gap` is what it was
+    activated with; `from_its_beginning` whether the first sample is the first that it ever took, so that its
+    memory was empty.
     """
 
     stamps: Times  # ns
     displacement: Column  # m
+    crank_frequency: Column  # Hz
     gap: MeasuredGap
     from_its_beginning: bool = True
 
@@ -146,6 +148,7 @@ def control_runs(
     stamps, values = _consumed(displacement, answers, ramps, gaps, period, notes)
     if not len(stamps):
         return []
+    frequencies = _crank_frequency(stamps, answers)
     steps = set((np.flatnonzero(np.diff(stamps) > 1.5 * period) + 1).tolist())
     if answers is not None:  # in lock-step an activation takes no time
         moved_before = np.concatenate([[False], answers.afresh])[: len(answers.afresh)]
@@ -167,8 +170,17 @@ def control_runs(
                 f'the recording begins while the controller is at work, at {notes.at(int(stamps[begin]))}: '
                 'what it remembered is not in it, so the replay starts afresh there'
             )
-        runs.append(ControlRun(stamps[begin:end], values[begin:end], (earlier or gaps[:1])[-1], whole))
+        part = slice(begin, end)
+        of_run = stamps[part], values[part], frequencies[part]
+        runs.append(ControlRun(*of_run, (earlier or gaps[:1])[-1], whole))
     return runs
+
+
+def _crank_frequency(stamps: Times, answers: RecordedAnswers | None) -> Column:
+    """Return what each sample's step knew of the engine (Hz), of the next step where its trace is lost."""
+    if answers is None or not len(answers.traces.get('crank_frequency', ())):
+        return np.zeros(len(stamps))  # older recordings have no such field
+    return answers.traces['crank_frequency'][places_in(answers.trace_stamps, stamps)[1]]
 
 
 def _consumed(

@@ -47,15 +47,16 @@ def run_with(policy: Policy) -> Callable[..., tuple[int, float, float]]:
 step: Any = None  # of the controller; bound by `run_with`
 
 
-def _run(ahead, memory, plausibility, believable, pending, readings, setpoints, truths, traces):
+def _run(ahead, memory, plausibility, believable, frequencies, pending, readings, setpoints, truths, traces):
     """Take samples until one displacement is not believed; return (number taken, setpoints in A).
 
     The two setpoints are the one that has arrived for the next sample and the one taken over last.
 
     `ahead` is what the plant gives for n samples, `memory` that of the controller, `plausibility` limits and
-    memory of the check of the displacement, `believable` its largest value (m), `pending` the setpoint (A)
-    that arrived before the first sample. Filled for each sample taken: `readings` (n, 4) as they arrive,
-    `setpoints` (n,) in A as they leave, `truths` and `traces` (n, bytes of their records).
+    memory of the check of the displacement, `believable` its largest value (m), `frequencies` (n,) the Hz of
+    the crankshaft, `pending` the setpoint (A) that arrived before the first sample. Filled for each sample
+    taken: `readings` (n, 4) as they arrive, `setpoints` (n,) in A as they leave, `truths` and `traces`
+    (n, bytes of their records).
     """
     last, mount = pending, ahead.memory
     limits, known = plausibility
@@ -71,7 +72,10 @@ def _run(ahead, memory, plausibility, believable, pending, readings, setpoints, 
         if doubt_of(limits, known, reading[0], 0):
             known[:] = before
             return index, pending, last
-        setpoint = step(memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0)
+        setpoint = step(
+            memory.law, memory.tables, memory.state, memory.window, traces[index], reading[0], 0,
+            frequencies[index],
+        )  # fmt: skip
         for place in range(4):
             readings[index, place] = reading[place]
         setpoints[index] = setpoint

@@ -143,6 +143,7 @@ class MountRun:
             controller.memory,
             (plausibility.limits, plausibility.memory),
             chain.control.parameters.displacement_range,
+            np.zeros(len(ahead.values)),
             self._pending,
             samples.readings[part],
             samples.setpoints[part],

@@ -40,10 +40,10 @@ def _install(file):
     def change_control(module):
         step = module.ControlLoop.step
 
-        def hanging(loop, stamp, displacement):
+        def hanging(loop, *sample):
             if pause := numbers()[1]:
                 time.sleep(1e-9 * pause)
-            return step(loop, stamp, displacement)
+            return step(loop, *sample)
 
         module.ControlLoop.step = hanging
 
