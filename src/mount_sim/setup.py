@@ -8,6 +8,7 @@ setup(
     description='The far end of the CAN bus: electronics, actuator, friction contact and vehicle, simulated.',
     license='Apache-2.0',
     packages=find_packages(exclude=['test']),
+    package_data={name: ['dbc/*.dbc']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/mount_sim']),
         ('share/mount_sim', ['package.xml', 'README.md']),

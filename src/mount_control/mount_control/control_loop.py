@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mount_control.controller import ControlLaw, Controller
+from mount_control.engine_speed import EngineSpeed
 from mount_control.force_maker import CurrentTable
 from mount_control.plausibility import Plausibility, doubt_of
 from mount_control.settings import ControlParameters, ControlSettings
@@ -80,6 +81,7 @@ class ControlLoop:
         """Whether the measurements are known to have come without a break before the first sample, too."""
         self.steps: deque[int] = deque(maxlen=_KEPT_STEPS)  # ns, between the samples before `begin`
         self.controller: Controller | None = None  # None: nothing is answered
+        self.engine_speed = EngineSpeed()
         self.judgement = Judgement.INACTIVE  # of the last sample
         self.trace: NDArray[np.uint8] | None = None
         """The bytes of the last sample's trace, None where there is none; overwritten by the next sample."""
@@ -99,6 +101,7 @@ class ControlLoop:
         self._range = parameters.displacement_range  # m
         self.plausibility = Plausibility(parameters)
         self.counts = SampleCounts()
+        self.engine_speed.timeout = round(parameters.engine_speed_timeout * 1e9)  # ns
         self.refusal = ''  # why the table no longer holds since the activation
         self.foreign = ''
         self._used = self._compared = _NEVER  # stamps of the last samples that controller, plausibility took
@@ -132,10 +135,10 @@ class ControlLoop:
         self.writer_doubt = suspected
         self._horizon = 0
 
-    def step(self, stamp: int, displacement: float, crank_frequency: float = 0.0) -> float | None:
+    def step(self, stamp: int, displacement: float, crank_frequency: float | None = None) -> float | None:
         """Return the current (A) that answers a sample (ns, m), None where it is not to be answered.
 
-        `crank_frequency`: turns of the crankshaft in a second (Hz), 0 where they are not known.
+        `crank_frequency`: turns of the crankshaft in a second (Hz), by default those of `engine_speed`.
         """
         elapsed = stamp - self._used
         usual = self._closest <= elapsed < self._horizon and abs(displacement) <= self._range
@@ -165,6 +168,8 @@ class ControlLoop:
                 missing = missing_samples(elapsed, self._period)
                 self.counts.bridged += missing
         self.trace = controller.trace_record
+        if crank_frequency is None:
+            crank_frequency = self.engine_speed.at(stamp)
         return controller.advance(displacement, missing, crank_frequency)
 
     def _refusal(self, stamp: int, displacement: float, elapsed: int) -> Judgement | None:

@@ -12,6 +12,7 @@ from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict
 
 _LARGEST_BRIDGED = 0.001  # share of samples, chosen
 _LIMIT = f'limit: none in {WINDOW:g} s'
+_NO_SPEED = 'engine_speed not used, the law follows the displacement alone'
 
 
 def counted_since(earlier: SampleCounts, counts: SampleCounts) -> SampleCounts:
@@ -22,16 +23,18 @@ def counted_since(earlier: SampleCounts, counts: SampleCounts) -> SampleCounts:
 def verdict(
     loop: ControlLoop,
     lately: SampleCounts,
+    doubted: int,
     silence: float,
     longest_silence: float,
     figures: Mapping[str, Any],
 ) -> Verdict:
     """Return level and sentence, worst first, and `figures` with those of the loop.
 
-    `lately` was counted within the window, or since the activation; `silence` is the time (s) since the last
+    `lately` and the messages of `engine_speed` that were `doubted` were counted within the window, or since
+    the activation; `silence` is the time (s) since the last
     displacement sample.
     """
-    doubt = loop.plausibility.sentence
+    doubt, speed = loop.plausibility.sentence, loop.engine_speed
     errors = (
         (loop.foreign, f'0 A: {loop.foreign}, then activate mount_init and mount_control again'),
         (loop.refusal, f'0 A: {loop.refusal}'),
@@ -60,6 +63,15 @@ def verdict(
             f'{lately.bridged} of {lately.samples} samples were missing and bridged (limit '
             f'{100 * _LARGEST_BRIDGED:g} % of {WINDOW:g} s); '
             "look at mount_driver's counts of lost frames",
+        ),
+        ('engine speed conflict' if speed.conflict else '', f'{_NO_SPEED}: {speed.conflict}'),
+        (
+            'engine speed stopped' if speed.stopped(loop.last) else '',
+            f'{_NO_SPEED}: none for more than {1e-9 * speed.timeout:g} s; look at mount_driver',
+        ),
+        (
+            'engine speed doubted' if doubted else '',
+            f'{_NO_SPEED} in {doubted} messages ({_LIMIT}); the last: {speed.doubt}',
         ),
     )
     findings = [

@@ -69,6 +69,7 @@ class MountControl(SafeLifecycleNode):
         self._foreign = False
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
+        self._speed = ScalarsLayout(topics.ENGINE_SPEED)
         self.trace_topic = topics.control_trace(trace_fields(self._settings.policy))
         self._trace = ScalarsLayout(self.trace_topic)
         self._gap_layout = ScalarsLayout(topics.AIR_GAP)
@@ -80,6 +81,7 @@ class MountControl(SafeLifecycleNode):
         self._send_trace = path.sender(topics.CONTROL_TRACE)
         self._send_event = path.sender(topics.EVENT)
         path.subscribe(topics.DISPLACEMENT, self._on_displacement, directly=True)
+        path.subscribe(topics.ENGINE_SPEED, self._on_engine_speed, on_conflict=self._on_speed_conflict)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
         path.start()
@@ -89,7 +91,10 @@ class MountControl(SafeLifecycleNode):
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
-        self._counted = SlidingWindow(SampleCounts())
+        self._counted, self._doubted = (
+            SlidingWindow(SampleCounts()),
+            SlidingWindow(self.loop.engine_speed.doubted),
+        )
         self._received = time.monotonic()
         with self._order:
             waiting, self._waiting = self._waiting, b''
@@ -135,9 +140,11 @@ class MountControl(SafeLifecycleNode):
             'damper': self.get_parameter('damper').value,
             'fatal': bool(loop.foreign) and self.lockstep,  # then a supervisor ends the graph
         }
+        doubted = loop.engine_speed.doubted
         return verdict(
             loop,
             counted_since(self._counted.earlier(now, counts), counts),
+            doubted - self._doubted.earlier(now, doubted),
             0.0 if self.lockstep else now - self._received,
             self._settings.parameters.longest_bridge,
             figures,
@@ -158,6 +165,14 @@ class MountControl(SafeLifecycleNode):
             while loop.changes_made:
                 self._send_change(stamp, loop.changes_made.popleft())
         self._received = time.monotonic()
+
+    def _on_engine_speed(self, raw: bytes) -> None:
+        stamp, _, (velocity,) = self._speed.unpack(raw)
+        with self._order:  # a displacement may come from another thread
+            self.loop.engine_speed.take(stamp, velocity, self.loop.last)
+
+    def _on_speed_conflict(self, confirmed: str, suspected: str) -> None:
+        self.loop.engine_speed.conflict = confirmed or suspected
 
     def _send_change(self, stamp: int, text: str) -> None:
         self._send_event(string_message(dated(stamp, text)))

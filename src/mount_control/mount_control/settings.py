@@ -45,6 +45,10 @@ class ControlParameters(NamedTuple):
     displacement_stuck: Annotated[
         float, Quantity('s', 'a noisy displacement that repeats for so long is stuck', 0.01, 10.0)
     ] = 0.05
+    engine_speed_timeout: Annotated[
+        float,
+        Quantity('s', 'a speed of the engine is used for so long, and then taken as not known', 0.02, 1.0),
+    ] = 0.1
     highest_current: Annotated[
         float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
     ] = HIGHEST_CURRENT

@@ -24,7 +24,7 @@ def judged(counts=None, lately=None, silence=0.0, doubt='', held=False, **change
             'foreign': '', 'writer_doubt': '', **changes,
         },
     )  # fmt: skip
-    return verdict(loop, lately or counts, silence, 0.020, {'policy': 'switched_viscous'})
+    return verdict(loop, lately or counts, 0, silence, 0.020, {'policy': 'switched_viscous'})
 
 
 ERRORS = {

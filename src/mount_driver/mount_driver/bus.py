@@ -63,21 +63,29 @@ class Frame(can.Message):
 
 
 def open_bus(
-    interface: str, channel: str, *, receive: Sequence[int] = (), port: int = MULTICAST_PORT
+    interface: str,
+    channel: str,
+    *,
+    receive: Sequence[int] = (),
+    port: int = MULTICAST_PORT,
+    extended: bool = False,
+    any_rate: bool = False,
 ) -> can.BusABC:
     """Return an open CAN FD bus that delivers the frames with the identifiers `receive` (empty: all).
 
+    `extended`: they have 29 bits. `any_rate`: a bus without CAN FD serves too, for one who only listens.
     `port` is that of `udp_multicast`; the bit rates of `socketcan` are set with `ip link`. Raises
     `CanLinkError`.
     """
-    filters = [{'can_id': number, 'can_mask': 0x7FF, 'extended': False} for number in receive] or None
+    mask = 0x1FFFFFFF if extended else 0x7FF
+    filters = [{'can_id': number, 'can_mask': mask, 'extended': extended} for number in receive] or None
     try:
         if interface == 'udp_multicast':
             return LoopbackMulticastBus(channel, port, can_filters=filters)
         if interface == 'virtual':
             return VirtualBus(channel, protocol=can.CanProtocol.CAN_FD, can_filters=filters)
         if interface == 'socketcan':
-            _check_socketcan(channel)
+            _check_socketcan(channel, any_rate=any_rate)
             bus = SocketcanBus(channel, can_filters=filters, fd=True)
             bus.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
             return bus
@@ -165,7 +173,9 @@ class LoopbackMulticastBus(can.BusABC):
         self._received = {entry['can_id'] for entry in filters or ()}  # what is not here python-can looks at
 
 
-def _check_socketcan(channel: str, interfaces: Path = Path('/sys/class/net')) -> None:
+def _check_socketcan(
+    channel: str, interfaces: Path = Path('/sys/class/net'), *, any_rate: bool = False
+) -> None:
     """Refuse an interface that is missing, down or not in FD mode, which would show only when sending."""
     folder = interfaces / channel
     if not folder.exists():
@@ -173,7 +183,7 @@ def _check_socketcan(channel: str, interfaces: Path = Path('/sys/class/net')) ->
     if (folder / 'operstate').read_text().strip() == 'down':
         raise OSError('the interface is down')
     mtu = int((folder / 'mtu').read_text())
-    if mtu != _CAN_FD_MTU:
+    if mtu != _CAN_FD_MTU and not any_rate:
         raise OSError(f'the interface is not in CAN FD mode: its MTU is {mtu}, needed is {_CAN_FD_MTU}')
 
 

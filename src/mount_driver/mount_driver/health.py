@@ -6,6 +6,7 @@ No sentence holds a number that goes on changing while its finding stands; such 
 from collections.abc import Iterator
 from dataclasses import asdict, astuple
 
+from mount_driver.engine_speed import EngineSpeedReader
 from mount_driver.exchange import Exchange
 from mount_driver.link import Counts
 from mount_driver.parameters import DriverParameters
@@ -22,9 +23,17 @@ _NONE = f'limit: none in {WINDOW:g} s'
 class Health:
     """Judges an exchange again and again; lives as long as an activation, which began at `started` (ns)."""
 
-    def __init__(self, exchange: Exchange, parameters: DriverParameters, started: int, *, lockstep: bool):
+    def __init__(
+        self,
+        exchange: Exchange,
+        parameters: DriverParameters,
+        started: int,
+        *,
+        lockstep: bool,
+        speed: EngineSpeedReader | None = None,
+    ):
         self._exchange, self._parameters = exchange, parameters
-        self._started, self._lockstep = started, lockstep
+        self._started, self._lockstep, self._speed = started, lockstep, speed
         self._counts = SlidingWindow(Counts())
         self._unheard = SlidingWindow(False, _SECOND)
 
@@ -39,6 +48,8 @@ class Health:
         was_unheard = self._unheard.earlier(seconds, unheard)
         findings = [Finding(Level.ERROR, *found) for found in self._errors(frame_age)]
         findings += [Finding(Level.WARN, *found) for found in self._warnings(recent, unheard and was_unheard)]
+        if self._speed is not None and (trouble := self._speed.trouble(now)):
+            findings.append(Finding(Level.WARN, 'engine speed', trouble))
         guard, status = exchange.guard, link.status
         # At 0 A a graph in real time goes on beside another writer; in lock-step nobody answers any more.
         fatal = link.fault and not link.needs_initialisation and (self._lockstep or not link.foreign_writer)

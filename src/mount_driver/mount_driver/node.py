@@ -4,6 +4,7 @@ import time
 from math import nan
 
 from mount_driver.clock import CounterClock, ElectronicsClock
+from mount_driver.engine_speed import EngineSpeedReader, SpeedSignal
 from mount_driver.exchange import Exchange
 from mount_driver.health import Health
 from mount_driver.link import Fault, Refusal, Stamped
@@ -21,7 +22,7 @@ from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import RealTimeThreads
-from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT, ENGINE_SPEED
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
 
@@ -37,11 +38,13 @@ class MountDriver(SafeLifecycleNode):
         declare(self, SpecimenChoice())
         self._of_specimen = SpecimenValues(self)
         self._exchange: Exchange | None = None
+        self._speed: EngineSpeedReader | None = None
         self._heat: HeatWatch | None = None
         self._not_before = 0.0  # s, steady clock: end of the break that a fault of the coil demands
         self._displacement_layout = ScalarsLayout(DISPLACEMENT)
         self._ripple_layout = ScalarsLayout(COIL_RIPPLE)
         self._temperature_layout = OneNumberLayout(temperature)
+        self._speed_layout = ScalarsLayout(ENGINE_SPEED)
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
 
     def configure(self) -> None:
@@ -51,10 +54,13 @@ class MountDriver(SafeLifecycleNode):
         check_heating(self._settings.heating)
         self._heat = self._heat_of(self._settings)
         self._codec = MountCodec()
+        self._speed_signal = SpeedSignal(speed) if (speed := self._settings.engine_speed).dbc else None
         path = self.open_data_path()
         self._publish_displacement = path.sender(DISPLACEMENT)
         self._publish_ripple = path.sender(COIL_RIPPLE)
         self._publish_temperature = path.sender(COIL_TEMPERATURE)
+        if self._speed_signal:  # else another node may publish it
+            self._publish_speed = path.sender(ENGINE_SPEED)
         path.subscribe(CURRENT_SETPOINT, self._on_setpoint, directly=True)
         path.start()
         self._path = path
@@ -81,10 +87,19 @@ class MountDriver(SafeLifecycleNode):
         attended = self.lockstep and self._settings.interface == 'virtual'
         exchange.start(threaded=not attended)
         self._exchange = exchange
-        self._health = Health(exchange, self._settings, started, lockstep=self.lockstep)
+        if self._speed_signal:
+            offset = 0 if self.lockstep else epoch_offset
+            self._speed = EngineSpeedReader(
+                self._speed_signal,
+                self._speed_bus(),
+                self._on_engine_speed,
+                lambda received: clock.now(received) + offset,
+            )
+            self._speed.start(threaded=not attended)
+        self._health = Health(exchange, self._settings, started, lockstep=self.lockstep, speed=self._speed)
         self.data_path.publisher_watch.report()
         if attended:
-            self._path.add_poll(exchange.poll)
+            self._path.add_poll(self._poll)
 
     def deactivate(self) -> None:
         exchange, self._exchange = self._exchange, None
@@ -93,6 +108,9 @@ class MountDriver(SafeLifecycleNode):
                 self._path.remove_polls()
             finally:
                 exchange.stop()
+                if self._speed is not None:
+                    self._speed.stop()
+                    self._speed = None
                 if exchange.link.fault:
                     self._not_before = time.monotonic() + _BREAK
 
@@ -104,6 +122,20 @@ class MountDriver(SafeLifecycleNode):
 
     def judge(self) -> Verdict:
         return self._health.judge(time.monotonic_ns())
+
+    def _speed_bus(self) -> tuple[str, str, int]:
+        own, speed = self._settings, self._settings.engine_speed
+        return speed.interface or own.interface, speed.channel or own.channel, own.port
+
+    def _poll(self) -> bool:
+        """Take what has come; the speed of the engine behind the sample that it came with."""
+        exchange, speed = self._exchange, self._speed
+        busy = exchange is not None and exchange.poll()
+        if exchange is not None and speed is not None:
+            while exchange.poll():
+                busy = True
+            busy |= speed.poll()
+        return busy
 
     def _heat_of(self, settings: DriverParameters) -> HeatWatch:
         """Return what is known of the coil: a new configuration does not cool it."""
@@ -136,6 +168,9 @@ class MountDriver(SafeLifecycleNode):
 
     def _on_temperature(self, stamp: int, celsius: float) -> None:
         self._publish_temperature(self._temperature_layout.pack(stamp, celsius))
+
+    def _on_engine_speed(self, stamp: int, velocity: float) -> None:
+        self._publish_speed(self._speed_layout.pack(stamp, (nan,), (velocity,)))
 
     def _on_setpoint(self, raw: bytes) -> None:
         exchange = self._exchange

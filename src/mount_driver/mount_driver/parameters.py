@@ -4,6 +4,7 @@ from math import nan
 from typing import Annotated, NamedTuple
 
 from mount_driver.bus import MULTICAST_GROUP, MULTICAST_PORT
+from mount_driver.engine_speed import EngineSpeedParameters
 from mount_driver.watches.coil_watch import CoilWatchParameters
 from mount_driver.watches.message_watches import StatusLimits
 from mount_driver.watches.ripple_watch import RippleWatchParameters
@@ -27,6 +28,7 @@ class DriverParameters(NamedTuple):
     status: StatusLimits = StatusLimits()
     ripple: RippleWatchParameters = RippleWatchParameters()
     heating: CoilHeating = CoilHeating()
+    engine_speed: EngineSpeedParameters = EngineSpeedParameters()
     coil_celsius_before: Annotated[
         float,
         Quantity(

@@ -177,7 +177,7 @@ class MountRecorder(SafeLifecycleNode):
             faults = FaultWatch(self._marks, self.get_namespace(), self._present_time)
             recorder.observers[name] = faults.observe
         # Setpoints pause between initialisation and control; the audit knows when, a live count does not.
-        elif entry.delivery is Delivery.STREAM and entry is not CURRENT_SETPOINT:
+        elif entry.delivery is Delivery.STREAM and entry.rate and entry is not CURRENT_SETPOINT:
             rate = entry.rate_at(self._settings.sample_rate)
             stamps = recorder.watches[name] = StampWatch(rate)
             recorder.observers[name] = stamps.observe

@@ -120,16 +120,26 @@ class DataPath:
 
         return send
 
-    def subscribe(self, topic: Topic, callback: Callable[[bytes], None], *, directly: bool = False) -> None:
+    def subscribe(
+        self,
+        topic: Topic,
+        callback: Callable[[bytes], None],
+        *,
+        directly: bool = False,
+        on_conflict: Callable[[str, str], None] | None = None,
+    ) -> None:
         """Call `callback` with the serialised bytes of each message of `topic`.
 
         `directly`: in the thread of a sender in this process, where time (not lock-step) allows it.
+        `on_conflict` takes what others publish on this topic alone; the path's own one is not called then.
         """
 
         def create() -> None:
             kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
             subscription = self.node.create_subscription(kind, topic.name, callback, qos, raw=True)
-            subscription.callback = self._receiver(topic, subscription, callback, directly and self._direct)
+            watch = PublisherWatch(self.node, on_conflict) if on_conflict else self.publisher_watch
+            direct = directly and self._direct
+            subscription.callback = self._receiver(topic, subscription, callback, watch, direct)
 
         if self._serving:
             self._thread.change(create)
@@ -192,10 +202,14 @@ class DataPath:
         self.node.destroy_node()
 
     def _receiver(
-        self, topic: Topic, subscription: Subscription, callback: Callable[[bytes], None], directly: bool
+        self,
+        topic: Topic,
+        subscription: Subscription,
+        callback: Callable[[bytes], None],
+        watch: PublisherWatch,
+        directly: bool,
     ) -> Callable[..., None]:
         """Return the function that takes a message, and lets no exception end the thread or the sender."""
-        watch = self.publisher_watch
         watched = watch.add(topic, subscription) if topic.writers else None
         count_publishers = subscription.get_publisher_count
         local = self._thread.local_topics[subscription.topic_name] if directly else LocalTopic()

@@ -102,6 +102,16 @@ CURRENT_SETPOINT = Topic(
     writers=('mount_control', 'mount_init'),
 )
 
+ENGINE_SPEED = Topic(
+    'engine_speed',
+    JOINT_STATE,
+    Delivery.STREAM,
+    0.0,
+    'speed of the crankshaft, 10 to 100 Hz, where the vehicle sends it; position always NaN',
+    (Scalar('crankshaft', 'rad', 'rad/s'),),
+    writers=('mount_driver',),
+)
+
 AIR_GAP = Topic(
     'air_gap',
     JOINT_STATE,
@@ -137,7 +147,6 @@ CONTROL_TRACE = Topic(
     (
         Scalar('displacement', 'm'),
         Scalar('velocity', 'm/s'),
-        Scalar('crank_frequency', 'Hz'),
         Scalar('damping_active', '1'),
         Scalar('desired_force', 'N'),
         Scalar('friction_deflection', 'm'),
@@ -147,6 +156,7 @@ CONTROL_TRACE = Topic(
         Scalar('bridged_samples', '1'),
     ),
     (
+        Scalar('crank_frequency', 'Hz'),  # not in older recordings
         Scalar('band_displacement', 'm'),
         Scalar('band_velocity', 'm/s'),
         Scalar('predicted_velocity', 'm/s'),
@@ -230,6 +240,7 @@ TOPICS: tuple[Topic, ...] = (
     DISPLACEMENT,
     COIL_RIPPLE,
     COIL_TEMPERATURE,
+    ENGINE_SPEED,
     CURRENT_SETPOINT,
     AIR_GAP,
     CURRENT_FORCE_TABLE,

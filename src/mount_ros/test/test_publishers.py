@@ -51,11 +51,12 @@ def _settled(path):
     return watch.confirmed, watch.suspected
 
 
-def test_topics_that_decide_on_the_current_have_writers_and_others_have_none():
+def test_topics_that_the_graph_uses_have_writers_and_others_have_none():
     assert {topic.name: topic.writers for topic in TOPICS if topic.writers} == {
         'displacement': ('mount_driver',),
         'coil_ripple': ('mount_driver',),
         'coil_temperature': ('mount_driver',),
+        'engine_speed': ('mount_driver',),
         'current_setpoint': ('mount_control', 'mount_init'),
         'air_gap': ('mount_init',),
         'current_force_table': ('mount_init',),

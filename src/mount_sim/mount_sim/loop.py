@@ -3,16 +3,19 @@
 Samples out, setpoints in, the plant moved on; in real time and in lock-step.
 """
 
+import copy
 import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from mount_driver.bus import Frame
 from mount_driver.protocol import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import status_every
+from mount_sim.electronics.vehicle_bus import sent_every
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
 
 _REMEMBERED = 1024  # samples whose sending time is kept
@@ -48,8 +51,11 @@ class ElectronicsLoop:
         mount: SimulatedMount,
         can_end: CanEnd,
         publish: Callable[[int], None],
+        speed: Frame | None = None,
     ):
+        """`speed` is what the vehicle sends of its engine every 10 ms, nothing by default."""
         self._mount = mount
+        self._speed, self._speed_every = speed, sent_every(mount.sample_rate)
         self._can_end = can_end
         self._status_every = status_every(mount.sample_rate)
         self._publish = publish
@@ -121,6 +127,8 @@ class ElectronicsLoop:
         ]
         if number % self._status_every == 0:
             frames.append(self._can_end.status_frame(mount.faults.through('status', self._status())))
+        if self._speed is not None and number % self._speed_every == 0:
+            frames.append(copy.deepcopy(self._speed))
         if mount.faults.present:
             frames = mount.faults.through('frames', frames)
         self._sent_at[self._counted % _REMEMBERED] = time.time()

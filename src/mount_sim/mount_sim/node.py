@@ -28,6 +28,7 @@ from mount_ros.private_rclpy import given_at_start
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults import injected_faults
+from mount_sim.electronics.vehicle_bus import speed_frame
 from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
 from mount_sim.parameters import NodeParameters, SimParameters
@@ -87,7 +88,8 @@ class MountSim(SafeLifecycleNode):
             own = values_of_mount(self._values, name)
             can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate)
             self._can_ends.append(can_end)
-            self._loops[name] = ElectronicsLoop(mount, can_end, partial(self._publish, name))
+            speed = speed_frame(idle.frequency) if (idle := self._settings.idle).speed_sent else None
+            self._loops[name] = ElectronicsLoop(mount, can_end, partial(self._publish, name), speed)
         self._loop = CarLoop(self._loops, drift, rate)
         self._counted = SlidingWindow({})
         self._ending.clear()

@@ -14,6 +14,7 @@ from mount_driver.can_library import can
 from mount_driver.protocol import MountCodec
 from mount_models.quantity import ParameterError, nearest
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
+from mount_sim.electronics.vehicle_bus import IDENTIFIER as SPEED
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
 
@@ -111,8 +112,9 @@ _EVERY = 3  # chosen: of so many samples one has damaged frames
 _REORDERED = 10  # chosen: of so many samples one overtakes the one before
 _REPLAYED = 100  # samples, chosen: age of the frames that are sent again
 _BABBLED = 5  # frames in each sample, chosen: about what a bus of 500 kbit/s and 2 Mbit/s can carry besides
-_OWN = {_CODEC.measurement.frame_id, _CODEC.setpoint.frame_id, _CODEC.status.frame_id}
+_OWN = {_CODEC.measurement.frame_id, _CODEC.setpoint.frame_id, _CODEC.status.frame_id, SPEED}
 _FOREIGN = [number for number in range(0x800) if number not in _OWN]
+_SPEED_ABSURD, _SPEED_WRONG = b'\xff\xff', (4 * 1500).to_bytes(2, 'little')  # chosen: 16383 and 1500 rpm
 _LENGTH_LESS = 4  # bytes; CAN FD knows 24 and 20
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
 _ERROR_BYTES = 8
@@ -204,6 +206,18 @@ def _babbling(fault, frames):
     numbers = fault.random.uniform(_BABBLED)
     foreign = (Frame(_FOREIGN[int(number * len(_FOREIGN))], number.tobytes()) for number in numbers)
     return [*frames, *foreign]
+
+
+def _speed(sent):
+    """Send these two bytes for the speed of the engine, or none of its messages."""
+
+    def changed(fault, frames):
+        for frame in frames:
+            if frame.arbitration_id == SPEED and sent:
+                frame.data[3:5] = sent
+        return [frame for frame in frames if sent or frame.arbitration_id != SPEED]
+
+    return changed
 
 
 def _drifting_clock(fault, counters):
@@ -323,6 +337,9 @@ FAULTS: dict[str, Kind] = {
     'wrong_length': _bus('the frames of every third sample are 4 bytes too short', _damaged(_shorten)),
     'replayed': _bus('behind each frame comes one of 100 samples ago once more', _replayed),
     'babbling': _bus('5 frames with foreign identifiers in each sample', _babbling),
+    'engine_speed_stopped': _bus('the vehicle sends the speed of its engine no more', _speed(b'')),
+    'engine_speed_absurd': _bus('the vehicle sends a speed that no engine has', _speed(_SPEED_ABSURD)),
+    'engine_speed_wrong': _bus('the speed stands at 1500 turns a minute', _speed(_SPEED_WRONG)),
     'deaf': _bus('setpoints are not received', deaf=True),
     'clock_jump': _bus(
         'the microsecond counter is 10 s ahead', counters=lambda _, count: (count[0], count[1] + _CLOCK_JUMP)

@@ -78,6 +78,9 @@ class IdleForce(NamedTuple):
     second_share: Annotated[
         float, Quantity('1', 'amplitude of the second harmonic over that of the first', 0.0, 2.0)
     ] = 0.4
+    speed_sent: Annotated[
+        bool, Quantity('1', 'send the turns of the crank on the bus, and let mount_driver read them')
+    ] = False
 
 
 class TipIn(NamedTuple):

@@ -5,6 +5,7 @@ from enum import IntEnum
 from typing import Annotated, Any, NamedTuple
 
 from mount_models.quantity import ParameterError, Quantity, nearest
+from mount_sim.electronics.vehicle_bus import READ_BY_DRIVER
 
 
 class Contents(IntEnum):
@@ -75,8 +76,13 @@ def simulated_mounts(settings: Settings) -> str:
 
 
 def with_control_of_mount(settings: Settings) -> dict[str, dict[str, Any]]:
-    """Return the settings of the nodes with policy and switching as the mount in the seat needs them."""
+    """Return the settings of the nodes with what the simulated car needs of them.
+
+    Policy and switching for the mount in the seat; a driver that reads the speed of an engine that sends it.
+    """
     completed = {node: dict(values) for node, values in settings.items()}
+    if settings.get('mount_sim', {}).get('idle.speed_sent'):
+        completed['mount_driver'] = {**READ_BY_DRIVER, **completed.get('mount_driver', {})}
     if seat_of(settings) == ALWAYS_ON:
         completed['mount_control'] = {**NEEDED, **completed.get('mount_control', {})}
     return completed

@@ -16,6 +16,7 @@ from mount_ros.messages.force_table import table_message
 from mount_ros.messages.scalars import OneNumberLayout, Rows, ScalarsLayout
 from mount_ros.topics import Topic
 from mount_sim.electronics.electronics import status_every
+from mount_sim.electronics.vehicle_bus import received_velocity, sent_every
 from mount_sim.plant.plant import TRUTH
 from mount_sim.plant.simulated_car import mount_parameters
 from mount_sim.quantisation import quantised_coil_temperature
@@ -61,11 +62,14 @@ class CoreMessages:
         rate = mount_parameters(sim, mount).sample_rate
         self._coil_celsius = coil_temperature(sim, mount)
         self._status_period = status_every(rate) * sample_time_ns(rate)
+        self._speed = sent_speed(sim)
+        self._speed_period = sent_every(rate) * sample_time_ns(rate)
         self._write = write
         self._write_columns = write_columns or self._one_by_one
         self._displacement = ScalarsLayout(topics.DISPLACEMENT)
         self._ripple = ScalarsLayout(topics.COIL_RIPPLE)
         self._temperature = OneNumberLayout(temperature)
+        self._engine_speed = ScalarsLayout(topics.ENGINE_SPEED)
         self._setpoint = ScalarsLayout(topics.CURRENT_SETPOINT)
         self._air_gap = ScalarsLayout(topics.AIR_GAP)
         self._truth = ScalarsLayout(topics.SIM_TRUTH)
@@ -77,7 +81,7 @@ class CoreMessages:
         stamps = samples.stamps[: samples.count]
         for begin, end in _alike(samples.traced[: samples.count]):
             part = slice(begin, end)
-            self._write_with_temperatures(self._columns(samples, part), stamps[part])
+            self._write_with_slow(self._columns(samples, part), stamps[part])
         samples.count = 0
 
     def write_off(self, stamp: int) -> None:
@@ -91,13 +95,19 @@ class CoreMessages:
         table = table_message(stamp, result.table)
         self._write(topics.CURRENT_FORCE_TABLE, table, stamp)
 
-    def _write_with_temperatures(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
-        """Write the columns up to each sample with a status, then the temperature of that, and go on."""
-        begin = 0
-        for end in (np.flatnonzero(stamps % self._status_period == 0) + 1).tolist():
+    def _write_with_slow(self, columns: Columns, stamps: NDArray[np.int64]) -> None:
+        """Write the columns up to each sample with a status or a speed, then what these carry, and go on."""
+        begin, status = 0, stamps % self._status_period == 0
+        speed = (stamps % self._speed_period == 0) & (self._speed is not None)
+        for end in (np.flatnonzero(status | speed) + 1).tolist():
             self._write_columns([(topic, rows[begin:end]) for topic, rows in columns], stamps[begin:end])
             stamp = int(stamps[end - 1])
-            self._write(topics.COIL_TEMPERATURE, self._temperature.pack(stamp, self._coil_celsius), stamp)
+            if status[end - 1]:
+                message = self._temperature.pack(stamp, self._coil_celsius)
+                self._write(topics.COIL_TEMPERATURE, message, stamp)
+            if speed[end - 1]:
+                message = self._engine_speed.pack(stamp, (math.nan,), (self._speed or 0.0,))
+                self._write(topics.ENGINE_SPEED, message, stamp)
             begin = end
         if begin < len(stamps):
             self._write_columns([(topic, rows[begin:]) for topic, rows in columns], stamps[begin:])
@@ -135,6 +145,12 @@ def _alike(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     changes = (np.flatnonzero(np.diff(flags)) + 1).tolist()
     if len(flags):
         yield from zip([0, *changes], [*changes, len(flags)], strict=True)
+
+
+def sent_speed(values: Mapping[str, Any]) -> float | None:
+    """Return the speed (rad/s) of the engine as it arrives, None where it is not sent; `values` as below."""
+    idle = mount_parameters(values).idle
+    return received_velocity(idle.frequency) if idle.speed_sent else None
 
 
 def coil_temperature(values: Mapping[str, Any], mount: str = '') -> float:

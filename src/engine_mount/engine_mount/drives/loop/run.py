@@ -12,7 +12,14 @@ from typing import Protocol
 import numpy as np
 
 from engine_mount.drives.loop import compiled_loop as loop
-from engine_mount.drives.loop.messages import CoreMessages, Samples, Write, WriteColumns, coil_temperature
+from engine_mount.drives.loop.messages import (
+    CoreMessages,
+    Samples,
+    Write,
+    WriteColumns,
+    coil_temperature,
+    sent_speed,
+)
 from engine_mount.settings.chosen import Parameters, chosen_control, chosen_initialisation
 from engine_mount.settings.options import settings_of_mounts
 from engine_mount.signals.excitation import build_excitation
@@ -22,6 +29,7 @@ from mount_init.estimate import TemperatureReadings
 from mount_init.initialisation import InitialisationResult
 from mount_sim.electronics.electronics import Reading, status_every
 from mount_sim.electronics.faults import check_without_bus
+from mount_sim.electronics.vehicle_bus import sent_every
 from mount_sim.excitation.excitation import Excitation
 from mount_sim.plant.mounts import ALONE
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedCar, SimulatedMount, mount_parameters
@@ -87,8 +95,12 @@ class CoreChain:
 class MountRun:
     """One simulated mount with the chain that answers it; samples and result go to `sink`."""
 
-    def __init__(self, mount: SimulatedMount, chain: CoreChain, coil_celsius: float, sink: Sink):
-        self.mount, self.chain = mount, chain
+    def __init__(
+        self, mount: SimulatedMount, chain: CoreChain, coil_celsius: float, sink: Sink, speed: float | None
+    ):
+        """`speed` (rad/s) of the engine as it arrives, None where the vehicle does not send it."""
+        self.mount, self.chain, self._speed = mount, chain, speed
+        self._speed_period = sent_every(mount.sample_rate) * mount.sample_time  # ns
         self._celsius, self._sink = coil_celsius, sink
         self._with_status = status_every(mount.sample_rate)
         self.samples = Samples(BLOCK, chain.control.policy)
@@ -109,6 +121,7 @@ class MountRun:
             chain.temperatures.take(stamp, self._celsius)
         reading = Reading(*loop.over_the_bus(*mount.measure()))
         setpoint = chain.answer(stamp, reading)
+        self._take_speed(stamp)
         trace = chain.loop.trace
         samples.stamps[place] = stamp
         samples.readings[place] = reading
@@ -143,7 +156,7 @@ class MountRun:
             controller.memory,
             (plausibility.limits, plausibility.memory),
             chain.control.parameters.displacement_range,
-            np.zeros(len(ahead.values)),
+            np.full(len(ahead.values), chain.loop.engine_speed.at(self.stamp)),  # it idles at one speed
             self._pending,
             samples.readings[part],
             samples.setpoints[part],
@@ -156,8 +169,15 @@ class MountRun:
             samples.traced[part] = True
             samples.count += taken
             chain.loop.follow(int(samples.stamps[samples.count - 1]), taken)
+            for stamp in samples.stamps[part].tolist():
+                self._take_speed(stamp)
             mount.skip(taken, last)
         return taken
+
+    def _take_speed(self, stamp: int) -> None:
+        """Let the control take what the vehicle sends with the sample of a stamp (ns)."""
+        if self._speed is not None and stamp % self._speed_period == 0:
+            self.chain.loop.engine_speed.take(stamp, self._speed, stamp)
 
     def end(self) -> None:
         """Write the remaining samples, and 0 A as mount_control answers when it is deactivated."""
@@ -199,9 +219,10 @@ def run_core_into(
         check_sample_rate(own)
         check_without_bus(mount_parameters(values, name).faults)
     car = SimulatedCar(values, excitation or build_excitation(mount_parameters(values)))
+    speed = sent_speed(values)
     of_mounts = sinks if isinstance(sinks, Mapping) else {ALONE: sinks}
     runs = [
-        MountRun(car.mounts[name], CoreChain(own), coil_temperature(values, name), of_mounts[name])
+        MountRun(car.mounts[name], CoreChain(own), coil_temperature(values, name), of_mounts[name], speed)
         for name, own in settings.items()
     ]
     alone, last = len(runs) == 1, runs[-1].mount
