@@ -101,6 +101,21 @@ def test_lockstep_equals_the_core_run_at_2_khz_and_nothing_counts_as_lost(comman
 
 
 @pytest.mark.slow
+def test_lockstep_equals_core_run_and_replay_where_the_engine_sends_its_speed(command):
+    options = ('--duration', '0.5', '--set', 'mount_sim.idle.amplitude=60')
+    both = _drive_both(command, *options, '--set', 'mount_sim.idle.speed_sent=true')
+    lockstep, core = (_payloads(result.folder, 'engine_speed') for result in both)
+    assert len(core) > 340
+    assert lockstep == core
+    for result in both:
+        trace = engine_mount.open(result.folder / 'recording')['control_trace']
+        assert np.unique(trace['crank_frequency']) == pytest.approx([13.35], abs=0.003)
+        replayed = replay(result.folder / 'recording')
+        assert replayed.agreement is not None
+        assert replayed.agreement.equal
+
+
+@pytest.mark.slow
 def test_lockstep_equals_the_core_run_over_a_measured_road(command):
     places = np.arange(0.0, 12.0, 0.02)  # m
     height = 0.01 * np.sin(2.0 * np.pi * places / 1.1) + 0.004 * np.sin(2.0 * np.pi * places / 0.3)

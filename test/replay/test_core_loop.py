@@ -19,6 +19,10 @@ CASES = {
     'a noise that is not believed': ({'electronics.displacement_noise': 3e-4}, {}),
     'longer than is bridged': ({'bench.frequency': 3.0}, {'displacement_range': NARROW}),
     'an excitation on the chassis': ({'scenario': 'motorway'}, {}),
+    'an engine that sends its speed': (
+        {'scenario': 'motorway', 'idle.amplitude': 60.0, 'idle.speed_sent': True},
+        {},
+    ),
 }
 
 

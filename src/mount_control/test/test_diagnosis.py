@@ -7,24 +7,26 @@ from bursts import check_burst
 
 from mount_control.control_loop import SampleCounts
 from mount_control.diagnosis import counted_since, verdict
+from mount_control.engine_speed import EngineSpeed
 from mount_ros.nodes.diagnostics import Level, SlidingWindow
 
 DOUBT = 'displacement moved at 2.00 m/s (limit 1 m/s)'
 BURST = SampleCounts(samples=90, invalid=10, implausible=10, bridged=50)
 
 
-def judged(counts=None, lately=None, silence=0.0, doubt='', held=False, **changes):
+def judged(counts=None, lately=None, silence=0.0, doubt='', held=False, doubted=0, speed=None, **changes):
     """The verdict on a loop at work, some of whose figures are changed."""
     counts = counts or SampleCounts(samples=10_000)
     loop = SimpleNamespace(
         counts=counts,
         plausibility=SimpleNamespace(sentence=doubt, held=held),
+        engine_speed=speed or EngineSpeed(),
         **{
             'refusal': '', 'damping_active': False, 'current': 0.0, 'last': 123_000_000, 'faults': 0,
             'foreign': '', 'writer_doubt': '', **changes,
         },
     )  # fmt: skip
-    return verdict(loop, lately or counts, 0, silence, 0.020, {'policy': 'switched_viscous'})
+    return verdict(loop, lately or counts, doubted, silence, 0.020, {'policy': 'switched_viscous'})
 
 
 ERRORS = {
@@ -89,3 +91,13 @@ def test_a_burst_is_warned_of_in_the_same_words_for_as_long_as_the_window_lasts(
         return judged(counts, counted_since(window.earlier(time, counts), counts), doubt='step')
 
     check_burst(judge)
+
+
+def test_a_speed_of_the_engine_that_is_doubted_or_stopped_is_a_warning_and_none_is_nothing():
+    assert judged().level is Level.OK
+    speed = EngineSpeed()
+    speed.take(1_000_000, 1e9, 1_000_000)
+    found = judged(doubted=1, speed=speed)
+    assert found.level is Level.WARN
+    assert 'none for more than 0.1 s; look at mount_driver' in found.sentence
+    assert 'in 1 messages (limit: none in 10 s); the last: 9549296586 turns a minute' in found.sentence

@@ -94,7 +94,7 @@ def test_another_level_is_believed_once_an_engine_can_have_reached_it():
     for ms in range(0, 120, 10):
         speed.take(NOW + ms * MS, rad(14.0 if ms < 30 else 30.0), NOW + ms * MS)
         known.append(at(speed, ms + 5))
-    assert known == pytest.approx([14.0] * 3 + [0.0] * 7 + [30.0] * 2)  # 2 Hz and 200 Hz/s
+    assert known == pytest.approx([14.0] * 3 + [0.0] * 6 + [30.0] * 3)  # 2 Hz and 200 Hz/s
 
 
 def test_a_time_of_the_displacement_that_goes_back_begins_anew():

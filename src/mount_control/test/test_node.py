@@ -311,6 +311,40 @@ def test_while_a_writer_may_be_one_that_was_killed_control_answers_0_ampere_and_
     assert _answers(around, 402)[-1][1] > 0.4
 
 
+def test_the_speed_of_the_engine_is_traced_until_another_node_publishes_it_too_and_damping_goes_on(
+    active, around, stranger
+):
+    control, layout = active(), ScalarsLayout(topics.ENGINE_SPEED)
+    assert 'engine_speed' not in control.judge().sentence
+    vehicle = around.path.publisher(topics.ENGINE_SPEED)
+    wait_until(lambda: vehicle.get_subscription_count(), 'the control')
+
+    def send_speed(ms):
+        vehicle.publish(layout.pack(ACTIVATION + ms * MS, (math.nan,), (30.0 * math.pi,)))
+
+    _shake(around, sine)
+    send_speed(400)
+    wait_until(lambda: control.loop.engine_speed.last, 'the speed')
+    for ms in (404, 405):
+        around.send(ms)
+    assert _answers(around, 402)[-1][1] > 0.4
+    wait_until(lambda: around.traces[-1][0] == 405.0, 'the traces')
+    assert [trace['crank_frequency'] for _, trace in around.traces[-2:]] == [0.0, pytest.approx(15.0)]
+    other = stranger(topics.ENGINE_SPEED)
+    wait_until(lambda: send_speed(406) or control.loop.engine_speed.conflict, 'the other')
+    for ms in (412, 413):
+        around.send(ms)
+    assert _answers(around, 404)[-1][1] > 0.4
+    wait_until(lambda: around.traces[-1][0] == 413.0, 'the traces')
+    assert around.traces[-1][1]['crank_frequency'] == 0.0
+    verdict = control.judge()
+    assert verdict.level is Level.WARN
+    assert 'engine_speed not used, the law follows the displacement alone: ' in verdict.sentence
+    assert 'must not publish engine_speed too (limit: one writer, mount_driver)' in verdict.sentence
+    other.destroy_node()
+    wait_until(lambda: send_speed(420) or not control.loop.engine_speed.conflict, 'its end')
+
+
 def test_deactivation_leaves_0_ampere_and_silence(active, around):
     control = active()
     assert _shake(around, sine)[-1][1] > 0.4

@@ -19,7 +19,7 @@ from mount_ros.messages.cdr import message_class
 from mount_ros.messages.scalars import ScalarsLayout, temperature_of
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
-from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT
+from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT, ENGINE_SPEED
 
 MS = 1_000_000
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -251,3 +251,60 @@ def test_the_driver_takes_the_heating_of_a_specimen_file(make_driver, tmp_path):
 
 def test_a_heating_that_makes_no_sense_is_refused(make_driver):
     assert make_driver(**{'heating.limit_celsius': 130.0}).trigger_configure() == FAILURE
+
+
+VEHICLE = """VERSION ""
+NS_ :
+BS_:
+BU_: Engine
+BO_ 640 Engine: 8 Engine
+ SG_ Speed : 0|16@1+ (0.5,0) [0|8000] "rpm" Engine
+"""
+
+
+@pytest.fixture
+def vehicle(tmp_path):
+    """Return the parameters that read the speed of the engine on the mount's own bus."""
+    (tmp_path / 'vehicle.dbc').write_text(VEHICLE)
+    values = {'dbc': str(tmp_path / 'vehicle.dbc'), 'message': 'Engine', 'signal': 'Speed'}
+    return {f'engine_speed.{name}': value for name, value in values.items()}
+
+
+def test_the_speed_of_the_engine_is_published_on_the_time_axis_of_the_displacement(
+    active, controller, far, vehicle
+):
+    speeds = []
+    layout = ScalarsLayout(ENGINE_SPEED)
+    controller.path.subscribe(ENGINE_SPEED, lambda raw: speeds.append(layout.unpack(raw)))
+    driver = active(lockstep=False, **vehicle)
+    wait_until(lambda: driver._speed._bus is not None, 'the bus')
+    before = time.time_ns()
+    far.send_raw(640, bytes([1680 & 0xFF, 1680 >> 8, *bytes(6)]))
+    far.send(sample(0))
+    controller.wait_for(1)
+    wait_until(lambda: speeds, 'the speed')
+    ((stamp, (angle,), (velocity,)),) = speeds
+    assert velocity == pytest.approx(28.0 * math.pi)
+    assert math.isnan(angle)
+    assert before - 50 * MS < stamp < time.time_ns() + 50 * MS
+    assert abs(stamp - controller.received[DISPLACEMENT][0][0]) < 1000 * MS
+    assert driver.trigger_deactivate() == SUCCESS
+    assert driver.trigger_activate() == SUCCESS
+
+
+def test_a_dbc_without_the_signal_is_refused_at_configure(make_driver, vehicle):
+    driver = make_driver(**vehicle | {'engine_speed.signal': 'Sped'})
+    assert driver.trigger_configure() == FAILURE
+    assert driver.sentence == "engine_speed.signal: 'Sped' is no signal of Engine; did you mean Speed?"
+
+
+def test_a_vehicle_bus_that_is_not_there_costs_the_mount_nothing(active, controller, far, vehicle):
+    controller.path.subscribe(ENGINE_SPEED, lambda raw: None)
+    driver = active(**vehicle, **{'engine_speed.interface': 'socketcan', 'engine_speed.channel': 'can7'})
+    for index in range(3):
+        far.send(sample(index))
+        controller.wait_for(index + 1)
+        controller.setpoint(index * MS, 1.0)
+        assert far.setpoint() == Setpoint(1.0, index, True)
+    wait_until(lambda: 'engine_speed is not read: CAN interface' in driver.judge().sentence, 'the sentence')
+    assert driver.judge().level is Level.WARN

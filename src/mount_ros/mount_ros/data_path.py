@@ -82,6 +82,7 @@ class DataPath:
         """Who publishes the subscribed topics; `on_conflict` is called when others begin or cease to."""
         self._serving, self._stopped = False, False
         self._publishers: list[Publisher] = []
+        self._optional: set[str] = set()  # full names of subscribed topics that may have no publisher
         self._senders, self._receivers = ExitStack(), ExitStack()  # what passes directly, and ends with it
         self._polls: list[Poll] = []
 
@@ -131,13 +132,16 @@ class DataPath:
         """Call `callback` with the serialised bytes of each message of `topic`.
 
         `directly`: in the thread of a sender in this process, where time (not lock-step) allows it.
-        `on_conflict` takes what others publish on this topic alone; the path's own one is not called then.
+        `on_conflict`: the topic is optional, and its other publishers are reported to this function alone.
         """
 
         def create() -> None:
             kind, qos = message_class(topic.type), control_qos(topic, lockstep=self.lockstep)
             subscription = self.node.create_subscription(kind, topic.name, callback, qos, raw=True)
-            watch = PublisherWatch(self.node, on_conflict) if on_conflict else self.publisher_watch
+            watch = self.publisher_watch
+            if on_conflict:
+                watch = PublisherWatch(self.node, on_conflict)
+                self._optional.add(subscription.topic_name)
             direct = directly and self._direct
             subscription.callback = self._receiver(topic, subscription, callback, watch, direct)
 
@@ -165,7 +169,8 @@ class DataPath:
 
         Data sent before both sides have found each other is lost silently.
         """
-        alone = [s.topic_name for s in self.node.subscriptions if s.get_publisher_count() == 0]
+        subscribed = [s for s in self.node.subscriptions if s.topic_name not in self._optional]
+        alone = [s.topic_name for s in subscribed if s.get_publisher_count() == 0]
         alone += [p.topic_name for p in self._publishers if p.get_subscription_count() == 0]
         return sorted(set(alone))
 

@@ -102,6 +102,11 @@ def table(currents: tuple[float, ...], forces: tuple[float, ...], stamp: int = 0
     yield sound[: -len(numbers)] + numbers
 
 
+def engine_speed(raw: bytes) -> bytes:
+    """Return the speed of another engine at the time of a displacement."""
+    return ScalarsLayout(topics.ENGINE_SPEED).pack(stamp_of(raw), (math.nan,), (100.0,))
+
+
 _SOUND = (0.0, 1.0, 3.0), (0.0, 500.0, 1000.0)
 _EVENT = string_message('flood ' + 'x' * 100)
 
@@ -109,6 +114,7 @@ ON_BUS = {'can_host': second_host, 'can_electronics': second_electronics}
 MESSAGES: dict[str, tuple[topics.Topic, Reply | Iterator[bytes]]] = {
     'current_setpoint': (topics.CURRENT_SETPOINT, setpoint),
     'displacement': (topics.DISPLACEMENT, displacement),
+    'engine_speed': (topics.ENGINE_SPEED, engine_speed),
     'air_gap': (topics.AIR_GAP, air_gap()),
     'table': (topics.CURRENT_FORCE_TABLE, table(*_SOUND)),
     'table_old': (topics.CURRENT_FORCE_TABLE, table(*_SOUND, 1_000_000_000)),
