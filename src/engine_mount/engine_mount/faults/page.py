@@ -30,6 +30,10 @@ and only the two directions of its law are exchanged (motorway drive in core: pe
 of 1.44 mm, rms 0.107 instead of 0.113 mm, 0.970 instead of 0.993 J; the friction force misses the wanted one
 by 16 instead of 0.4 %). What is told is the jump where it turns farther away (`displacement_flipped`).
 
+The speed of the engine (`engine_speed_*`, `second_engine_speed`) only helps the law to find the engine's
+line. What is doubted is not used and told, and damping goes on: friction takes energy out of the mount at any
+speed. A wrong one that an engine can have (`engine_speed_wrong`) is told while it jumps there.
+
 Required of every fault: at most 3 A on the bus; no traceback; no sample missing in the recording, but
 for what the fault itself takes from it; no process, file of shared memory or held lock left behind. A
 sentence has a value, its limit and a remedy. And by its group:
