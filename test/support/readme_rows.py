@@ -9,7 +9,7 @@ def readme_rows(parameters, prefix: str = '') -> Iterator[str]:
     """Yield a row for each number of a parameter set, with default, unit, range and meaning."""
     for name, note in quantities(parameters).items():
         default = getattr(parameters, name)
-        if isinstance(default, int | float):
+        if isinstance(default, int | float) and not isinstance(default, bool):
             yield (
                 f'| `{prefix}{name}` | {default:g} | {note.unit} '
                 f'| {note.low:g} .. {note.high:g} | {note.meaning} |'
