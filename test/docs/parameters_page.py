@@ -69,7 +69,9 @@ def notes_of(parameters: NamedTuple, prefix: str) -> Iterator[tuple[str, Quantit
 
 def row(name: str, default: Any, note: Quantity) -> str:
     """Return the row of one parameter."""
-    if isinstance(default, (int, float)):
+    if isinstance(default, bool):
+        value = str(default).lower()
+    elif isinstance(default, (int, float)):
         value = 'unknown' if math.isnan(default) else f'{default:g}'
     else:
         value = f'`{default}`' if default else 'empty'
