@@ -1,10 +1,10 @@
-"""The engine's line: what ignition leaves in the displacement, at an unknown frequency from 18 to 217 Hz.
+"""The engine's lines: what ignition leaves in the displacement, from 18 to 217 Hz.
 
-A running engine shakes itself with a line and twice its frequency. A bank of resonators, one for each hertz,
-shows at which frequency the high-passed displacement moves fastest; from there two oscillators follow the
-line and its double; the phase of the first corrects the common frequency (a phase-locked loop of second
-order). The gain and phase of the high-pass are known and taken back, so that both lines can be subtracted
-from the displacement and carried ahead in time.
+A running engine shakes itself at multiples of half the frequency of its crankshaft. Where that frequency is
+not known, half the frequency of the fastest line takes its place: a bank of resonators, one for each hertz,
+shows it. Oscillators at the first twelve multiples follow the lines in the high-passed displacement. Each
+counts by how clearly it stands above the rest. The gain and phase of the high-pass are known and taken back,
+so that the lines can be subtracted from the displacement and carried ahead in time.
 """
 
 import math
@@ -19,19 +19,24 @@ from mount_models.arithmetic.record import record_type
 
 LOWEST_FREQUENCY = 18.0  # Hz, chosen: four cylinders at 540 turns per minute
 RESONATORS = 200  # 1 Hz apart
+LINES = 12  # orders 0.5 to 6 of the crankshaft
+WINDOW = 2 * (RESONATORS + LINES)
+"""Numbers of memory: phasors (m) of the resonators, then of the lines; real parts, then imaginary parts."""
 _FIRST_FREQUENCY = 27.0  # Hz, chosen: an idling engine
 _CORNER = 24.0  # Hz, chosen: of the high-pass, four poles; engine and wheel shake at 6 to 13 Hz
 _MEMORY = 0.35  # s, chosen: time constant of the resonators
 _SEARCH = 16  # samples, chosen: from one search in the bank to the next
-_STRONGER = 2.4  # chosen: ratio of squared velocities at which the line moves to another frequency
-_ELSEWHERE = 2  # Hz, chosen: the loop itself follows nearer frequencies
+_STRONGER = 2.4  # chosen: ratio of squared velocities at which the fastest line moves to another frequency
+_ELSEWHERE = 2  # Hz, chosen: a nearer frequency is gone to gradually
+_GRADUALLY = 0.05  # chosen: share of the way to it in a search
 _FOLLOWING = 6.5
 """1/s: share of the deviation from the expected sample that a line takes up in a time (chosen)."""
-_PULLING = 9.0
-"""Hz/s by which the frequency follows (chosen)."""
-_SMALLEST_LINE = 8e-6  # m, chosen: smaller ones pull the frequency less
-_LARGEST_DEVIATION = 2.5e-5  # m, chosen: a larger one, beyond twice the line, is an impact
-_AMPLITUDE_TIME = 0.04  # s, chosen
+_DOUBT = 0.08  # chosen: share of the rest's mean square that a line must exceed to count by half
+_KNOWN = 0.5  # chosen: so much of `_FOLLOWING` and `_DOUBT` where the frequency is known
+_SMALLEST_SQUARE = 1e-18  # m^2: of 1 nm, keeps 0 / 0 away
+_SAME_SPEED = 0.1  # chosen: a larger jump of the crankshaft's frequency leaves no line where it was
+_LARGEST_DEVIATION = 2.5e-5  # m, chosen: a larger one, beyond twice the lines, is an impact
+_AVERAGING_TIME = 0.04  # s, chosen: of the lines' velocity and acceleration
 _NOISE_TIME = 0.55  # s, chosen: longer than an impact
 
 
@@ -47,7 +52,6 @@ class EngineLine(NamedTuple):
     averaging: float
     noise_averaging: float
     following: float
-    pulling: float
     lead_samples: float
     sample_time: float
 
@@ -56,20 +60,19 @@ STATE = record_type(
     [
         (name, 'f8')
         for name in (
-            *('first_z1', 'first_z2', 'second_z1', 'second_z2'),
-            *('cosine_part', 'sine_part', 'double_real', 'double_imaginary'),
-            *('turns', 'amplitude', 'noise_square'),
+            *('first_z1', 'first_z2', 'second_z1', 'second_z2', 'spacing', 'fastest', 'amplitude'),
+            *('velocity', 'acceleration', 'deviation', 'deviation_square', 'noise_square'),
         )
     ]
     + [('samples', 'i8')]
 )
-"""Memory of both high-passes (m), phasors of line and double line behind them (m), frequency of the line
-(turns per sample), its amplitude in the displacement (m), mean square beside both lines (m^2), samples since
-the search. The bank is an array of `2 * RESONATORS`: real parts, imaginary parts (m)."""
+"""Memory of both high-passes (m), distance of the lines and frequency of the fastest (turns per sample);
+amplitudes of all lines together (m, m/s, m/s^2); what is left beside the lines (m), its mean square and that
+of white noise in it (m^2); samples since the search."""
 
 
 def design(lead_time: float, sample_time: float) -> EngineLine:
-    """Return the constants of a line that is predicted `lead_time` s ahead; Butterworth, prewarped."""
+    """Return the constants of lines that are predicted `lead_time` s ahead; Butterworth, prewarped."""
     sine, cosine = sine_and_cosine(0.5 * _CORNER * sample_time)
     warped = sine / cosine
     scale = 1.0 / (1.0 + math.sqrt(2.0) * warped + warped * warped)
@@ -80,10 +83,9 @@ def design(lead_time: float, sample_time: float) -> EngineLine:
         lowest=LOWEST_FREQUENCY * sample_time,
         highest=(LOWEST_FREQUENCY + RESONATORS - 1) * sample_time,
         first=_FIRST_FREQUENCY * sample_time,
-        averaging=sample_time / _AMPLITUDE_TIME,
+        averaging=sample_time / _AVERAGING_TIME,
         noise_averaging=sample_time / _NOISE_TIME,
         following=_FOLLOWING * sample_time,
-        pulling=_PULLING * sample_time * sample_time,
         lead_samples=lead_time / sample_time,
         sample_time=sample_time,
     )
@@ -101,55 +103,104 @@ def rest(line, state, displacement):
     """Set a state of zeros to that of a mount which has always been at `displacement` (m), no line in it."""
     state.first_z1 = -line.gain * displacement
     state.first_z2 = line.gain * displacement
-    state.turns = line.first
+    state.fastest = line.first
+    state.spacing = 0.5 * line.first
 
 
 @compiled
-def step(line, factors, state, bank, displacement):
-    """Take one sample (m); return both lines: displacement (m) now, displacement and velocity (m/s) ahead."""
+def step(line, factors, state, window, displacement, crank_frequency):
+    """Take one sample (m) and the frequency of the crankshaft (Hz, 0.0: unknown); return all lines together.
+
+    These are their displacement (m) now and, when a force acts, displacement (m), velocity (m/s) and the
+    velocity that is low. Of a line (lowest frequency / its frequency)^2 counts as low; the displacement
+    ahead is without that part.
+    """
     once, state.first_z1, state.first_z2 = _high_pass(line, state.first_z1, state.first_z2, displacement)
     seen, state.second_z1, state.second_z2 = _high_pass(line, state.second_z1, state.second_z2, once)
+    bank, phasors = window[: 2 * RESONATORS], window[2 * RESONATORS :]
     _shake(factors, bank, (2.0 * line.sample_time / _MEMORY) * seen)
-    turns = state.turns
-    sine, cosine = sine_and_cosine(turns)
-    _follow(line, state, seen, cosine, sine)
     state.samples += 1
-    if state.samples >= _SEARCH:
+    share = 1.0
+    if crank_frequency > 0.0:
+        share = _KNOWN
+        _set_spacing(state, phasors, 0.5 * crank_frequency * line.sample_time)
+    elif state.samples >= _SEARCH:
         state.samples = 0
-        if _found(line, state, bank):
-            turns = state.turns
-            sine, cosine = sine_and_cosine(turns)
-
-    real, imaginary = _unfiltered(line, state.cosine_part, state.sine_part, cosine, sine)
-    double_real, double_imaginary = _unfiltered(
-        line, state.double_real, state.double_imaginary, cosine * cosine - sine * sine, 2.0 * sine * cosine
-    )
-    amplitude = math.sqrt(real * real + imaginary * imaginary)
-    state.amplitude += line.averaging * (amplitude - state.amplitude)
-    sine, cosine = sine_and_cosine(line.lead_samples * turns)
-    ahead, quarter = _turned(real, imaginary, cosine, sine)
-    double_ahead, double_quarter = _turned(
-        double_real, double_imaginary, cosine * cosine - sine * sine, 2.0 * sine * cosine
-    )
-    velocity = -2.0 * math.pi * turns / line.sample_time * (quarter + 2.0 * double_quarter)
-    return real + double_real, ahead + double_ahead, velocity
+        _search(line, state, bank, phasors)
+    sine, cosine = sine_and_cosine(state.spacing)
+    _follow(line, state, phasors, share * line.following, seen, cosine, sine)
+    return _sum(line, state, phasors, share * _DOUBT * state.deviation_square, cosine, sine)
 
 
 @compiled
-def _follow(line, state, seen, cosine, sine):
-    """Turn both phasors by one sample and correct them, and the frequency, by what was `seen` (m)."""
-    real, imaginary = _turned(state.cosine_part, state.sine_part, cosine, sine)
-    double_real, double_imaginary = _turned(
-        state.double_real, state.double_imaginary, cosine * cosine - sine * sine, 2.0 * sine * cosine
-    )
-    square = real * real + imaginary * imaginary
+def _set_spacing(state, phasors, turns):
+    """Set the distance of the lines; forget them where it jumps."""
+    if abs(turns - state.spacing) > _SAME_SPEED * turns:
+        phasors[:] = 0.0
+    state.spacing = turns
+
+
+@compiled
+def _follow(line, state, phasors, following, seen, cosine, sine):
+    """Turn the lines by one sample and correct them by what was `seen` (m).
+
+    `cosine` and `sine` are those of the distance of the lines.
+    """
+    expected, square = 0.0, 0.0
+    turn_real, turn_imaginary = 1.0, 0.0
+    for k in range(LINES):
+        turn_real, turn_imaginary = _turned(turn_real, turn_imaginary, cosine, sine)
+        real, imaginary = 0.0, 0.0
+        if line.lowest <= (k + 1) * state.spacing <= line.highest:
+            real, imaginary = _turned(phasors[k], phasors[LINES + k], turn_real, turn_imaginary)
+        phasors[k], phasors[LINES + k] = real, imaginary
+        expected += real
+        square += real * real + imaginary * imaginary
     limit = 2.0 * math.sqrt(square) + _LARGEST_DEVIATION
-    deviation = min(max(seen - real - double_real, -limit), limit)
-    state.noise_square += line.noise_averaging * (deviation * deviation - state.noise_square)
-    pull = line.pulling * imaginary * deviation / (square + _SMALLEST_LINE * _SMALLEST_LINE)
-    state.turns = min(max(state.turns - pull, line.lowest), line.highest)
-    state.cosine_part, state.sine_part = real + line.following * deviation, imaginary
-    state.double_real, state.double_imaginary = double_real + line.following * deviation, double_imaginary
+    deviation = min(max(seen - expected, -limit), limit)
+    change = deviation - state.deviation
+    state.deviation = deviation
+    state.deviation_square += line.noise_averaging * (deviation * deviation - state.deviation_square)
+    state.noise_square += line.noise_averaging * (0.5 * change * change - state.noise_square)
+    for place in range(LINES):
+        if line.lowest <= (place + 1) * state.spacing <= line.highest:
+            phasors[place] += following * deviation
+
+
+@compiled
+def _sum(line, state, phasors, doubt, cosine, sine):
+    """Return the sums over all lines, see `step`, each by its power over that power and `doubt` (m^2)."""
+    now, high, velocity, low_velocity = 0.0, 0.0, 0.0, 0.0
+    of_displacement, of_velocity, of_acceleration, largest = 0.0, 0.0, 0.0, 0.0
+    lead_sine, lead_cosine = sine_and_cosine(line.lead_samples * state.spacing)
+    turn_real, turn_imaginary, lead_real, lead_imaginary = 1.0, 0.0, 1.0, 0.0
+    for k in range(LINES):
+        turn_real, turn_imaginary = _turned(turn_real, turn_imaginary, cosine, sine)
+        lead_real, lead_imaginary = _turned(lead_real, lead_imaginary, lead_cosine, lead_sine)
+        turns = (k + 1) * state.spacing
+        if line.lowest <= turns <= line.highest:
+            real, imaginary = phasors[k], phasors[LINES + k]
+            power = real * real + imaginary * imaginary
+            share = power / (power + doubt + _SMALLEST_SQUARE)
+            real, imaginary = _unfiltered(line, share * real, share * imaginary, turn_real, turn_imaginary)
+            rate = 2.0 * math.pi * turns / line.sample_time
+            square = real * real + imaginary * imaginary
+            velocity_square = rate * rate * square
+            of_displacement += square
+            of_velocity += velocity_square
+            of_acceleration += rate * rate * velocity_square
+            if velocity_square > largest:
+                largest, state.fastest = velocity_square, turns
+            ahead, quarter = _turned(real, imaginary, lead_real, lead_imaginary)
+            low = line.lowest / turns * (line.lowest / turns)
+            now += real
+            high += (1.0 - low) * ahead
+            velocity -= rate * quarter
+            low_velocity -= low * rate * quarter
+    state.amplitude = math.sqrt(of_displacement)
+    state.velocity += line.averaging * (math.sqrt(of_velocity) - state.velocity)
+    state.acceleration += line.averaging * (math.sqrt(of_acceleration) - state.acceleration)
+    return now, high, velocity, low_velocity
 
 
 @compiled
@@ -164,18 +215,34 @@ def _shake(factors, bank, push):
 
 
 @compiled
-def _found(line, state, bank):
-    """Move the line to the fastest resonator where this is elsewhere and clearly faster; return whether."""
-    best = 0
-    for k in range(1, RESONATORS):
-        if _speed_square(bank, k) > _speed_square(bank, best):
+def _search(line, state, bank, phasors):
+    """Move the fastest line to the fastest resonator: at once where this is elsewhere and clearly faster.
+
+    The squared amplitude of a resonator that is off a line by w is inverse to 1 + (w times its memory)^2, so
+    a parabola through three inverse squares has its vertex at the line.
+    """
+    here = min(max(int(2.0 * state.spacing / line.sample_time - LOWEST_FREQUENCY + 0.5), 1), RESONATORS - 2)
+    best, near, share = here, here, _GRADUALLY
+    for k in range(1, RESONATORS - 1):
+        speed = _speed_square(bank, k)
+        if speed > _speed_square(bank, best):
             best = k
-    here = min(max(int(state.turns / line.sample_time - LOWEST_FREQUENCY + 0.5), 0), RESONATORS - 1)
-    if abs(best - here) <= _ELSEWHERE or _speed_square(bank, best) <= _STRONGER * _speed_square(bank, here):
-        return False
-    state.turns = (LOWEST_FREQUENCY + best) * line.sample_time
-    state.cosine_part = state.sine_part = state.double_real = state.double_imaginary = 0.0
-    return True
+        if abs(k - here) <= _ELSEWHERE and speed > _speed_square(bank, near):
+            near = k
+    if abs(best - here) > _ELSEWHERE and _speed_square(bank, best) > _STRONGER * _speed_square(bank, near):
+        near, share = best, 1.0
+        phasors[:] = 0.0
+    below, above = _inverse_square(bank, near - 1), _inverse_square(bank, near + 1)
+    curvature = below + above - 2.0 * _inverse_square(bank, near)
+    offset = min(max(0.5 * (below - above) / curvature, -1.0), 1.0) if curvature > 0.0 else 0.0
+    turns = 0.5 * (LOWEST_FREQUENCY + near + offset) * line.sample_time
+    state.spacing += share * (turns - state.spacing)
+
+
+@compiled
+def _inverse_square(bank, k):
+    """Return the inverse square of a resonator's amplitude, in 1/m^2."""
+    return 1.0 / (bank[k] * bank[k] + bank[RESONATORS + k] * bank[RESONATORS + k] + _SMALLEST_SQUARE)
 
 
 @compiled

@@ -1,18 +1,19 @@
-"""A viscous damper that engages with the amplitude in the band, and cancels the engine's line meanwhile.
+"""A viscous damper that engages with the amplitude in the band, and cancels the engine's lines meanwhile.
 
-The force comes from the unfiltered velocity without the engine's line, so that friction is small where the
+The force comes from the unfiltered velocity without the engine's lines, so that friction is small where the
 true velocity reverses; the band-pass only sets the degree of damping. While the slow motion fixes the
-direction of friction, its size is modulated against the line's force in the elastomer.
+direction of friction, its size is modulated against the force of the lines in the elastomer.
 
-    x_n = x - line,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the line
-    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight (w_l / w0)^3 a,  A_n = 37 times the noise
+    x_n = x - lines,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the lines
+    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight a_l / w0^2,  A_n = 50 times the noise
     q = A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2),  g follows q, fast up, slowly down
-    s = max(v_n sign v, 0)
-    |F| = min(max(c g (sqrt(s^2 + d^2) - d) - K kappa x_l sign v, 0), 2 c g |v|)
+    s = max((v_n + 0.5 v_low) sign v, 0),  D^2 = d^2 + (0.4 v_l)^2
+    |F| = min(max(c g (sqrt(s^2 + D^2) - D) - K x_high sign v, 0), 2 c g |v|)
 
-v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is designed so that v_n has
-phase 0 at the eigenfrequency, tracker and delay of the loop included. a and w_l are the amplitude and the
-frequency of the line, x_l its displacement when the force acts, kappa = a^2 / (a^2 + a_0^2). Figures:
+v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is the lead and the lag of the
+tracker. v_l and a_l are the amplitudes of the lines' velocity and acceleration; x_high and v_low are their
+displacement and velocity when the force acts, weighted as in `engine_line`: near 18 Hz the chassis and the
+harmonics of friction answer, so there a line is damped rather than cancelled. Figures:
 docs/explanation/policy.md.
 """
 
@@ -23,7 +24,7 @@ from mount_control import band_pass, engine_line
 from mount_control.delay import LOOP_DELAY, check_lead, delay_at
 from mount_control.policy.contract import Design
 from mount_models.arithmetic.compiled import compiled
-from mount_models.arithmetic.elementary import expm1, log, sine_and_cosine
+from mount_models.arithmetic.elementary import expm1, log
 from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
@@ -32,9 +33,9 @@ _REVERSAL_SLOPE = 2.0
 """So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
 _LEAST_DEGREE = 0.03
 """Degree of damping below which there is no current (chosen): the offset current alone would rub."""
-_NOISE_WEIGHT = 1369.0  # chosen: square of how much noise of the displacement releases the damper
-_CLEAR_LINE = 7.5e-6  # m, chosen: amplitude a_0 of a line that is half cancelled
-_SMALLEST_SQUARE = 1e-14  # m^2: of 0.1 um, keeps 0 / 0 away
+_NOISE_WEIGHT = 2500.0  # chosen: square of how much noise of the displacement releases the damper
+_LINE_DAMPING = 0.5  # chosen: share of the damper that a line at the lowest frequency feels
+_LINE_ROUNDING = 0.4  # chosen: share of the lines' velocity below which the force falls off
 
 
 class Parameters(NamedTuple):
@@ -62,10 +63,10 @@ class Parameters(NamedTuple):
     position_gain: Annotated[
         float,
         Quantity('1', 'alpha of the tracker at 1 kHz; large: quick, noisy', 0.1, 0.95),
-    ] = 0.58
+    ] = 0.6
     damping_coefficient: Annotated[
         float, Quantity('N s/m', 'c: force over velocity, fully engaged', 1.0, 1e4)
-    ] = 3200.0
+    ] = 3000.0
     rounding_velocity: Annotated[
         float,
         Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
@@ -75,14 +76,14 @@ class Parameters(NamedTuple):
     ] = 0.00013
     engaging_time: Annotated[
         float, Quantity('s', 'time constant by which the degree of damping rises', 0.001, 1.0)
-    ] = 0.008
+    ] = 0.01
     releasing_time: Annotated[float, Quantity('s', 'and by which it falls', 0.001, 10.0)] = 0.14
     line_weight: Annotated[
-        float, Quantity('1', 'how much a line of the engine releases the damper; 0: not at all', 0.0, 100.0)
-    ] = 0.02
+        float, Quantity('1', 'how much lines of the engine release the damper; 0: not at all', 0.0, 100.0)
+    ] = 0.28
     line_stiffness: Annotated[
-        float, Quantity('N/m', 'K: force of the line that friction cancels, by displacement', 0.0, 1e6)
-    ] = 8e4
+        float, Quantity('N/m', 'K: force of the lines that friction cancels, by displacement', 0.0, 1e6)
+    ] = 2e5
 
 
 class Law(NamedTuple):
@@ -93,7 +94,7 @@ class Law(NamedTuple):
     sample_time: float
     alpha: float
     beta_rate: float
-    band_share: float
+    velocity_share: float
     w0: float
     damping: float
     rounding: float
@@ -126,7 +127,6 @@ TRACE = {
 def design(parameters: Parameters, sample_time: float) -> Design:
     """Return the law; raises `ParameterError` for too long a lead."""
     check_lead(parameters.lead_time, parameters.eigenfrequency)
-    turns = parameters.eigenfrequency * sample_time
     w0 = 2.0 * math.pi * parameters.eigenfrequency
     alpha = _alpha(parameters.position_gain, sample_time)
     lead_time = delay_at(parameters.lead_time, sample_time)
@@ -138,18 +138,18 @@ def design(parameters: Parameters, sample_time: float) -> Design:
             sample_time=sample_time,
             alpha=alpha,
             beta_rate=beta / sample_time,
-            band_share=_band_share(parameters.eigenfrequency, lead_time, alpha, beta, sample_time),
+            velocity_share=(lead_time + sample_time * (alpha / beta - 0.5)) * w0 * w0,
             w0=w0,
             damping=parameters.damping_coefficient,
             rounding=parameters.rounding_velocity,
             half_square=parameters.half_amplitude * parameters.half_amplitude,
             engaging=min(sample_time / parameters.engaging_time, 1.0),
             releasing=min(sample_time / parameters.releasing_time, 1.0),
-            line_weight=parameters.line_weight / (turns * turns * turns),
+            line_weight=parameters.line_weight / (w0 * w0),
             line_stiffness=parameters.line_stiffness,
         ),
         engine_line.rotations(sample_time),
-        2 * engine_line.RESONATORS,
+        engine_line.WINDOW,
     )
 
 
@@ -161,30 +161,6 @@ def _alpha(position_gain: float, sample_time: float) -> float:
     if sample_time == SAMPLE_TIME:
         return position_gain
     return -expm1(log(1.0 - position_gain) * (sample_time / SAMPLE_TIME))
-
-
-def _band_share(
-    eigenfrequency: float, lead_time: float, alpha: float, beta: float, sample_time: float
-) -> float:
-    """Return T w0^2 (1/s).
-
-    The tracker's velocity is V = (beta/Ts) z (z - 1) / (z^2 + (alpha + beta - 2) z + 1 - alpha) of the
-    displacement, the band-pass at its centre is 1. V - T w0^2 shall have the phase 90 degrees and the lead,
-    so T w0^2 = Re V + Im V tan(lead).
-    """
-    # in real numbers: how products of complex ones are rounded differs between processors
-    sine, cosine = sine_and_cosine(eigenfrequency * sample_time)
-    square_real, square_imaginary = cosine * cosine - sine * sine, 2.0 * cosine * sine
-    rate = beta / sample_time
-    above_real, above_imaginary = rate * (square_real - cosine), rate * (square_imaginary - sine)
-    sum_of_gains = alpha + beta - 2.0
-    below_real = square_real + sum_of_gains * cosine + (1.0 - alpha)
-    below_imaginary = square_imaginary + sum_of_gains * sine
-    scale = 1.0 / (below_real * below_real + below_imaginary * below_imaginary)
-    real = (above_real * below_real + above_imaginary * below_imaginary) * scale
-    imaginary = (above_imaginary * below_real - above_real * below_imaginary) * scale
-    lead_sine, lead_cosine = sine_and_cosine(eigenfrequency * lead_time)
-    return real + imaginary * lead_sine / lead_cosine
 
 
 @compiled
@@ -205,32 +181,38 @@ def transfer(law, new_law, state, window, new_window):
 @compiled
 def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N), velocity (m/s) at which it acts, and the degree 0 .. 1."""
-    line_now, line_ahead, line_velocity = engine_line.step(law.line, table, state.line, window, displacement)
-    engine = displacement - line_now
+    lines = state.line
+    now, ahead, line_velocity, low_velocity = engine_line.step(
+        law.line, table, lines, window, displacement, crank_frequency
+    )
+    engine = displacement - now
     banded, _, band_velocity = band_pass.step(law.band, state.band, engine)
-    engine_velocity = _tracked(law, state, engine) - law.band_share * banded
+    engine_velocity = _tracked(law, state, engine) - law.velocity_share * banded
     velocity = engine_velocity + line_velocity
 
     in_band = band_velocity / law.w0
     square = banded * banded + in_band * in_band
-    line_square = state.line.amplitude * state.line.amplitude
-    _set_degree(law, state, square, line_square)
+    of_lines = law.line_weight * lines.acceleration
+    others = law.half_square + of_lines * of_lines + _NOISE_WEIGHT * lines.noise_square
+    wanted = square / (square + others)
+    state.degree += (law.engaging if wanted > state.degree else law.releasing) * (wanted - state.degree)
 
     trace.band_displacement = banded
     trace.amplitude = math.sqrt(square)
-    trace.line_amplitude = state.line.amplitude
-    trace.line_frequency = state.line.turns / law.sample_time
+    trace.line_amplitude = lines.amplitude
+    trace.line_frequency = lines.fastest / law.sample_time
     trace.engine_velocity = engine_velocity
     trace.predicted_velocity = velocity
     if state.degree < _LEAST_DEGREE:
         return 0.0, velocity, 0.0
     direction = -1.0 if velocity < 0.0 else 1.0
-    speed = max(direction * engine_velocity, 0.0)
-    rounded = math.sqrt(speed * speed + law.rounding * law.rounding) - law.rounding
-    cancelled = law.line_stiffness * line_square / (line_square + _CLEAR_LINE * _CLEAR_LINE) * line_ahead
+    speed = max(direction * (engine_velocity + _LINE_DAMPING * low_velocity), 0.0)
+    of_lines = _LINE_ROUNDING * lines.velocity
+    rounding = math.sqrt(law.rounding * law.rounding + of_lines * of_lines)
     damping = law.damping * state.degree
+    damper = damping * (math.sqrt(speed * speed + rounding * rounding) - rounding)
     force = min(
-        max(damping * rounded - direction * cancelled, 0.0), _REVERSAL_SLOPE * damping * abs(velocity)
+        max(damper - direction * law.line_stiffness * ahead, 0.0), _REVERSAL_SLOPE * damping * abs(velocity)
     )
     return direction * force, velocity, state.degree
 
@@ -243,14 +225,3 @@ def _tracked(law, state, displacement):
     state.position = expected + law.alpha * surprise
     state.velocity += law.beta_rate * surprise
     return state.velocity
-
-
-@compiled
-def _set_degree(law, state, square, line_square):
-    """Let the degree of damping follow the squares of the amplitudes (m^2) in the band and of the line."""
-    turns = state.line.turns
-    per_amplitude = law.line_weight * turns * turns * turns
-    line = per_amplitude * per_amplitude * line_square
-    others = law.half_square + line + _NOISE_WEIGHT * state.line.noise_square
-    wanted = square / (square + others + _SMALLEST_SQUARE)
-    state.degree += (law.engaging if wanted > state.degree else law.releasing) * (wanted - state.degree)
