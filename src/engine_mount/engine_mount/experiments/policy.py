@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from engine_mount.experiments.bound import MEASURES
 from engine_mount.experiments.harness.closed_loop import run_cases
-from engine_mount.experiments.harness.drawing import HYDRO_LINE, OFF_LINE, new_panels
+from engine_mount.experiments.harness.drawing import GREY, HYDRO_LINE, OFF_LINE, legend_below, new_panels
 from engine_mount.experiments.harness.experiment import (
     EVEN,
     PAPER,
@@ -30,6 +31,7 @@ from engine_mount.experiments.harness.measures import (
 )
 from engine_mount.experiments.policy_cases import (
     ABLATIONS,
+    BOUND_WEIGHTS,
     COMPARED,
     CONTINUOUS,
     DISTURBANCES,
@@ -48,6 +50,7 @@ from engine_mount.experiments.policy_cases import (
     Key,
     PolicyParameters,
     cases_of,
+    windows,
 )
 from engine_mount.experiments.policy_page import page_of
 from engine_mount.reports.drawing.chart import COLOUR_OF
@@ -97,6 +100,8 @@ def run(order: Order) -> Findings:
         pictures['policy_sweep'] = draw_sweeps(found, [level for level, _ in shown['sweep']])
     if shown['gap']:
         pictures['policy_gap'] = draw_gap(found, *shown['gap'][0])
+    if 'bound' in figures:
+        pictures['policy_bound'] = draw_bound(figures['bound'])
     pages = {f'{NAME}.md': page_of(figures, pictures.keys())}
     judged = [figures | {'who': who} for who in POLICIES]
     return Findings(figures, pictures, (), pages, *judged)
@@ -178,6 +183,8 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         'limits': limits_of(found, axes),
         'idle_amplitude_n': idle,
     }
+    if own.bound:
+        figures['bound'] = {name: bound_of(found, name) for name in windows(idle)}
     if not own.thorough:
         return figures
     engines = {f'{frequency:g} Hz by {how}': (how, frequency) for how, frequency in axes.plants}
@@ -263,6 +270,21 @@ def variant(found: Found, key: Key, axes: Axes, idle: float) -> dict[str, Any]:
         'acceleration': quiet,
         'acceleration_idling': idling,
         'j_per_km': found[*key, CONTINUOUS, 'road', 0.0]['wear_j_per_km'],
+    }
+
+
+def bound_of(found: Found, name: str) -> Values:
+    """Return a window's figures over those without current: of mounts, ideal dampers, the best by weight."""
+    without = found['bound', OFF, name]
+
+    def ratios(figures: Values) -> Values:
+        wear = {key: figures[key] for key in ('wear_w',) if key in figures}
+        return {measure: figures[measure] / without[measure] for measure in MEASURES} | wear
+
+    return {
+        'mounts': {who: ratios(found['bound', who, name]) for who in COMPARED},
+        'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
+        'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
 
 
@@ -419,6 +441,32 @@ def draw_gap(found: Found, depth: float, seed: int) -> Any:
         panel.plot(time[shown], 1e3 * displacement[shown], linewidth=width, label=who, **_LINES[who])
     panel.set(xlabel='time from the gap on (s)', ylabel='displacement (mm)')
     panel.legend()
+    return figure
+
+
+def draw_bound(windows: Values) -> Any:
+    """Draw acceleration over displacement in each window: mounts, ideal dampers, the best forces."""
+    figure, panels = new_panels(
+        'The best force of the pads', -(-len(windows) // 2), 2, 4.0 * len(windows) / 2
+    )
+    for panel, (name, each) in zip(panels.flat, windows.items(), strict=False):
+        lines = {'best force, wear in W': (each['best'], 'k'), 'ideal dampers, N s/m': (each['ideal'], GREY)}
+        for label, (points, colour) in lines.items():
+            places = np.sqrt([[point[measure] for measure in MEASURES] for point in points.values()])
+            panel.plot(*places.T, 'o-', color=colour, markersize=4, label=label)
+            for key, point, place in zip(points, points.values(), places, strict=True):
+                panel.annotate(
+                    f'{point["wear_w"]:.2f}' if 'wear_w' in point else key, place, fontsize='small'
+                )
+        for who, point in each['mounts'].items():
+            panel.plot(
+                *np.sqrt([point[measure] for measure in MEASURES]), 's', color=_LINES[who]['color'], label=who
+            )
+        panel.set_title(name, fontsize='medium')
+        panel.set(xscale='log', yscale='log')
+    legend_below(figure, panels.flat[0], 3)
+    figure.supxlabel('displacement, 3 to 14 Hz, rms over no current')
+    figure.supylabel('chassis acceleration, 20 to 200 Hz, rms over no current')
     return figure
 
 
