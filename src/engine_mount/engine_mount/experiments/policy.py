@@ -39,6 +39,7 @@ from engine_mount.experiments.policy_cases import (
     FRONT,
     GAP_TIME,
     HYDRO,
+    KNOWN,
     NAMED,
     OFF,
     POLICIES,
@@ -46,10 +47,12 @@ from engine_mount.experiments.policy_cases import (
     ROADS,
     SHOCKS,
     SPEED,
+    UNSTABLE,
     Axes,
     Key,
     PolicyParameters,
     cases_of,
+    steady,
     windows,
 )
 from engine_mount.experiments.policy_page import page_of
@@ -176,9 +179,19 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
                     'ringing': over('rms_m', name, who, other=OFF),
                     'acceleration': over('acceleration', name, who, other=OFF),
                 }
-                for who in _SUPPORTED
+                for who in COMPARED
             }
             for name in PULLS
+        },
+        'steady': {
+            name: {
+                who: {
+                    'displacement': over('rms_m', 'steady', who, name),
+                    'acceleration': found['steady', who, name]['acceleration'],
+                }
+                for who in COMPARED
+            }
+            for name in steady()
         },
         'limits': limits_of(found, axes),
         'idle_amplitude_n': idle,
@@ -233,7 +246,15 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             for engine, plant in engines.items()
         },
         'engine': {
-            number(1e6 * road): {who: of_engine(who, road) for who in COMPARED} for road in ENGINE_ROADS
+            number(1e6 * road): {who: of_engine(who, road) for who in (*COMPARED, KNOWN)}
+            for road in ENGINE_ROADS
+        },
+        'rest': {
+            name: {
+                key: max(each[key] for of, each in found.items() if of[0] == 'rest' and of[2] == name)
+                for key in ('peak_m', 'force_n')
+            }
+            for name in UNSTABLE
         },
         'noise': {
             f'{road}, {who}': {
