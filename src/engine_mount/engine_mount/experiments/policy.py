@@ -21,12 +21,7 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import (
-    BELOW_ISOLATION,
-    FIRST_FREQUENCY,
-    RATE,
-    first_extremum,
     highest_per_band,
-    peak_in,
     swept_frequency,
 )
 from engine_mount.experiments.policy_cases import (
@@ -39,14 +34,15 @@ from engine_mount.experiments.policy_cases import (
     FRONT,
     GAP_TIME,
     HYDRO,
+    HYDROMOUNTS,
     KNOWN,
     NAMED,
+    NOMINAL,
     OFF,
     POLICIES,
     PULLS,
     ROADS,
     SHOCKS,
-    SPEED,
     UNSTABLE,
     Axes,
     Key,
@@ -58,18 +54,11 @@ from engine_mount.experiments.policy_cases import (
 from engine_mount.experiments.policy_page import page_of
 from engine_mount.reports.drawing.chart import COLOUR_OF
 from engine_mount.reports.drive.felt import ACCELERATIONS
-from engine_mount.reports.drive.signals import FloatArray
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
-from mount_sim.excitation.scenario import STEP_TIME, SweepScenario
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 NAME = 'policy'
 Found = dict[Key, Values]
 _SUPPORTED = (*POLICIES, OFF)
-_LIMIT_DAMPINGS = (910.0, 1100.0, 2000.0, 2600.0, 3000.0)  # N s/m
-_LIMIT_DELAYS = (0.0, 0.04, 0.065, 0.1, 0.15)  # s
-_LIMIT_DEPTH, _LIMIT_DAMPING = 0.02, 2000.0
 _CLEAR = 0.75  # chosen
 _BEFORE, _AFTER = 0.05, 0.8  # s, drawn round the gap
 _LINES: dict[str, Values] = {
@@ -129,12 +118,12 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         bands = [each for each in found['sweep', who, level, force]['rms'] if each is not None]
         return float(np.sqrt(np.sum(np.square(bands)))) if bands else math.nan
 
-    def high_ratio(force: float) -> Values:
+    def high_over(who: str, other: str, force: float) -> Values:
         levels = [level for level in axes.levels if not np.isnan(high(OFF, level, force))]
-        return {
-            who: {number(level): high(who, level, force) / high(OFF, level, force) for level in levels}
-            for who in (*POLICIES, HYDRO)
-        }
+        return {number(level): high(who, level, force) / high(other, level, force) for level in levels}
+
+    def high_ratio(force: float) -> Values:
+        return {who: high_over(who, OFF, force) for who in (*POLICIES, HYDRO)}
 
     def of_road(road: str, who: str) -> Values:
         quiet = found['road', who, road, 0.0]
@@ -193,7 +182,6 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             }
             for name in steady()
         },
-        'limits': limits_of(found, axes),
         'idle_amplitude_n': idle,
     }
     if own.bound:
@@ -209,6 +197,15 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             / found['robust', HYDRO, *plant, 'nominal', level]['peak_m']
             for level in axes.engine_levels
         )
+
+    def over_hydromount(who: str, other: str) -> Values:
+        both = zip(*(found['rack', mount, NOMINAL]['harmonics_n'] for mount in (who, other)), strict=True)
+        return {
+            'displacement': [over('peak_m', 'sweep', who, level, 0.0, other=other) for level in axes.levels],
+            'acceleration': [*high_over(who, other, 0.0).values()],
+            'acceleration_idling': [*high_over(who, other, idle).values()],
+            'lower_harmonics': [order for order, (own, its) in enumerate(both, 1) if own < its],
+        }
 
     def of_engine(who: str, roughness: float) -> Values:
         cases = list(product(axes.engine_frequencies, axes.engine_forces))
@@ -248,6 +245,9 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         'engine': {
             number(1e6 * road): {who: of_engine(who, road) for who in (*COMPARED, KNOWN)}
             for road in ENGINE_ROADS
+        },
+        'hydromounts': {
+            who: {other: over_hydromount(who, other) for other in HYDROMOUNTS} for who in POLICIES
         },
         'rest': {
             name: {
@@ -307,53 +307,6 @@ def bound_of(found: Found, name: str) -> Values:
         'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
         'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
-
-
-def limits_of(found: Found, axes: Axes) -> Values:
-    """Return what an ideal damper leaves: always on in the sweep, on after some delay over a gap."""
-    always, free = (gap_limit(_LIMIT_DEPTH, damping, 0.0) for damping in (_LIMIT_DAMPING, 0.0))
-    return {
-        'sweep_always_on': {
-            number(damping): {
-                number(level): sweep_limit(level, damping) / found['sweep', HYDRO, level, 0.0]['peak_m']
-                for level in axes.levels
-            }
-            for damping in _LIMIT_DAMPINGS
-        },
-        'gap_after_delay': {
-            number(1e3 * delay): gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, delay)[0] / free[0]
-            for delay in _LIMIT_DELAYS
-        },
-        'gap_first_extremum_always_on': always[1] / free[1],
-        'gap_damping': _LIMIT_DAMPING,
-        'gap_depth_m': _LIMIT_DEPTH,
-    }
-
-
-def sweep_limit(level: float, damping: float) -> float:
-    """Return the largest displacement (m) from 3 to 14 Hz with an ideal damper always on."""
-    seconds = (BELOW_ISOLATION[1] - FIRST_FREQUENCY) / RATE
-    time = STEP_TIME * np.arange(round(seconds / STEP_TIME))
-    displacement = damped(sweep_road(time, SweepScenario(velocity_amplitude=level)), damping)
-    return peak_in(swept_frequency(displacement.size), displacement, BELOW_ISOLATION) or math.nan
-
-
-def gap_limit(depth: float, damping: float, delay: float) -> tuple[float, float]:
-    """Return largest displacement and first extremum (m) over a gap of 1 m in a smooth road.
-
-    The damper is on `delay` s after the wheel meets the gap.
-    """
-    time = STEP_TIME * np.arange(round(1.0 / STEP_TIME))
-    road = gap_in_road(time, Gap(depth=depth, position=0.0, speed=SPEED))
-    displacement = damped(road, damping, round(delay / STEP_TIME))
-    return float(np.abs(displacement).max()), first_extremum(displacement)
-
-
-def damped(road: FloatArray, damping: float, first: int = 0) -> FloatArray:
-    """Return the displacement (m) at 1 kHz over a road (m) at the plant's step."""
-    still = np.zeros_like(road)
-    moved, _ = ride_without_friction(Vehicle(), resting_vehicle(), road, still, STEP_TIME, damping, first)
-    return moved[:: round(SAMPLE_TIME / STEP_TIME)]
 
 
 def _told(ratios: Values, unit: str) -> str:

@@ -38,6 +38,22 @@ NOMINAL = 8.0  # Hz
 _CASES = plain_yaml(importlib.resources.files(__package__).joinpath('policy_cases.yaml').read_text('utf-8'))
 DISTURBANCES, ABLATIONS = _CASES['disturbances'], _CASES['ablations']
 UNSTABLE = {name: DISTURBANCES[name] for name in _CASES['stability']}
+HYDROMOUNTS = {
+    f'R_d = {resistance:.0e} Pa s/m^3, asymmetry {asymmetry:g}': {
+        'mount': 'hydro',
+        'hydromount.decoupler_resistance': resistance,
+        'hydromount.compliance_asymmetry': asymmetry,
+    }
+    for resistance, asymmetry in product(_CASES['decoupler_resistances'], _CASES['chamber_asymmetries'])
+}
+"""Hydromounts that the paper's may have been, of which it gives nothing."""
+_MOUNTS: dict[str, Values] = {
+    **{policy: {'mount': 'friction'} for policy in POLICIES},
+    OFF: {'mount': 'friction_off'},
+    HYDRO: {'mount': 'hydro'},
+    KNOWN: {'mount': 'friction', 'idle.speed_sent': True},
+    **HYDROMOUNTS,
+}
 FRONT = list(product(_CASES['amplitudes'], _CASES['dampings']))
 """Half amplitudes (m) and damping coefficients (N s/m) that are run."""
 NAMED = {tuple(point): name for name, point in _CASES['points'].items()}
@@ -118,11 +134,10 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
     cases: dict[Key, Case] = {}
 
     def add(key: Key, sim: Values, figures: Any, changes: Mapping[str, Any] = NOTHING) -> None:
-        who = next(part for part in key if part in (*COMPARED, KNOWN))
-        policy = CONTINUOUS if who == KNOWN else who if who in POLICIES else PAPER
+        who = next(part for part in key if part in _MOUNTS)
+        policy = CONTINUOUS if who.startswith(CONTINUOUS) else PAPER
         control = {'policy': policy, **{f'{policy}.{name}': value for name, value in changes.items()}}
-        mount = {OFF: 'friction_off', HYDRO: 'hydro'}.get(who, 'friction')
-        cases[key] = Case(settings_of_run(order, {**sim, 'mount': mount}, control), figures)
+        cases[key] = Case(settings_of_run(order, {**sim, **_MOUNTS[who]}, control), figures)
 
     idles, seeds = (0.0, own.idle_amplitude), range(1, own.gap_seeds + 1)
     for level, idle, who in product(axes.levels, idles, COMPARED):
@@ -151,6 +166,11 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
             add(('bound', OFF, name, weight), sim, partial(bound.best, weight))
     if not own.thorough:
         return cases
+    for who in HYDROMOUNTS:
+        for level, idle in product(axes.levels, idles):
+            add(('sweep', who, level, idle), sweep_parameters(level, own.last_frequency, idle), peak_and_rms)
+    for who in (*POLICIES, *HYDROMOUNTS):
+        add(('rack', who, NOMINAL), {**_RACK, 'bench.frequency': NOMINAL}, of_rack)
     for who in COMPARED:
         add(('high', who, 'as driven'), {}, of_high_bands)
     for name, changes in _CASES['high frequencies'].items():
@@ -171,8 +191,6 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         ENGINE_ROADS, axes.engine_frequencies, axes.engine_forces, (*COMPARED, KNOWN)
     ):
         sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
-        if who == KNOWN:
-            sim['idle.speed_sent'] = True
         add(('engine', who, roughness, frequency, force), sim, of_road)
     for (road, roughness), noise, who in product(ROADS.items(), axes.noise, COMPARED):
         sim = _road(roughness, 6.0) | {'electronics.displacement_noise': 1e-6 * noise}
@@ -289,10 +307,11 @@ def of_high_bands(truth: Truth, sim: SimParameters) -> Values:
 
 
 def of_rack(truth: Truth, sim: SimParameters) -> Values:
-    """Return the harmonic distortion (%) of the mount force."""
+    """Return the harmonics of the mount force (N) and their distortion (%)."""
     frequency = sim.bench.frequency
     part, _ = whole_periods(truth.time, frequency, _PERIODS)
-    return {'thd': 100.0 * distortion(harmonics(truth.time[part], truth.mount_force[part], frequency))}
+    found = harmonics(truth.time[part], truth.mount_force[part], frequency)
+    return {'harmonics_n': found.tolist(), 'thd': 100.0 * distortion(found)}
 
 
 def of_road(truth: Truth, sim: SimParameters) -> Values:

@@ -11,7 +11,7 @@ from engine_mount.experiments.harness.closed_loop import at_each_step, truth_of_
 from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
 from engine_mount.experiments.registry import experiment
-from mount_models.quantity import with_flattened
+from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.parameters import SimParameters
 
@@ -63,10 +63,10 @@ def test_the_plant_that_its_setpoints_drive_again_goes_the_way_of_the_run():
     assert not np.array_equal(straight['chassis_acceleration'], again)
 
 
-def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():
-    assert policy.sweep_limit(0.06, 3000.0) < policy.sweep_limit(0.06, 1000.0)
-    peaks = [policy.gap_limit(0.02, 2000.0, delay)[0] for delay in (0.0, 0.065, 0.15)]
-    assert peaks[0] < peaks[1] < peaks[2]
+@pytest.mark.parametrize('text', ['fast', '0.1, 0.1', '0.1, 3'])
+def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
+    with pytest.raises(ParameterError, match=r'policy\.road_levels'):
+        experiment(policy.NAME, out=tmp_path, road_levels=text)
 
 
 @pytest.fixture(scope='module')
