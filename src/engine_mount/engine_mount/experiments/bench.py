@@ -172,7 +172,7 @@ def _on_harmonics(figures):
         answers.append(not missing)
     told = f"""Lower than the simulated hydromount: {'; '.join(texts)}. The even ones prove nothing: the
         simulated hydromount has them only through an assumed asymmetry of its upper chamber (see
-        docs/explanation/results.md)."""
+        docs/explanation/policy.md)."""
     return holds_if(answers), told
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from engine_mount.experiments.bound import MEASURES
 from engine_mount.experiments.harness.closed_loop import run_cases
-from engine_mount.experiments.harness.drawing import HYDRO_LINE, OFF_LINE, new_panels
+from engine_mount.experiments.harness.drawing import GREY, HYDRO_LINE, OFF_LINE, legend_below, new_panels
 from engine_mount.experiments.harness.experiment import (
     EVEN,
     PAPER,
@@ -20,16 +21,12 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import (
-    BELOW_ISOLATION,
-    FIRST_FREQUENCY,
-    RATE,
-    first_extremum,
     highest_per_band,
-    peak_in,
     swept_frequency,
 )
 from engine_mount.experiments.policy_cases import (
     ABLATIONS,
+    BOUND_WEIGHTS,
     COMPARED,
     CONTINUOUS,
     DISTURBANCES,
@@ -37,33 +34,31 @@ from engine_mount.experiments.policy_cases import (
     FRONT,
     GAP_TIME,
     HYDRO,
+    HYDROMOUNTS,
+    KNOWN,
     NAMED,
+    NOMINAL,
     OFF,
     POLICIES,
     PULLS,
     ROADS,
     SHOCKS,
-    SPEED,
+    UNSTABLE,
     Axes,
     Key,
     PolicyParameters,
     cases_of,
+    steady,
+    windows,
 )
 from engine_mount.experiments.policy_page import page_of
 from engine_mount.reports.drawing.chart import COLOUR_OF
 from engine_mount.reports.drive.felt import ACCELERATIONS
-from engine_mount.reports.drive.signals import FloatArray
 from mount_models.sampling import SAMPLE_TIME
-from mount_sim.excitation.road import Gap, gap_in_road, sweep_road
-from mount_sim.excitation.scenario import STEP_TIME, SweepScenario
-from mount_sim.plant.vehicle import Vehicle, resting_vehicle, ride_without_friction
 
 NAME = 'policy'
 Found = dict[Key, Values]
 _SUPPORTED = (*POLICIES, OFF)
-_LIMIT_DAMPINGS = (910.0, 1100.0, 2000.0, 2600.0, 3000.0)  # N s/m
-_LIMIT_DELAYS = (0.0, 0.04, 0.065, 0.1, 0.15)  # s
-_LIMIT_DEPTH, _LIMIT_DAMPING = 0.02, 2000.0
 _CLEAR = 0.75  # chosen
 _BEFORE, _AFTER = 0.05, 0.8  # s, drawn round the gap
 _LINES: dict[str, Values] = {
@@ -97,6 +92,8 @@ def run(order: Order) -> Findings:
         pictures['policy_sweep'] = draw_sweeps(found, [level for level, _ in shown['sweep']])
     if shown['gap']:
         pictures['policy_gap'] = draw_gap(found, *shown['gap'][0])
+    if 'bound' in figures:
+        pictures['policy_bound'] = draw_bound(figures['bound'])
     pages = {f'{NAME}.md': page_of(figures, pictures.keys())}
     judged = [figures | {'who': who} for who in POLICIES]
     return Findings(figures, pictures, (), pages, *judged)
@@ -121,12 +118,12 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
         bands = [each for each in found['sweep', who, level, force]['rms'] if each is not None]
         return float(np.sqrt(np.sum(np.square(bands)))) if bands else math.nan
 
-    def high_ratio(force: float) -> Values:
+    def high_over(who: str, other: str, force: float) -> Values:
         levels = [level for level in axes.levels if not np.isnan(high(OFF, level, force))]
-        return {
-            who: {number(level): high(who, level, force) / high(OFF, level, force) for level in levels}
-            for who in (*POLICIES, HYDRO)
-        }
+        return {number(level): high(who, level, force) / high(other, level, force) for level in levels}
+
+    def high_ratio(force: float) -> Values:
+        return {who: high_over(who, OFF, force) for who in (*POLICIES, HYDRO)}
 
     def of_road(road: str, who: str) -> Values:
         quiet = found['road', who, road, 0.0]
@@ -171,13 +168,24 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
                     'ringing': over('rms_m', name, who, other=OFF),
                     'acceleration': over('acceleration', name, who, other=OFF),
                 }
-                for who in _SUPPORTED
+                for who in COMPARED
             }
             for name in PULLS
         },
-        'limits': limits_of(found, axes),
+        'steady': {
+            name: {
+                who: {
+                    'displacement': over('rms_m', 'steady', who, name),
+                    'acceleration': found['steady', who, name]['acceleration'],
+                }
+                for who in COMPARED
+            }
+            for name in steady()
+        },
         'idle_amplitude_n': idle,
     }
+    if own.bound:
+        figures['bound'] = {name: bound_of(found, name) for name in windows(idle)}
     if not own.thorough:
         return figures
     engines = {f'{frequency:g} Hz by {how}': (how, frequency) for how, frequency in axes.plants}
@@ -189,6 +197,15 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             / found['robust', HYDRO, *plant, 'nominal', level]['peak_m']
             for level in axes.engine_levels
         )
+
+    def over_hydromount(who: str, other: str) -> Values:
+        both = zip(*(found['rack', mount, NOMINAL]['harmonics_n'] for mount in (who, other)), strict=True)
+        return {
+            'displacement': [over('peak_m', 'sweep', who, level, 0.0, other=other) for level in axes.levels],
+            'acceleration': [*high_over(who, other, 0.0).values()],
+            'acceleration_idling': [*high_over(who, other, idle).values()],
+            'lower_harmonics': [order for order, (own, its) in enumerate(both, 1) if own < its],
+        }
 
     def of_engine(who: str, roughness: float) -> Values:
         cases = list(product(axes.engine_frequencies, axes.engine_forces))
@@ -226,7 +243,18 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             for engine, plant in engines.items()
         },
         'engine': {
-            number(1e6 * road): {who: of_engine(who, road) for who in COMPARED} for road in ENGINE_ROADS
+            number(1e6 * road): {who: of_engine(who, road) for who in (*COMPARED, KNOWN)}
+            for road in ENGINE_ROADS
+        },
+        'hydromounts': {
+            who: {other: over_hydromount(who, other) for other in HYDROMOUNTS} for who in POLICIES
+        },
+        'rest': {
+            name: {
+                key: max(each[key] for of, each in found.items() if of[0] == 'rest' and of[2] == name)
+                for key in ('peak_m', 'force_n')
+            }
+            for name in UNSTABLE
         },
         'noise': {
             f'{road}, {who}': {
@@ -266,51 +294,19 @@ def variant(found: Found, key: Key, axes: Axes, idle: float) -> dict[str, Any]:
     }
 
 
-def limits_of(found: Found, axes: Axes) -> Values:
-    """Return what an ideal damper leaves: always on in the sweep, on after some delay over a gap."""
-    always, free = (gap_limit(_LIMIT_DEPTH, damping, 0.0) for damping in (_LIMIT_DAMPING, 0.0))
+def bound_of(found: Found, name: str) -> Values:
+    """Return a window's figures over those without current: of mounts, ideal dampers, the best by weight."""
+    without = found['bound', OFF, name]
+
+    def ratios(figures: Values) -> Values:
+        wear = {key: figures[key] for key in ('wear_w',) if key in figures}
+        return {measure: figures[measure] / without[measure] for measure in MEASURES} | wear
+
     return {
-        'sweep_always_on': {
-            number(damping): {
-                number(level): sweep_limit(level, damping) / found['sweep', HYDRO, level, 0.0]['peak_m']
-                for level in axes.levels
-            }
-            for damping in _LIMIT_DAMPINGS
-        },
-        'gap_after_delay': {
-            number(1e3 * delay): gap_limit(_LIMIT_DEPTH, _LIMIT_DAMPING, delay)[0] / free[0]
-            for delay in _LIMIT_DELAYS
-        },
-        'gap_first_extremum_always_on': always[1] / free[1],
-        'gap_damping': _LIMIT_DAMPING,
-        'gap_depth_m': _LIMIT_DEPTH,
+        'mounts': {who: ratios(found['bound', who, name]) for who in COMPARED},
+        'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
+        'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
-
-
-def sweep_limit(level: float, damping: float) -> float:
-    """Return the largest displacement (m) from 3 to 14 Hz with an ideal damper always on."""
-    seconds = (BELOW_ISOLATION[1] - FIRST_FREQUENCY) / RATE
-    time = STEP_TIME * np.arange(round(seconds / STEP_TIME))
-    displacement = damped(sweep_road(time, SweepScenario(velocity_amplitude=level)), damping)
-    return peak_in(swept_frequency(displacement.size), displacement, BELOW_ISOLATION) or math.nan
-
-
-def gap_limit(depth: float, damping: float, delay: float) -> tuple[float, float]:
-    """Return largest displacement and first extremum (m) over a gap of 1 m in a smooth road.
-
-    The damper is on `delay` s after the wheel meets the gap.
-    """
-    time = STEP_TIME * np.arange(round(1.0 / STEP_TIME))
-    road = gap_in_road(time, Gap(depth=depth, position=0.0, speed=SPEED))
-    displacement = damped(road, damping, round(delay / STEP_TIME))
-    return float(np.abs(displacement).max()), first_extremum(displacement)
-
-
-def damped(road: FloatArray, damping: float, first: int = 0) -> FloatArray:
-    """Return the displacement (m) at 1 kHz over a road (m) at the plant's step."""
-    still = np.zeros_like(road)
-    moved, _ = ride_without_friction(Vehicle(), resting_vehicle(), road, still, STEP_TIME, damping, first)
-    return moved[:: round(SAMPLE_TIME / STEP_TIME)]
 
 
 def _told(ratios: Values, unit: str) -> str:
@@ -419,6 +415,32 @@ def draw_gap(found: Found, depth: float, seed: int) -> Any:
         panel.plot(time[shown], 1e3 * displacement[shown], linewidth=width, label=who, **_LINES[who])
     panel.set(xlabel='time from the gap on (s)', ylabel='displacement (mm)')
     panel.legend()
+    return figure
+
+
+def draw_bound(windows: Values) -> Any:
+    """Draw acceleration over displacement in each window: mounts, ideal dampers, the best forces."""
+    figure, panels = new_panels(
+        'The best force of the pads', -(-len(windows) // 2), 2, 4.0 * len(windows) / 2
+    )
+    for panel, (name, each) in zip(panels.flat, windows.items(), strict=False):
+        lines = {'best force, wear in W': (each['best'], 'k'), 'ideal dampers, N s/m': (each['ideal'], GREY)}
+        for label, (points, colour) in lines.items():
+            places = np.sqrt([[point[measure] for measure in MEASURES] for point in points.values()])
+            panel.plot(*places.T, 'o-', color=colour, markersize=4, label=label)
+            for key, point, place in zip(points, points.values(), places, strict=True):
+                panel.annotate(
+                    f'{point["wear_w"]:.2f}' if 'wear_w' in point else key, place, fontsize='small'
+                )
+        for who, point in each['mounts'].items():
+            panel.plot(
+                *np.sqrt([point[measure] for measure in MEASURES]), 's', color=_LINES[who]['color'], label=who
+            )
+        panel.set_title(name, fontsize='medium')
+        panel.set(xscale='log', yscale='log')
+    legend_below(figure, panels.flat[0], 3)
+    figure.supxlabel('displacement, 3 to 14 Hz, rms over no current')
+    figure.supylabel('chassis acceleration, 20 to 200 Hz, rms over no current')
     return figure
 
 

@@ -247,7 +247,7 @@ Hz is known, and higher frequencies may
   more would also move the chassis, and the chassis would move the mount.
 - **The hydromount's parameters are chosen**, as are the elastomer's and the engine's mass: magnitudes as in
   the literature, not those of this car nor those of the authors. Their effect:
-  [results.md](results.md).
+  [policy.md](policy.md).
 - **Friction acts only after the displacement left {1e3 * figures['switch_on_level_m']:g} mm for one \
 period.** Such events are few in one drive:
   a figure over the whole drive mostly compares a soft spring with a hydromount, and figures of the events

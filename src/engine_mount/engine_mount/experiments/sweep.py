@@ -137,7 +137,7 @@ def _on_damping(figures):
         {', '.join(f'{name} {1e3 * peak:.2f}' for name, peak in peaks.items())}. So {share:.2f} of the
         hydromount; damping always on leaves {peaks[ALWAYS] / peaks[OFF]:.2f} of the undamped one. Counted as
         far higher below {FAR_HIGHER:g} of the hydromount (chosen). Against the hydromount this depends on
-        the road level (docs/explanation/results.md)."""
+        the road level (docs/explanation/policy.md)."""
     return share < FAR_HIGHER or (share < 1.0 and PARTLY), told
 
 
@@ -155,7 +155,7 @@ def _on_noise(figures):
     texts = (f'{ratio:.2f} ({low:.0f} to {high:.0f} Hz)' for (low, high), ratio in ratios.items())
     told = f"""Rms of the friction mount over that of the hydromount, engine off: {', '.join(texts)}. The
         paper gives neither the road level nor whether the engine ran; with an idling engine and on other
-        roads: docs/explanation/results.md."""
+        roads: docs/explanation/policy.md."""
     return holds_if([ratio < 1.0 for ratio in ratios.values()]), told
 
 
@@ -189,7 +189,7 @@ EXPERIMENT = Experiment(
     of its velocity (chosen). The same sweep is driven with the friction mount, the original
     hydromount, and the friction mount without current and with damping always on; displacement and
     chassis acceleration come from the recordings. The better of the two mounts depends on values that the
-    paper does not give: docs/explanation/results.md.""",
+    paper does not give: docs/explanation/policy.md.""",
     SweepParameters(),
     run,
     closed_loop=True,

@@ -1,4 +1,4 @@
-"""Rack, sweep, gap and their sensitivity on short versions, and the values that the laws lead to."""
+"""Rack, sweep and gap on short versions, and the values that the laws lead to."""
 
 import json
 import re
@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine_mount.experiments import bench, motorway_gap, sensitivity, sweep
+from engine_mount.experiments import bench, motorway_gap, policy_cases, sweep
 from engine_mount.experiments.harness.closed_loop import Case, run_case
 from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.registry import experiment
 from engine_mount.experiments.sweep import defined_peak
 from engine_mount.recordings.recording import open_recording
 from mount_models.damper import damper_curve
-from mount_models.quantity import ParameterError
 
 pytestmark = pytest.mark.slow
 
@@ -93,7 +92,7 @@ def test_half_the_step_of_the_plant_changes_no_odd_harmonic_by_half_a_percent(mo
         'electronics.ripple_noise': 0.0,
     }
     paper = {'policy': 'switched_viscous'}
-    case = Case({'mount_sim': quiet_bench, 'mount_control': paper}, sensitivity.rack_harmonics)
+    case = Case({'mount_sim': quiet_bench, 'mount_control': paper}, policy_cases.of_rack)
     found = []
     for step in (5e-5, 2.5e-5):
         monkeypatch.setattr('mount_sim.excitation.building.STEP_TIME', step)
@@ -159,34 +158,3 @@ def test_damping_comes_one_period_after_the_level_is_exceeded_and_leaves_less_ri
         assert found['rms_m'][motorway_gap.FRICTION] < 0.6 * found['rms_m'][motorway_gap.OFF]
     on_hydro = gaps.claims[-1]
     assert [on_hydro.holds, on_hydro.ours.holds] == [Holds.PARTLY, Holds.YES]
-
-
-# Sensitivity.
-
-
-def test_the_grid_is_run_in_processes_and_told_in_words(tmp_path):
-    settings = {
-        'road_levels': '0.06, 0.12',
-        'decoupler_resistances': '1e8,',
-        'chamber_asymmetries': '0.25, 0',
-        'idle_forces': '0,',
-        'last_frequency': 14.5,
-        'workers': 2,
-    }
-    order = sensitivity.EXPERIMENT.order(tmp_path, {sensitivity.NAME: settings})
-    outcome = sensitivity.EXPERIMENT.run(order)
-    check(outcome)
-    ratios = np.array(outcome.figures['peak_ratio'])[:, 0, 0, 0]
-    assert ratios[1] == pytest.approx(0.72, rel=0.03)
-    assert ratios[0] > 1.3
-    text = outcome.pages[0].read_text()
-    assert 'at V0 = 0.12 m/s it always wins; at V0 = 0.06 m/s it always loses' in text
-    assert [claim.holds for claim in outcome.claims] == [Holds.PARTLY, Holds.NOT_COMPARABLE, Holds.PARTLY]
-    orders = {each['chamber_asymmetry']: each['orders'] for each in outcome.figures['lower_harmonics']}
-    assert orders == {0.25: [1, 2, 3, 4, 5, 6, 7, 8], 0.0: [1, 3, 5, 7]}
-
-
-@pytest.mark.parametrize('text', ['fast', '0.1, 0.1', '0.1, 3'])
-def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
-    with pytest.raises(ParameterError, match=r'sensitivity\.road_levels'):
-        experiment(sensitivity.NAME, out=tmp_path, road_levels=text)

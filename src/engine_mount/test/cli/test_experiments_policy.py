@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from engine_mount.experiments import policy
+from engine_mount.experiments import bound, policy, policy_cases
 from engine_mount.experiments.harness import measures
 from engine_mount.experiments.harness.closed_loop import at_each_step, truth_of_run
 from engine_mount.experiments.harness.experiment import Holds
 from engine_mount.experiments.policy_cases import CONTINUOUS, POLICIES
 from engine_mount.experiments.registry import experiment
-from mount_models.quantity import with_flattened
+from mount_models.quantity import ParameterError, with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.parameters import SimParameters
 
@@ -22,6 +22,7 @@ SHORT = {
     'gap_seeds': 1,
     'rack_frequencies': '8,',
     'thorough': 0,
+    'bound': 0,
     'workers': 1,
 }
 
@@ -56,15 +57,58 @@ def test_the_plant_that_its_setpoints_drive_again_goes_the_way_of_the_run():
     values = {'timeline.start': 2.9, 'timeline.duration': 0.7, 'motorway.gap_time': 0.3}
     truth = truth_of_run({'mount_sim': values, 'mount_control': {}})
     sim = with_flattened(SimParameters(), values)
-    again = at_each_step(truth.current_setpoint, sim)
+    again = at_each_step(truth.current_setpoint, sim)['chassis_acceleration']
     np.testing.assert_array_equal(again[::20], truth.chassis_acceleration[:-1])
-    assert not np.array_equal(at_each_step(truth.current_setpoint, sim, straight=True), again)
+    straight = at_each_step(truth.current_setpoint, sim, straight=True)
+    assert not np.array_equal(straight['chassis_acceleration'], again)
 
 
-def test_ideal_damper_leaves_less_the_stronger_and_the_earlier_it_is():
-    assert policy.sweep_limit(0.06, 3000.0) < policy.sweep_limit(0.06, 1000.0)
-    peaks = [policy.gap_limit(0.02, 2000.0, delay)[0] for delay in (0.0, 0.065, 0.15)]
-    assert peaks[0] < peaks[1] < peaks[2]
+@pytest.mark.parametrize('text', ['fast', '0.1, 0.1', '0.1, 3'])
+def test_a_list_that_is_no_list_of_levels_is_refused(text, tmp_path):
+    with pytest.raises(ParameterError, match=r'policy\.road_levels'):
+        experiment(policy.NAME, out=tmp_path, road_levels=text)
+
+
+@pytest.fixture(scope='module')
+def short_window():
+    values = {'timeline.duration': 0.4, 'motorway.gap_time': 0.1, 'idle.amplitude': 100.0}
+    sim = with_flattened(SimParameters(), values)
+    return bound.Window(sim, 0.5, {'displacement': 1e-7, 'acceleration': 1e-2})
+
+
+def test_linear_car_goes_the_way_of_the_simulation(short_window):
+    short_window.cost(np.zeros(short_window.samples))
+    mean_squares, displacement = short_window.damped(0.0)
+    np.testing.assert_allclose(
+        short_window.rows[20::20, bound._DISPLACEMENT], displacement, rtol=1e-9, atol=1e-15
+    )
+    assert mean_squares['displacement'] > 1e-9
+
+
+def test_gradient_of_the_best_force_is_that_of_finite_differences(short_window):
+    levels = 60.0 * np.random.default_rng(2).random(short_window.samples)
+    _, gradient = short_window.cost(levels)
+    for sample in (50, 200, 390):
+        step = np.zeros_like(levels)
+        step[sample] = 1e-2
+        (above, _), (below, _) = (short_window.cost(levels + each) for each in (step, -step))
+        assert gradient[sample] == pytest.approx((above - below) / 2e-2, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_best_force_is_far_better_than_the_ideal_dampers():
+    values = policy_cases.windows(200.0)['idle, class A'] | {
+        'mount': 'friction_off',
+        'timeline.duration': 1.0,
+    }
+    truth = truth_of_run({'mount_sim': values, 'mount_control': {}})
+    sim = with_flattened(SimParameters(), values)
+    without = bound.of_ideal(truth, sim)
+
+    def cost(figures):
+        return np.mean([figures[name] / without[name] for name in bound.MEASURES])
+
+    assert cost(bound.best(0.5, truth, sim)) < 0.7 * min(map(cost, without['ideal'].values()))
 
 
 def test_first_extremum_is_the_first_clear_turning_point():

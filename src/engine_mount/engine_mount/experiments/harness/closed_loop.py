@@ -20,7 +20,7 @@ from mount_init.initialisation import InitialisationResult
 from mount_models.quantity import with_flattened
 from mount_models.sampling import SAMPLE_TIME
 from mount_sim.electronics.electronics import Noise
-from mount_sim.excitation.excitation import Shaking
+from mount_sim.excitation.excitation import Shaking, steps_of_sample
 from mount_sim.parameters import SimParameters
 from mount_sim.plant.mounts import ALWAYS_ON, with_control_of_mount
 from mount_sim.plant.plant import TRUTH, PlantSimulation
@@ -108,25 +108,27 @@ def truth_of_run(parameters: Settings) -> Truth:
     return Truth(time=SAMPLE_TIME * np.arange(len(records)), **columns)
 
 
-def at_each_step(setpoints: FloatArray, sim: SimParameters, *, straight: bool = False) -> FloatArray:
-    """Return the chassis acceleration (m/s^2) at each step of the plant, driven by `setpoints` (A, (n,)).
+def at_each_step(setpoints: FloatArray, sim: SimParameters, *, straight: bool = False) -> Any:
+    """Return the columns of `sim/truth` at each step of the plant, driven by `setpoints` (A, (n,)).
 
     These are the true ones at the samples of a run. With `straight` the current wanted goes to each of them
     in a straight line.
     """
     excitation = build_excitation(sim)
     plant = PlantSimulation(sim.plant, excitation.seat, excitation.step_time)
-    shaking, quiet, before, found = Shaking(excitation, sim.sample_rate), np.zeros(Noise.NUMBERS), 0.0, []
+    shaking, quiet, before = Shaking(excitation, sim.sample_rate), np.zeros(Noise.NUMBERS), 0.0
+    steps = steps_of_sample(sim.sample_rate, excitation.step_time)
+    found = np.zeros((len(setpoints) - 1, steps), TRUTH)
     for sample, wanted in enumerate(setpoints[1:].tolist()):  # a sample knows the one that led to it
         values, forces = shaking.at(shaking.start + sample)
         for step in range(len(values)):
             plant.read(quiet)
-            found.append(plant.truth['chassis_acceleration'])
+            found[sample, step] = plant.truth
             share = (step + 1) / len(values) if straight else 1.0
             part = slice(step, step + 1)
             plant.advance(values[part], forces[part], before + share * (wanted - before))
         before = wanted
-    return np.array(found)
+    return found.ravel()
 
 
 class _TruthSink:

@@ -28,8 +28,7 @@ NAMES = {
     'bench': ('Friction mount and hydromount on a test rack', 'Fig. 13'),
     'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
     'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
-    'sensitivity': ('Influences on the comparison with the hydromount', 'Figs. 13, 14'),
-    'policy': ('Control policies side by side', 'Figs. 14, 15; Secs. 1, 5 to 7'),
+    'policy': ('Control policies side by side', 'Figs. 13 to 15; Secs. 1, 5 to 7'),
     'recorded_drive': ('A recorded drive', 'Sec. 7'),
 }
 """{name of the experiment and its file: (title, section or figure of the paper)}."""
