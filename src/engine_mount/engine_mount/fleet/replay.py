@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import Rows, TableJob
+from engine_mount.fleet.job import Row, Rows, TableJob
 from engine_mount.fleet.places import Place, root_of, select_recordings
 from engine_mount.fleet.setpoints import (
     Compared,
@@ -18,13 +18,11 @@ from engine_mount.fleet.setpoints import (
     compare_setpoints,
     recorded_in,
 )
-from engine_mount.fleet.tables import Row
 from engine_mount.recordings.recording import open_mount, open_run, recording_hash, recording_place
 from engine_mount.recordings.session import versions_told
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import NoEffectError
-from engine_mount.signals.sources.stores import local_copy
-from engine_mount.signals.sources.uris import shown
+from engine_mount.signals.sources.stores import local_copy, shown
 from mount_recorder.versions import versions
 
 if TYPE_CHECKING:

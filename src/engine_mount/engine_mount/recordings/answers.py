@@ -55,25 +55,19 @@ class Control(NamedTuple):
         return self.inactive is not None and not _has_any(self.inactive, begin, end + _PAUSE)
 
 
-class Silence(NamedTuple):
-    """Between two setpoints (stamps in ns) none came in time while control was active: 0 A."""
-
-    begin: int
-    end: int
-
-
 @dataclass(frozen=True)
 class Answers:
     """How control answered: counts of samples, and the spans in which it was active.
 
     `asked` were taken while it was active; of these `unanswered` have no setpoint and `late` have one that
     was sent more than 20 ms after it, which the driver refuses (None: its clock is not that of the stamps).
+    Between the setpoints of a span of `silences` none came in time: 0 A.
     """
 
     asked: int = 0
     unanswered: int = 0
     late: int | None = None
-    silences: tuple[Silence, ...] = ()
+    silences: tuple[Span, ...] = ()
     spans: tuple[Span, ...] = ()
 
 
@@ -95,11 +89,11 @@ def judge_answers(samples: Times, setpoints: Setpoints, control: Control) -> Ans
         too_late = stamps[setpoints.sent[first] - stamps > _LATE]
         late = int(np.count_nonzero(spanned(too_late, spans) >= 0))
         in_time = answers[~is_in(answers, too_late)]
-    silences = []
+    silences = list[Span]()
     for begin, end in spans:
         ticks = np.concatenate([[begin], in_time[(in_time >= begin) & (in_time <= end)], [end]])
         long = np.flatnonzero(np.diff(ticks) > _LATE + _HALF_SAMPLE)
-        silences += [Silence(int(ticks[place]), int(ticks[place + 1])) for place in long]
+        silences += zip(ticks[long].tolist(), ticks[long + 1].tolist(), strict=True)
     unanswered = int(np.count_nonzero(~is_in(asked, answers)))
     return Answers(len(asked), unanswered, late, tuple(silences), tuple(spans))
 

@@ -258,7 +258,7 @@ def node_reports(recording: Recording) -> list[NodeReport]:
             for time, message in zip(series.receive_times.tolist(), series.messages(), strict=True)
             for verdict in verdicts_in(message)
         ]
-    except (ReadingError, SeriesError):
+    except ReadingError:
         return []
     return sorted(reports, key=lambda report: report.log_time)
 

@@ -21,7 +21,7 @@ from engine_mount.recordings.mcap_records import (
     FOOTER_LENGTH,
     RECORD,
     Chunk,
-    StorageError,
+    ReadingError,
     StoredMessages,
     StoredTopic,
     Summary,
@@ -69,7 +69,7 @@ class McapFile:
         self.proven = bool(summary.sound)
         """Whether its own account of its content can be relied upon."""
         if self._data[:_BEGIN] != MCAP0_MAGIC and not summary.sound and not any(scattered_chunks(self._data)):
-            raise StorageError(f'{path} is no MCAP file: its first bytes are not those of one')
+            raise ReadingError(f'{path} is no MCAP file: its first bytes are not those of one')
         if summary.complete:
             self._use_summary(summary)
         else:
@@ -246,7 +246,7 @@ class McapFile:
         """Use the records from `position` on; return where the last sensible one before `limit` ends."""
         for opcode, begin, end in records_in(self._data, position, limit):
             if opcode == Opcode.MESSAGE and not self.chunks:
-                raise StorageError(
+                raise ReadingError(
                     f'{self.path} has messages outside of chunks: '
                     f'copy it by rosbags-convert --src {self.path.name} --dst FOLDER and read that'
                 )
@@ -280,6 +280,6 @@ def _mapped(path: Path) -> mmap.mmap:
         with path.open('rb') as file:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
-        raise StorageError(f'{path} cannot be read: {error.strerror or error}') from None
+        raise ReadingError(f'{path} cannot be read: {error.strerror or error}') from None
     except ValueError:
-        raise StorageError(f'{path} is empty') from None
+        raise ReadingError(f'{path} is empty') from None

@@ -51,8 +51,8 @@ _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
 FOOTER_LENGTH = 20  # bytes behind opcode and length
 
 
-class StorageError(ValueError):
-    """A file holds no recording that can be read; the text gives the reason."""
+class ReadingError(ValueError):
+    """A recording, a topic or a column of it cannot be read; the text gives the reason."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import Any
 
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
-from engine_mount.recordings.series import SeriesError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE
 from mount_ros.topics import SESSION
@@ -19,7 +18,7 @@ _OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to ru
 _LISTED = 3  # parameters that only one names
 
 
-class SessionError(ValueError):
+class SessionError(ReadingError):
     """A session message is not understood; the text says why."""
 
 
@@ -81,7 +80,7 @@ def recorded_sample_rate(recording: Recording, namespace: str = '/') -> float:
         found = recorded_sessions(recording)
         text = found.get(f'{namespace}{SESSION.name}') or recorded_session(recording)
         return session_sample_rate(session_content(text))
-    except (SessionError, ReadingError, SeriesError):
+    except ReadingError:
         return SAMPLE_RATE
 
 
@@ -90,7 +89,7 @@ def told_session(recording: Recording) -> dict[str, Any]:
     try:
         text = recorded_session(recording) or next(iter(recorded_sessions(recording).values()), '')
         return session_content(text)
-    except (SessionError, SeriesError, ReadingError):
+    except ReadingError:
         return {}
 
 

@@ -23,7 +23,7 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count, mean
-from engine_mount.signals.sources.uris import name_of
+from engine_mount.signals.sources.stores import name_of
 from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, si_unit, unit_of
 
@@ -65,7 +65,7 @@ def select(
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
     uri = measured.provenance.uri
-    signals, quantities, columns, chosen = {}, {}, {}, []
+    signals, quantities, columns = {}, {}, {}
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
         if name not in mapping.others:
@@ -82,10 +82,6 @@ def select(
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
-        chosen.append((name, choice, wanted, column, base, notes))
-    measured = replace(measured, columns={})  # what the file holds of a column goes when it is converted
-    while chosen:
-        name, choice, wanted, column, base, notes = chosen.pop(0)
         where = f'{name_of(uri)}, column {column.name!r}'
         is_known = _known(where, column, base, whole=whole)
         own = replace(column, values=column.values[is_known])
@@ -101,8 +97,7 @@ def select(
         begin = base.begin + round(SECOND * float(times[0]))
         if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        times = times - times[0] if missing else base.from_first
-        signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
+        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
             'times': base.told, 'samples': int(values.size),

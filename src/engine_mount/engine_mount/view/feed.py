@@ -1,10 +1,10 @@
-"""Where messages come from: a running graph (`running_graph.py`), or a recording by the clock."""
+"""Where messages come from: a running graph, or a recording by the clock."""
 
 import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mount_bringup.graph.nodes import GraphError
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 
 _PERIOD = 0.01  # s, chosen
+_PERIOD_OF_GRAPH = 0.02  # s, chosen: less than a picture of the page
 
 
 class FeedError(GraphError):
@@ -126,3 +127,53 @@ class RecordedFeed:
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1
+
+
+class RunningGraph:
+    """The graph of one mount in a ROS domain and namespace."""
+
+    def __init__(self, domain: int, namespace: str = ''):
+        """Raises `FeedError` where no process can reach another."""
+        # ROS, which no recording needs
+        from rclpy.context import Context
+        from rclpy.node import Node
+
+        from mount_ros.environment import loopback_refusal, prepare_environment
+
+        if refusal := loopback_refusal():
+            raise FeedError(refusal)
+        prepare_environment()
+        self._context = Context()
+        self._context.init(domain_id=domain)
+        self._node = Node(
+            'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
+        )
+        self._collector: Any = None
+        self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
+        self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
+        self.zero: int | None = None
+        self._stopped = False
+
+    def start(self, receive: Receive, on_failure: Fail) -> None:
+        """Begin to take messages."""
+        from mount_recorder.collector import Collector
+        from mount_ros.qos import control_qos
+
+        self._collector = Collector(self._node, period=_PERIOD_OF_GRAPH, on_failure=on_failure)
+        for topic in TOPICS:
+            self._collector.collect(
+                topic,
+                lambda *found, own=topic: receive(Message(own, *found)),
+                control_qos(topic, lockstep=False),
+            )
+        self._collector.start()
+
+    def stop(self) -> None:
+        """End the subscriptions and leave the middleware."""
+        if self._stopped:
+            return
+        self._stopped = True
+        if self._collector is not None:
+            self._collector.stop()
+        self._node.destroy_node()
+        self._context.try_shutdown()

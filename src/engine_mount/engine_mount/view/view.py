@@ -32,7 +32,7 @@ def open_feed(
     if recording is not None:
         feed = RecordedFeed(recording, rate, begin, namespace)
     else:
-        from engine_mount.view.running_graph import RunningGraph  # ROS, which no recording needs
+        from engine_mount.view.feed import RunningGraph  # ROS, which no recording needs
 
         feed = RunningGraph(domain, namespace)
     try:
@@ -74,8 +74,7 @@ def serve_view(
 
     Raises `FeedError`, also amid it.
     """
-    from engine_mount.view.foxglove_server import FoxgloveServer
-    from engine_mount.view.web import Web
+    from engine_mount.view.web import FoxgloveServer, Web
 
     ending = threading.Event()
     with ExitStack() as stack:

@@ -10,7 +10,7 @@ from ros_testing import serialised
 from samples import PERIOD, RECORDED, START, joint_state
 
 import engine_mount
-from engine_mount.recordings.answers import Control, Setpoints, Silence, judge_answers
+from engine_mount.recordings.answers import Control, Setpoints, judge_answers
 from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import as_json, losses, sentences
 from engine_mount.recordings.times import NO_TIMES
@@ -52,7 +52,7 @@ def test_the_ramp_and_the_time_until_control_is_active_ask_for_nothing():
 def test_a_control_that_stalls_leaves_samples_unanswered_and_the_coil_at_0_ampere():
     found = judged(np.delete(SAMPLES, slice(1000, 1398)))
     assert (found.asked, found.unanswered) == (3000, 398)
-    assert found.silences == (Silence(SAMPLES[999], SAMPLES[1398]),)
+    assert found.silences == ((SAMPLES[999], SAMPLES[1398]),)
 
 
 @pytest.mark.parametrize(('missing', 'silent'), [(19, 0), (20, 1)])
@@ -66,7 +66,7 @@ def test_an_answer_that_was_sent_after_20_ms_is_late_and_ends_no_silence():
     sent[1000:1100] = SAMPLES[1100]  # all at once, the oldest 100 ms late
     found = judged(SAMPLES, sent=sent)
     assert (found.unanswered, found.late) == (0, 80)
-    assert found.silences == (Silence(SAMPLES[999], SAMPLES[1080]),)
+    assert found.silences == ((SAMPLES[999], SAMPLES[1080]),)
 
 
 def test_whether_answers_were_late_is_unknown_in_lock_step():

@@ -45,7 +45,7 @@ def open_bag(path: Path, stated: Stated) -> Content:
                 values.update(
                     {(topic, name): np.asarray(recording[topic][name], np.float64) for name in names}
                 )
-        except (ReadingError, SeriesError) as error:
+        except ReadingError as error:
             raise SignalError(str(error)) from None
 
     leaves = [

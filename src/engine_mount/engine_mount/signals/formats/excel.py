@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.signals.extras import required
 from engine_mount.signals.formats.cells import is_unit_row, titles_and_units
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError, required
 
 Row = tuple[Any, ...]
 MOST_CELLS = 20_000_000  # of a sheet, rows times width, chosen: 160 MB

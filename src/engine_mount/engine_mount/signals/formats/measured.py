@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from engine_mount.signals.signal import FloatArray, SignalError
-from engine_mount.signals.sources.uris import is_local, name_of, shown
+from engine_mount.signals.sources.stores import is_local, name_of, shown
 from engine_mount.signals.units import unit_of
 
 _LISTED = 40  # names in a refusal, chosen
@@ -43,11 +42,6 @@ class TimeBase:
     times: FloatArray
     begin: int
     told: str
-
-    @cached_property
-    def from_first(self) -> FloatArray:
-        """The times in s after the first, shared by the columns too."""
-        return self.times - self.times[0] if self.times[0] else self.times
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.signals.extras import required
 from engine_mount.signals.formats.arrays import leaves_of
 from engine_mount.signals.formats.cells import date_in, name_and_unit
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError, required
 
 _DEEPEST = 32  # groups of an HDF5 file, whose links may form circles, chosen
 _MOST = 4096  # elements of an array of structs or cells, chosen
