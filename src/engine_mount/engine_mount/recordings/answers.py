@@ -3,7 +3,6 @@
 import contextlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -55,8 +54,7 @@ class Control(NamedTuple):
         return self.inactive is not None and not _has_any(self.inactive, begin, end + _PAUSE)
 
 
-@dataclass(frozen=True)
-class Answers:
+class Answers(NamedTuple):
     """How control answered: counts of samples, and the spans in which it was active.
 
     `asked` were taken while it was active; of these `unanswered` have no setpoint and `late` have one that
@@ -132,8 +130,7 @@ def _has_any(times: Times, begin: int, end: int) -> bool:
     return bool(((times >= begin) & (times <= end)).any())
 
 
-@dataclass(frozen=True)
-class Latency:
+class Latency(NamedTuple):
     """Latencies in s."""
 
     median: float

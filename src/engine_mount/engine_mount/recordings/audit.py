@@ -6,7 +6,7 @@ are held against the samples, not against their own stamps.
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -199,7 +199,7 @@ def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
     if why:
         return TopicAudit(None, present, None, remark=f'{why}: only counted')
     entry = TopicAudit(
-        **asdict(stamp_statistics(stamps, rate)),
+        **stamp_statistics(stamps, rate)._asdict(),
         misdated=int(np.count_nonzero(wrong)) or None,
         rate_hz=rate,
         remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',

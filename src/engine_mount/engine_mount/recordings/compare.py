@@ -28,10 +28,10 @@ from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION, Topic
 # Sessions have words of their own; diagnostics hold clock time and load, which are never equal.
 _NOT_BY_SAMPLES = (SESSION, EVENT, DIAGNOSTICS)
 _LACKING = {
-    'samples missing in B': 'only_a',
-    'samples missing in A': 'only_b',
-    'samples of A before or behind those of B': 'outside_a',
-    'samples of B before or behind those of A': 'outside_b',
+    'samples missing in B': 'missing_in_b',
+    'samples missing in A': 'missing_in_a',
+    'samples of A before or behind those of B': 'outside_in_a',
+    'samples of B before or behind those of A': 'outside_in_b',
     'messages that differ': 'differing_messages',
 }
 

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ class ToleranceError(ValueError):
     """A tolerance is not understood or names no signal; the text says how to write it."""
 
 
-@dataclass(frozen=True)
-class Tolerance:
+class Tolerance(NamedTuple):
     """A bound on the difference: in the signal's unit, or as a share of its largest value in A."""
 
     value: float = 0.0
@@ -94,8 +93,7 @@ def _read(text: str) -> tuple[str, Tolerance]:
     return name, Tolerance(value / 100.0 if relative else value, relative)
 
 
-@dataclass(frozen=True)
-class Moment:
+class Moment(NamedTuple):
     """One matched sample: time in s, values in A and B."""
 
     time: float
@@ -113,8 +111,7 @@ class Moment:
         return {'time_s': self.time, **{name: known(number) for name, number in numbers.items()}}
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One signal of matched samples: times (s), values in A and B.
 
     `mount` is the part of its name before the topic: `mount_left/`, or nothing.

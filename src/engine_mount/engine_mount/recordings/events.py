@@ -1,8 +1,7 @@
 """What happened in a recording: marks, the switching of damping, and what the nodes said of themselves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +31,7 @@ class EventError(ValueError):
     """An event that was asked for is not in the recording; the text lists those that are."""
 
 
-@dataclass(frozen=True)
-class RecordedEvent:
+class RecordedEvent(NamedTuple):
     """Something worth finding again: when it was logged, and its time on the clock of the stamps, in ns."""
 
     log_time: int
@@ -126,8 +124,7 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
 # Switching.
 
 
-@dataclass(frozen=True)
-class Switching:
+class Switching(NamedTuple):
     """When damping went on and off, s."""
 
     on: Sequence[float]
@@ -143,8 +140,7 @@ class Switching:
         return f'on from {", ".join(shown[:SHOWN])}{more}'
 
 
-@dataclass(frozen=True)
-class SwitchingChange:
+class SwitchingChange(NamedTuple):
     """One switching: `on` or off, its times (s) in A and B, None where there is none, and of which mount."""
 
     on: bool
@@ -228,8 +224,7 @@ def paired_switchings(
 # Reports of the nodes.
 
 
-@dataclass(frozen=True, slots=True)
-class NodeReport:
+class NodeReport(NamedTuple):
     """One status: when it was logged (ns), of which node below which namespace, and what it said."""
 
     log_time: int

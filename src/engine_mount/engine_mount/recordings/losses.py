@@ -6,7 +6,7 @@ Faults are errors of nodes, marks of faults, and a coil without setpoints.
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import TopicAudit
@@ -226,7 +226,7 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
     for name, entry in audits.items():
         figures = {figure: getattr(entry, figure) for figure in _FIGURES}
         topics[name] = {figure: None if value != value else value for figure, value in figures.items()}
-        latency = entry.latency and {f'{key}_s': value for key, value in asdict(entry.latency).items()}
+        latency = entry.latency and {f'{key}_s': value for key, value in entry.latency._asdict().items()}
         topics[name]['latency'] = latency
     return {**found.as_json(), 'topics': topics}
 

@@ -132,7 +132,7 @@ def declared_topics(
                 topic.other_types.add(stored.type)
                 continue
             topic.places.setdefault(file, []).append(number)
-            topic.message_count += file.message_counts.get(number, 0)
+            topic.message_count += file.message_counts[number]
     return topics
 
 

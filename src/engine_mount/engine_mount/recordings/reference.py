@@ -3,9 +3,9 @@
 import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -45,8 +45,7 @@ class AcceptError(ValueError):
     """A recording cannot become a reference; the text says why and what to do."""
 
 
-@dataclass(frozen=True)
-class Accepted:
+class Accepted(NamedTuple):
     """A reference recording as it stands now; sizes in bytes."""
 
     folder: Path

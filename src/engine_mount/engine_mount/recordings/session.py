@@ -35,7 +35,11 @@ def session_content(text: str) -> dict[str, Any]:
 
 def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: value}} of a session, {} where it tells none."""
-    return {str(node): values for node, values in _mapping(content, 'parameters') if isinstance(values, dict)}
+    return {
+        str(node): values
+        for node, values in _mapping(content, 'parameters').items()
+        if isinstance(values, dict)
+    }
 
 
 def session_sample_rate(content: Mapping[str, Any]) -> float:
@@ -144,9 +148,8 @@ def versions_told(content: Mapping[str, Any]) -> dict[str, str]:
 
     A recorded replay has its own versions beside those of the drive; its answers are of its own.
     """
-    replay = content.get('replay')
-    source = replay if isinstance(replay, Mapping) else content
-    return {str(name): str(value) for name, value in _mapping(source, 'versions')}
+    source = _mapping(content, 'replay') or content
+    return {str(name): str(value) for name, value in _mapping(source, 'versions').items()}
 
 
 def version_differences(session: Mapping[str, Any], here: Mapping[str, str]) -> dict[str, str | None]:
@@ -168,9 +171,9 @@ def versions_sentence(differences: Mapping[str, str | None], here: Mapping[str, 
     return f'the recording was made with {which}{more}'
 
 
-def _mapping(content: Mapping[str, Any], key: str) -> list[tuple[Any, Any]]:
+def _mapping(content: Mapping[str, Any], key: str) -> Mapping[Any, Any]:
     found = content.get(key)
-    return list(found.items()) if isinstance(found, Mapping) else []
+    return found if isinstance(found, Mapping) else {}
 
 
 def _flat(content: Mapping[Any, Any], prefix: str = '') -> dict[str, Any]:

@@ -12,7 +12,7 @@ A stamp far from those of the samples around it is no time of a sample: misdated
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +55,7 @@ def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
     return known[np.minimum(np.searchsorted(known, times), len(known) - 1)] == times
 
 
-@dataclass(frozen=True)
-class StampStatistics:
+class StampStatistics(NamedTuple):
     """Counts of samples; `longest_gap_s` between neighbouring stamps in s, NaN below two samples."""
 
     expected: int

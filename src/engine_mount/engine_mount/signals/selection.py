@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Keys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(NamedTuple):
     """Signals in SI by quantity, what these are, and where they came from.
 
     `columns` is plain data for a session: column, unit, factor to SI and times of each quantity; `notes` are

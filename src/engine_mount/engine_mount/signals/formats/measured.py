@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.sources.stores import is_local, name_of, shown
@@ -11,8 +11,7 @@ from engine_mount.signals.units import unit_of
 _LISTED = 40  # names in a refusal, chosen
 
 
-@dataclass(frozen=True)
-class Provenance:
+class Provenance(NamedTuple):
     """Where a recording came from: URI, SHA-256 of its bytes, size in bytes, format, and what read it.
 
     Of a folder the SHA-256 is that of the lines `sha256  relative path` of its files, sorted by path.
@@ -31,8 +30,7 @@ class Provenance:
         return {'file': name_of(self.uri), **uri, **own}
 
 
-@dataclass(frozen=True, eq=False)
-class TimeBase:
+class TimeBase(NamedTuple):
     """When the samples of a column were taken: s after `begin` (ns since 1970, or 0), shape (n,).
 
     `told` says in words where these times come from. Columns that were sampled together share one. With
