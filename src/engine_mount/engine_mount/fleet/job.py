@@ -52,15 +52,11 @@ class Column(NamedTuple):
     meaning: str
 
 
-def _declared_columns() -> dict[str, tuple[Column, ...]]:
-    text = Path(__file__).with_name('columns.yaml').read_text(encoding='utf-8')
-    return {
-        table: tuple(Column(name, *declared) for name, declared in columns.items())
-        for table, columns in yaml.safe_load(text).items()
-    }
-
-
-COLUMNS = _declared_columns()
+_DECLARED = Path(__file__).with_name('columns.yaml').read_text(encoding='utf-8')
+COLUMNS = {
+    table: tuple(Column(name, *declared) for name, declared in columns.items())
+    for table, columns in yaml.safe_load(_DECLARED).items()
+}
 """{table: its columns} of `recordings`, `events` and `result`."""
 
 
@@ -155,7 +151,14 @@ class TableJob(NamedTuple):
             if order is not None:
                 if not kept_order.exists():
                     _write(kept_order, json.dumps(order, indent=2, sort_keys=True) + '\n')
-                _check_same(folder, json.loads(kept_order.read_text(encoding='utf-8')), order)
+                before = json.loads(kept_order.read_text(encoding='utf-8'))
+                for name in sorted(before.keys() | order.keys()):
+                    if before.get(name) != order.get(name):
+                        raise OrderError(
+                            f'{folder} holds the result of another order: {name} was '
+                            f'{json.dumps(before.get(name))}, now it is {json.dumps(order.get(name))}; '
+                            'choose another folder with --out'
+                        )
             journal = (folder / JOURNAL).open('a', encoding='utf-8')
             try:
                 yield journal
@@ -213,15 +216,6 @@ def read_place(
         raise
     except OSError as error:
         return Answer(rows_of_failure(place, str(error)))
-
-
-def _check_same(folder: Path, before: Mapping[str, Any], order: Mapping[str, Any]) -> None:
-    for name in sorted(before.keys() | order.keys()):
-        if before.get(name) != order.get(name):
-            raise OrderError(
-                f'{folder} holds the result of another order: {name} was {json.dumps(before.get(name))}, now '
-                f'it is {json.dumps(order.get(name))}; choose another folder with --out'
-            )
 
 
 def _line(uri: str, answer: Answer) -> str:

@@ -50,15 +50,18 @@ def open_run(path: Path) -> 'Recording':
     return open_recording(recording_place(path))
 
 
-def open_mount(path: Path, mount: str = '') -> 'Recording':
-    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`."""
+def open_mount(path: Path, mount: str = '', option: str = '--mount') -> 'Recording':
+    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`.
+
+    `option` is that of a command by which it is chosen.
+    """
     recording = open_run(path)
     if not mount and len(recording.mounts) < 2:
         return recording
     if mount.strip('/') not in recording.mounts:
         what = f'no mount {mount!r}' if mount else 'several mounts'
         known = ', '.join(recording.mounts) or 'none with a name'
-        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --mount')
+        raise ReadingError(f'{path} has {what}; it has {known}: choose one with {option}')
     return recording.of_mount(mount.strip('/'))
 
 

@@ -89,7 +89,10 @@ def accept(
             'versions': dict(versions or {}),
             'changes': changes or ['new reference'],
         }
-        _write_history(made / name, target, entry)
+        earlier = target / ACCEPTED_NAME
+        entries = [*((yaml_in_file(earlier) or []) if earlier.is_file() else []), entry]
+        history = yaml.safe_dump(entries, sort_keys=False, allow_unicode=True, width=100)
+        (made / name / ACCEPTED_NAME).write_text(history, encoding='utf-8')
         aside = folder / f'.{name}.old'
         shutil.rmtree(aside, ignore_errors=True)
         if target.exists():
@@ -113,8 +116,8 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
     for topic in (*ANSWERS, DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
-    source = run if _has_displacement(run) else before
-    assert source is not None
+    has_displacement = DISPLACEMENT.name in run and len(run[DISPLACEMENT.name])
+    source = run if has_displacement or before is None else before
     stamps = source[DISPLACEMENT.name].stamps
     for topic in ANSWERS:
         without = np.setdiff1d(run[topic.name].stamps, stamps)
@@ -131,14 +134,8 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
         session = parts[SESSION].at(np.array([len(parts[SESSION]) - 1]))
         content = session_content(recorded_session(run) or recorded_session(before or run))
         shortened = string_message(session_text(_shortened(content)))
-        parts[SESSION] = (
-            session if _shortened(content) == content else replace(session, payloads=Payloads([[shortened]]))
-        )
+        parts[SESSION] = replace(session, payloads=Payloads([[shortened]]))
     return list(parts.values())
-
-
-def _has_displacement(recording: Recording) -> bool:
-    return DISPLACEMENT.name in recording and len(recording[DISPLACEMENT.name]) > 0
 
 
 def _shortened(content: Any) -> Any:
@@ -150,13 +147,6 @@ def _shortened(content: Any) -> Any:
     if isinstance(content, str) and content.startswith('/') and len(Path(content).parts) > 2:
         return Path(content).name
     return content
-
-
-def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
-    earlier = target / ACCEPTED_NAME
-    entries = (yaml_in_file(earlier) or []) if earlier.is_file() else []
-    text = yaml.safe_dump([*entries, entry], sort_keys=False, allow_unicode=True, width=100)
-    (made / ACCEPTED_NAME).write_text(text, encoding='utf-8')
 
 
 def _size(folder: Path) -> int:

@@ -2,10 +2,10 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Protocol, TextIO
+from typing import TextIO
 
 
 @dataclass(frozen=True)
@@ -24,19 +24,13 @@ class Table:
     ruled: bool = False
 
 
-class Bar(Protocol):
-    """Takes the share that is done (0..1) and, where it has changed, what is being done.
+Bar = Callable[..., None]
+"""Takes the share that is done (0..1) and, where it has changed, `what` is being done.
 
-    `detail` is a sentence about this moment.
-    """
-
-    def __call__(self, share: float, what: str = '', detail: str = '') -> None: ...
-
-
-class Line(Protocol):
-    """Takes the text that stands there from now on."""
-
-    def __call__(self, text: str) -> None: ...
+`detail` is a sentence about this moment.
+"""
+Line = Callable[[str], None]
+"""Takes the text that stands there from now on."""
 
 
 class Screen:

@@ -12,7 +12,7 @@ A stamp far from those of the samples around it is no time of a sample: misdated
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,13 +170,13 @@ class TimeAxis:
 
     def of_log(self, log_time: int) -> float:
         """Return the time at which a message was logged (ns)."""
-        return float(self.of_logs(np.array([log_time]))[0])
+        return float(self.of_logs(np.int64(log_time)))
 
-    def of_logs(self, log_times: Times) -> NDArray[np.float64]:
+    def of_logs(self, log_times: Any) -> NDArray[np.float64]:
         """Return the times at which messages were logged (ns)."""
         return self.of_stamps(self.stamps_at(log_times))
 
-    def stamps_at(self, log_times: Times) -> Times:
+    def stamps_at(self, log_times: Any) -> Times:
         """Return the stamps (ns) that samples would have which came in at log times (ns)."""
         return _related(log_times, self._received, self._stamps)
 
@@ -188,7 +188,7 @@ class TimeAxis:
 
     def log_time(self, seconds: float) -> int:
         """Return the log time (ns) that belongs to a time."""
-        return int(_related(np.array([self.zero + round(1e9 * seconds)]), self._stamps, self._received)[0])
+        return int(_related(self.zero + round(1e9 * seconds), self._stamps, self._received))
 
 
 def anchors(types: Mapping[str, str]) -> list[str]:
@@ -198,7 +198,7 @@ def anchors(types: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _related(times: Times, known: Times, wanted: Times) -> Times:
+def _related(times: Any, known: Times, wanted: Times) -> Times:
     """Return what belongs to times: linear between known ones, at the same pace before and behind (ns)."""
     passed = ((each - each[0]).astype(float) for each in (known, wanted))
     inside = np.rint(np.interp(times - known[0], *passed)).astype(np.int64)

@@ -4,11 +4,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.recordings.recording import open_run
+from engine_mount.recordings.recording import open_mount
 from mount_bringup.graph.nodes import GraphError
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 
@@ -34,20 +34,6 @@ Fail = Callable[[str], None]
 """Takes the sentence on the exception that has ended a feed."""
 
 
-class Feed(Protocol):
-    """The messages of the topics of one mount, {name with namespace: topic}, in the order of arrival."""
-
-    topics: Mapping[str, Topic]
-    title: str
-    zero: int | None  # the stamp (ns) at which time begins; None: the first that comes
-
-    def start(self, receive: Receive, on_failure: Fail) -> None:
-        """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
-
-    def stop(self) -> None:
-        """Return when no message comes any more; safe to call twice."""
-
-
 class RecordedFeed:
     """A recording of one mount, `rate` times as fast as it was recorded.
 
@@ -56,16 +42,9 @@ class RecordedFeed:
 
     def __init__(self, path: Path, rate: float = 1.0, begin: float = 0.0, namespace: str = ''):
         """Raises a `ValueError` for what is no recording, or for a `begin` that lies beyond it."""
-        recording = open_run(path)
-        mounts, wanted = recording.mounts, namespace.strip('/')
-        if not wanted and len(mounts) == 1:
-            wanted = mounts[0]
-        if mounts and wanted not in mounts:
-            named = ', '.join(mount or '/' for mount in sorted(mounts))
-            raise ValueError(f'{path} holds the mounts {named}: choose one with --namespace')
-        part = recording.of_mount(wanted)
+        part = open_mount(path, namespace, '--namespace')
         self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
-        self.title = f'{recording.short_name} at {rate:g} x'
+        self.title = f'{part.short_name} at {rate:g} x'
         part.load(self.topics)
         self.zero: int | None = part.time_axis.zero
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
@@ -177,3 +156,11 @@ class RunningGraph:
             self._collector.stop()
         self._node.destroy_node()
         self._context.try_shutdown()
+
+
+Feed = RecordedFeed | RunningGraph
+"""The messages of the topics of one mount, {name with namespace: topic}, in the order of arrival.
+
+`zero` is the stamp (ns) at which time begins; None: the first that comes. `start` calls `receive` with each
+message, from a thread, until `stop`, which is safe to call twice, or until `on_failure` was called.
+"""

@@ -42,6 +42,8 @@ _KEYS = {
     'ssh': 'ssh to this host must work without a question: a key in the agent or in ~/.ssh/config',
     'http': "what the server wants to know stands in fsspec's configuration, as client_kwargs of http",
 }
+_LIBRARIES = {'s3': 's3fs', 'gs': 'gcsfs', 'ssh': 'sshfs', 'http': 'aiohttp'}
+"""What fsspec needs for each kind of store."""
 _REFUSED = {  # exceptions of the libraries below fsspec, by name: they are not loaded here
     'DefaultCredentialsError', 'KeyEncryptionError', 'KeyImportError',
     'NoCredentialsError', 'PartialCredentialsError', 'PermissionDenied', 'ProfileNotFound',
@@ -198,15 +200,8 @@ def _filesystem_class(uri: str) -> Any:
     """Return the class of fsspec behind a scheme; raises `MissingLibraryError`."""
     kind, what = _kind(uri), f'reading {shown(uri)}'
     fsspec = required('fsspec', what)
-    if kind == 'ssh':
-        return required('sshfs', what).SSHFileSystem
-    if kind == 's3':
-        required('s3fs', what)
-    elif kind == 'gs':
-        required('gcsfs', what)
-    elif kind == 'http':
-        required('aiohttp', what)
-    return fsspec.get_filesystem_class(scheme_of(uri))
+    library = required(_LIBRARIES.get(kind, 'fsspec'), what)
+    return library.SSHFileSystem if kind == 'ssh' else fsspec.get_filesystem_class(scheme_of(uri))
 
 
 def _filesystem(uri: str) -> tuple[Any, str]:
