@@ -17,7 +17,7 @@ from engine_mount.fleet.job import OUTAGES, WritingError
 from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
 from engine_mount.signals.sources import remote
-from engine_mount.signals.sources.stores import StoreAwayError
+from engine_mount.signals.sources.uris import StoreAwayError
 
 pytestmark = pytest.mark.slow
 

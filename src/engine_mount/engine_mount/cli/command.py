@@ -33,7 +33,7 @@ from engine_mount.cli.commands import (
 from engine_mount.cli.commands.options import with_repeated_options
 from engine_mount.cli.help import Command, Group, check_former_names, group
 from engine_mount.cli.terminal import refuse, terminal
-from engine_mount.signals.sources.stores import SourceError, StoreAwayError
+from engine_mount.signals.sources.uris import SourceError, StoreAwayError
 from mount_ros.environment import prepare_environment
 
 _RECORDINGS = 'Recordings'

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine_mount.signals.sources.stores import is_uri, shown
+from engine_mount.signals.sources.uris import is_uri, shown
 
 if TYPE_CHECKING:
     from engine_mount.cli.screen import TerminalScreen

@@ -19,7 +19,8 @@ import yaml
 from engine_mount.fleet.places import Place
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.signals.signal import required
-from engine_mount.signals.sources.stores import StoreAwayError, local_copy
+from engine_mount.signals.sources.stores import local_copy
+from engine_mount.signals.sources.uris import StoreAwayError
 
 if TYPE_CHECKING:
     import pyarrow

@@ -9,15 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from engine_mount.signals.signal import required
-from engine_mount.signals.sources.stores import (
-    Entry,
-    SourceError,
-    entries,
-    is_uri,
-    local_path,
-    scheme_of,
-    shown,
-)
+from engine_mount.signals.sources.stores import entries
+from engine_mount.signals.sources.uris import Entry, SourceError, is_uri, local_path, scheme_of, shown
 from mount_recorder.metadata import METADATA_NAME
 
 _RECORDED = re.compile(r'(?P<stem>.+?)\.(mcap|db3)(\.(zstd|lz4|zst))?')

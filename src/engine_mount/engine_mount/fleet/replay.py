@@ -22,7 +22,8 @@ from engine_mount.recordings.recording import open_mount, open_run, recording_ha
 from engine_mount.recordings.session import versions_told
 from engine_mount.reports.fleet.looks import Signals
 from engine_mount.settings.chosen import NoEffectError
-from engine_mount.signals.sources.stores import local_copy, shown
+from engine_mount.signals.sources.stores import local_copy
+from engine_mount.signals.sources.uris import shown
 from mount_recorder.versions import versions
 
 if TYPE_CHECKING:

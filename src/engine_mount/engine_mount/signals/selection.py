@@ -23,7 +23,7 @@ from engine_mount.signals.judgement import unit_of_column
 from engine_mount.signals.mapping import MEAN, ColumnChoice, Mapping, with_options
 from engine_mount.signals.quantities import QUANTITIES, Quantities, Quantity, quantity
 from engine_mount.signals.signal import FEWEST, SECOND, FloatArray, Signal, SignalError, check_count, mean
-from engine_mount.signals.sources.stores import name_of
+from engine_mount.signals.sources.uris import name_of
 from engine_mount.signals.times import is_time, times_of
 from engine_mount.signals.units import is_unit, si_unit, unit_of
 

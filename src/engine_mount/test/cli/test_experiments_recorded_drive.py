@@ -13,7 +13,7 @@ from engine_mount.experiments.recorded_drive import (
     HYDRO,
 )
 from engine_mount.experiments.registry import experiment
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from references import REFERENCES_FOLDER
 
 from engine_mount.fleet import job
 from engine_mount.fleet.runner import Done
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 CHANGE = ('--set', 'mount_control.highest_current=0.7')
 

@@ -13,7 +13,7 @@ import engine_mount
 from engine_mount.fleet.catalogue import index, rows_of
 from engine_mount.fleet.job import COLUMNS, schema_of
 from engine_mount.fleet.places import places
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 
 @pytest.fixture

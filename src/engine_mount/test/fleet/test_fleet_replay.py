@@ -21,7 +21,7 @@ from engine_mount.fleet.replay import count_outcomes, replay_fleet
 from engine_mount.fleet.setpoints import compare_setpoints, recorded_in
 from engine_mount.recordings.recording import open_run
 from engine_mount.settings.options import with_sample_rate
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 from mount_recorder.session import session_text
 
 CHANGES = parsed_changes({'highest_current': 0.7})

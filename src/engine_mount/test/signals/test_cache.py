@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from engine_mount.signals.sources import cache
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 HOLD = """
 import sys

@@ -12,7 +12,7 @@ from engine_mount.signals.formats import excel
 from engine_mount.signals.formats.content import Stated
 from engine_mount.signals.formats.reading import read
 from engine_mount.signals.signal import SignalError
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 N = 60
 TIMES = np.arange(N) / 100.0

@@ -9,14 +9,8 @@ import pytest
 from served_stores import SECRET_KEY, BreakingWay, HttpStore, know_host
 
 from engine_mount.signals.sources import remote
-from engine_mount.signals.sources.stores import (
-    SourceError,
-    StoreAwayError,
-    entries,
-    fetched,
-    local_copy,
-    uri_of,
-)
+from engine_mount.signals.sources.stores import entries, fetched, local_copy, uri_of
+from engine_mount.signals.sources.uris import SourceError, StoreAwayError
 
 DATA = bytes(range(256)) * 8192  # 2 MB
 FETCH = 'import sys; from engine_mount.signals.sources.stores import fetched; print(fetched(sys.argv[1]))'

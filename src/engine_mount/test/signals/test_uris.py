@@ -2,17 +2,8 @@
 
 import pytest
 
-from engine_mount.signals.sources.stores import (
-    SourceError,
-    checked,
-    entries,
-    fetched,
-    inside,
-    is_uri,
-    name_of,
-    scheme_of,
-    shown,
-)
+from engine_mount.signals.sources.stores import entries, fetched
+from engine_mount.signals.sources.uris import SourceError, checked, inside, is_uri, name_of, scheme_of, shown
 
 SECRET = 'hunter2'
 WITH_SECRETS = [

@@ -52,7 +52,7 @@ def ls(
     """List recordings with date, length, scenario, losses and faults."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.listing import list_recordings
-    from engine_mount.signals.sources.stores import is_local, local_path
+    from engine_mount.signals.sources.uris import is_local, local_path
 
     if not all(map(is_local, folders or ())):
         raise ValueError(

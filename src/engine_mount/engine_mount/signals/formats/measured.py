@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from engine_mount.signals.signal import FloatArray, SignalError
-from engine_mount.signals.sources.stores import is_local, name_of, shown
+from engine_mount.signals.sources.uris import is_local, name_of, shown
 from engine_mount.signals.units import unit_of
 
 _LISTED = 40  # names in a refusal, chosen

@@ -15,7 +15,8 @@ from engine_mount.signals.roads.crg import read_track
 from engine_mount.signals.roads.iso8608 import RoadProfile, root_mean_square, unevenness
 from engine_mount.signals.selection import select_rows
 from engine_mount.signals.signal import FloatArray, SignalError
-from engine_mount.signals.sources.stores import local_copy, name_of
+from engine_mount.signals.sources.stores import local_copy
+from engine_mount.signals.sources.uris import name_of
 
 EFFECTIVE = 'effective_height'
 """Name of a height that is already the one behind the tyre."""

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from engine_mount.settings.options import size_in_bytes
-from engine_mount.signals.sources.stores import SourceError
+from engine_mount.signals.sources.uris import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'
 LIMIT = '20GB'  # chosen: about a hundred hours of one mount

@@ -16,7 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 from engine_mount.signals.signal import MissingLibraryError, required
 from engine_mount.signals.sources.cache import cached_copy
-from engine_mount.signals.sources.stores import (
+from engine_mount.signals.sources.uris import (
     Entry,
     SourceError,
     StoreAwayError,
@@ -42,8 +42,6 @@ _KEYS = {
     'ssh': 'ssh to this host must work without a question: a key in the agent or in ~/.ssh/config',
     'http': "what the server wants to know stands in fsspec's configuration, as client_kwargs of http",
 }
-_LIBRARIES = {'s3': 's3fs', 'gs': 'gcsfs', 'ssh': 'sshfs', 'http': 'aiohttp'}
-"""What fsspec needs for each kind of store."""
 _REFUSED = {  # exceptions of the libraries below fsspec, by name: they are not loaded here
     'DefaultCredentialsError', 'KeyEncryptionError', 'KeyImportError',
     'NoCredentialsError', 'PartialCredentialsError', 'PermissionDenied', 'ProfileNotFound',
@@ -200,8 +198,15 @@ def _filesystem_class(uri: str) -> Any:
     """Return the class of fsspec behind a scheme; raises `MissingLibraryError`."""
     kind, what = _kind(uri), f'reading {shown(uri)}'
     fsspec = required('fsspec', what)
-    library = required(_LIBRARIES.get(kind, 'fsspec'), what)
-    return library.SSHFileSystem if kind == 'ssh' else fsspec.get_filesystem_class(scheme_of(uri))
+    if kind == 'ssh':
+        return required('sshfs', what).SSHFileSystem
+    if kind == 's3':
+        required('s3fs', what)
+    elif kind == 'gs':
+        required('gcsfs', what)
+    elif kind == 'http':
+        required('aiohttp', what)
+    return fsspec.get_filesystem_class(scheme_of(uri))
 
 
 def _filesystem(uri: str) -> tuple[Any, str]:
