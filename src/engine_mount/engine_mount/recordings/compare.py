@@ -1,8 +1,7 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine_mount.recordings.difference import SHOWN, SignalDifference, Tolerances, few, signal_sentences
 from engine_mount.recordings.events import (
@@ -36,8 +35,7 @@ _LACKING = {
 }
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """What two recordings have in common and what not; times in s on the time axis of A."""
 
     name_a: str

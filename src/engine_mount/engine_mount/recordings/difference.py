@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,8 +129,7 @@ class Column(NamedTuple):
         return Moment(float(self.time[place]), float(self.a[place]), float(self.b[place]))
 
 
-@dataclass(frozen=True)
-class SignalDifference:
+class SignalDifference(NamedTuple):
     """One signal in both recordings; values in `unit`, unknown is NaN.
 
     `differing` samples are beyond the tolerance; NaN in one recording alone always is, NaN in both never.

@@ -6,7 +6,6 @@ Faults are errors of nodes, marks of faults, and a coil without setpoints.
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import TopicAudit
@@ -87,8 +86,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
 _SHOWN = 5  # faults named one by one
 
 
-@dataclass(frozen=True)
-class Losses:
+class Losses(NamedTuple):
     """The figures of one recording, of all its mounts together.
 
     `lost_samples` of `samples` were taken by the electronics and lack their displacement or ripple;

@@ -1,7 +1,6 @@
 """Which sample of one recording belongs to which of another, topic by topic, and what time it has."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -128,8 +127,7 @@ def _alignment(a: Series, b: Series, axis: TimeAxis) -> Alignment:
     )
 
 
-@dataclass(frozen=True)
-class TopicComparison:
+class TopicComparison(NamedTuple):
     """One topic of both: its signals, and how many samples are in one recording alone.
 
     Samples are missing within the time that both recordings cover with this topic, those before and behind it
@@ -154,7 +152,7 @@ class TopicComparison:
 
     def figures(self) -> dict[str, Any]:
         """Return the figures for JSON."""
-        own = {name: value for name, value in vars(self).items() if name not in ('mount', 'topic')}
+        own = {name: value for name, value in self._asdict().items() if name not in ('mount', 'topic')}
         return {**own, 'signals': {signal.signal: signal.figures() for signal in self.signals}}
 
 

@@ -8,7 +8,7 @@ import mmap
 import struct
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, NamedTuple, TypeVar
 
@@ -55,8 +55,7 @@ class ReadingError(ValueError):
     """A recording, a topic or a column of it cannot be read; the text gives the reason."""
 
 
-@dataclass(frozen=True)
-class StoredTopic:
+class StoredTopic(NamedTuple):
     """A topic as a file declares it: its type and the definition of that, empty where the file has none.
 
     `encoding` is that of the messages (`cdr`), `definition_encoding` that of the text (`ros2msg`); `details`
@@ -68,7 +67,7 @@ class StoredTopic:
     encoding: str
     definition: bytes = b''
     definition_encoding: str = ''
-    details: Mapping[str, str] = field(default_factory=dict)
+    details: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)

@@ -112,7 +112,7 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
                 name = source.resolve(topic.name)
                 messages = read_messages(source, name)
                 if messages is not None and len(messages):
-                    parts[topic] = replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
+                    parts[topic] = replace(messages, topic=messages.topic._replace(name=f'/{topic.name}'))
     for topic in (*ANSWERS, DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')

@@ -3,13 +3,11 @@
 import contextlib
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import zip_longest
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of texts below `heads` (none: no head); `columns` has `l` or `r` for each: where its texts stand.
 
     The rows `marked` are not as they should be; `ruled`: rows of long texts, with lines between them.

@@ -82,7 +82,7 @@ def import_file(
         notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
     written = []
     for _, _, inside in parts:
-        signals = {name: replace(one, begin=one.begin + shift) for name, one in inside.items()}
+        signals = {name: one._replace(begin=one.begin + shift) for name, one in inside.items()}
         channels, done = channels_of(signals, selection.quantities)
         notes += done
         written.append(channels)
@@ -198,5 +198,5 @@ def _part(signals: Keys[str, Signal], span: Span) -> Part:
         elif np.count_nonzero(inside) >= FEWEST:
             times, values = signal.times[inside], signal.values[inside]
             first = signal.begin + round(SECOND * float(times[0]))
-            found[name] = replace(signal, times=times - times[0], values=values, begin=first)
+            found[name] = signal._replace(times=times - times[0], values=values, begin=first)
     return *span, found

@@ -1,10 +1,10 @@
 """A signal as it was recorded, and the sentences why one cannot be used."""
 
 import importlib
-from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,7 @@ class MissingLibraryError(ValueError):
     """A library is not installed; the text says what needs it and how it is installed."""
 
 
-@dataclass(frozen=True, eq=False)
-class Signal:
+class Signal(NamedTuple):
     """Samples in the order of the file: times in s after `begin` (ns) and values, both (n,).
 
     `clock` says in words whose times they are, `notes` what of the recording is not in the samples.

@@ -3,7 +3,6 @@
 import csv
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,7 +42,7 @@ def open_excel(path: Path, stated: Stated) -> Content:
         for place, leaf in enumerate(content.leaves):
             name = leaf.name or str(place)
             found.append(
-                (content, place, replace(leaf, name=name if len(sheets) == 1 else f'{title}/{name}'))
+                (content, place, leaf._replace(name=name if len(sheets) == 1 else f'{title}/{name}'))
             )
 
     def prepare(numbers: Sequence[int]) -> None:

@@ -69,8 +69,7 @@ class MeasuredColumn(Heading):
     time: TimeBase | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(NamedTuple):
     """A file as named columns, with what a reader must know: `notes` are sentences.
 
     `others` are the headings of columns that were not asked for.
