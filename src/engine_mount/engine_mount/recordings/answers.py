@@ -45,10 +45,6 @@ class Control(NamedTuple):
     handovers: Times
     inactive: Times | None = None
 
-    def is_control(self, begin: int, end: int) -> bool:
-        """Return whether answers from `begin` to `end` are control rather than a ramp."""
-        return _has_any(self.steps, begin, end) if len(self.steps) else end not in self.handovers
-
     def stayed_active(self, begin: int, end: int) -> bool:
         """Return whether diagnostics were there to say that control was deactivated, and did not."""
         return self.inactive is not None and not _has_any(self.inactive, begin, end + _PAUSE)
@@ -112,7 +108,10 @@ def _spans(answers: Times, last_sample: int, control: Control) -> list[Span]:
     handed_over = True  # at the beginning, and behind a ramp, silence says nothing
     for part in np.split(answers, np.flatnonzero(breaks) + 1):
         begin, end = int(part[0]), int(part[-1])
-        if not control.is_control(begin, end):
+        is_ramp = end in control.handovers
+        if len(control.steps):
+            is_ramp = not _has_any(control.steps, begin, end)
+        if is_ramp:
             handed_over = True
             continue
         if found and not handed_over and control.stayed_active(found[-1][1], begin):

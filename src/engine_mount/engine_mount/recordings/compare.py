@@ -95,11 +95,11 @@ class Comparison(NamedTuple):
             *self.difference_sentences(),
             *([f'the sessions differ: {few(self.sessions, "; ")}'] if self.sessions else []),
             *(
-                f'{what}: {few([f"{count} of {name}" for name, count in found], ", ")}'
+                f'{what}: {few([f"{count} of {name}" for name, count in found])}'
                 for what, found in self.incomplete.items()
             ),
             *(f'{topic.name}: {topic.remark}' for topic in self.topics if topic.remark),
-            *(f'{what}: {few(names, ", ")}' for what, names in alone.items() if names),
+            *(f'{what}: {few(names)}' for what, names in alone.items() if names),
             self._rest(),
         ]
 

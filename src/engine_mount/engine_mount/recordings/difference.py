@@ -238,7 +238,7 @@ def signal_sentences(signals: Iterable[SignalDifference]) -> list[str]:
     """Return the sentences about the most important of the differing `signals`."""
     ordered = by_importance(signals)
     others = [signal.name for signal in ordered[SHOWN:]]
-    more = [f'{len(others)} more signals differ: {few(others, ", ")}'] if others else []
+    more = [f'{len(others)} more signals differ: {few(others)}'] if others else []
     return [*(signal.sentence for signal in ordered[:SHOWN]), *more]
 
 
@@ -255,10 +255,10 @@ def signal_table(signals: Iterable[SignalDifference]) -> Table:
     )
 
 
-def few(names: Sequence[str], separator: str) -> str:
+def few(names: Sequence[str], separator: str = ', ', most: int = SHOWN) -> str:
     """Return the first names, and how many more there are."""
-    more = f'{separator}{len(names) - SHOWN} more' if len(names) > SHOWN else ''
-    return separator.join(names[:SHOWN]) + more
+    more = f'{separator}{len(names) - most} more' if len(names) > most else ''
+    return separator.join(names[:most]) + more
 
 
 def known(value: float | None) -> float | None:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.difference import SHOWN, quantity_text, time_text
+from engine_mount.recordings.difference import few, quantity_text, time_text
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import Series, SeriesError
@@ -113,12 +113,10 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     if not events:
         return 'it has none, and damping was never switched; cut by --from and --to'
     axis = recording.time_axis
-    shown = [
-        f'{number} {event.kind} at {event_time(event, axis):.3f} s'
-        for number, event in enumerate(events[:_LISTED], 1)
+    all_of_them = [
+        f'{number} {event.kind} at {event_time(event, axis):.3f} s' for number, event in enumerate(events, 1)
     ]
-    more = f' and {len(events) - _LISTED} more' if len(events) > _LISTED else ''
-    return f'it has {", ".join(shown)}{more}'
+    return f'it has {few(all_of_them, most=_LISTED)}'
 
 
 # Switching.
@@ -131,13 +129,13 @@ class Switching(NamedTuple):
     off: Sequence[float]
 
     def sentence(self, digits: int = 3) -> str:
-        """Return the first `SHOWN` stretches in words, times with so many digits behind the point."""
+        """Return the first stretches in words, times with so many digits behind the point."""
         if not self.on:
             return 'never on'
         ends = (next((f'{off:.{digits}f} s' for off in self.off if off > on), 'the end') for on in self.on)
-        shown = [f'{on:.{digits}f} s to {end}' for on, end in zip(self.on, ends, strict=True)]
-        more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
-        return f'on from {", ".join(shown[:SHOWN])}{more}'
+        return (
+            f'on from {few([f"{on:.{digits}f} s to {end}" for on, end in zip(self.on, ends, strict=True)])}'
+        )
 
 
 class SwitchingChange(NamedTuple):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import TopicAudit
+from engine_mount.recordings.difference import few
 from engine_mount.recordings.events import CONTROL, node_reports, recorded_marks
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
@@ -83,9 +84,6 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
     return sorted((fault for fault in found if begin <= fault.time <= end), key=lambda fault: fault.time)
 
 
-_SHOWN = 5  # faults named one by one
-
-
 class Losses(NamedTuple):
     """The figures of one recording, of all its mounts together.
 
@@ -155,9 +153,7 @@ class Losses(NamedTuple):
         """Return how many faults there are, and the first in words, each on a line of its own."""
         if not self.faults:
             return f'not judged: {self.unjudged}' if self.unjudged else 'none'
-        rest = len(self.faults) - _SHOWN
-        more = [f'and {rest} more'] if rest > 0 else []
-        return f'{len(self.faults)}:\n' + ';\n'.join([*map(str, self.faults[:_SHOWN]), *more])
+        return f'{len(self.faults)}:\n' + few([*map(str, self.faults)], ';\n')
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures as JSON knows them: unknown is null, times are in s."""

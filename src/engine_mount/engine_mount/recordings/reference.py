@@ -1,10 +1,10 @@
 """Reference recordings: short drives in the repository whose setpoints a replay must meet to the bit."""
 
 import re
-import shutil
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,11 +75,10 @@ def accept(
         if comparison.equal and not comparison.sessions:
             raise AcceptError(f'{run.path} is equal to {before.path} to the bit; there is nothing to accept')
         changes = comparison.sentences()
-    made = folder / f'.{name}.new'
-    shutil.rmtree(made, ignore_errors=True)
-    try:
-        made.mkdir(parents=True)
-        with BagCopy(made / name, _CHUNK_SIZE) as bag:
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=folder, prefix='.') as made:
+        new = Path(made, name)
+        with BagCopy(new, _CHUNK_SIZE) as bag:
             bag.add(parts)
             bag.complete()
         entry = {
@@ -92,15 +91,10 @@ def accept(
         earlier = target / ACCEPTED_NAME
         entries = [*((yaml_in_file(earlier) or []) if earlier.is_file() else []), entry]
         history = yaml.safe_dump(entries, sort_keys=False, allow_unicode=True, width=100)
-        (made / name / ACCEPTED_NAME).write_text(history, encoding='utf-8')
-        aside = folder / f'.{name}.old'
-        shutil.rmtree(aside, ignore_errors=True)
+        (new / ACCEPTED_NAME).write_text(history, encoding='utf-8')
         if target.exists():
-            target.rename(aside)
-        (made / name).rename(target)
-        shutil.rmtree(aside, ignore_errors=True)
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
+            target.rename(Path(made, 'before'))
+        new.rename(target)
     return Accepted(target, _size(target), sum(map(_size, folder.iterdir())), tuple(changes))
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from engine_mount.recordings.difference import few
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
 from mount_models.plain_yaml import YamlError, plain_yaml
@@ -116,8 +117,7 @@ def session_differences(a: str, b: str) -> list[str]:
     for where, here, there in (('A', one, other), ('B', other, one)):
         alone = [f'{name} ({text})' for name, text in here.items() if name not in there]
         if alone:
-            more = f' and {len(alone) - _LISTED} more' if len(alone) > _LISTED else ''
-            found.append(f'only {where} tells {", ".join(alone[:_LISTED])}{more}')
+            found.append(f'only {where} tells {few(alone, most=_LISTED)}')
     return found
 
 

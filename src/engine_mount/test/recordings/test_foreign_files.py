@@ -10,6 +10,7 @@ import shutil
 from collections import Counter
 
 import pytest
+from compared_drives import messages_of
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -64,16 +65,15 @@ def intact(request, tmp_path_factory):
 
 def contents(recording):
     """Return how often each message with its times and numbers is in a recording."""
-    found = Counter()
+    found, messages = Counter(), messages_of(recording)
     for name in recording:
         series = recording[name]
         numbers = [(0.0,)] * len(series)
         with contextlib.suppress(SeriesError):
             columns = [series[column] for column in series.names]
             numbers = list(zip(series.stamps.tolist(), *columns, strict=True))
-        times = zip(series.receive_times.tolist(), series.publish_times.tolist(), strict=True)
-        for raw, time, row in zip(series.payloads, times, numbers, strict=True):
-            found[(name, bytes(raw), time, repr(row) if len(row) > 1 else '')] += 1
+        for message, row in zip(messages[name], numbers, strict=True):
+            found[(name, message, repr(row) if len(row) > 1 else '')] += 1
     return found
 
 
