@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from generated import PAGES, page_of, table, written_by
 
-from engine_mount.fleet.tables import COLUMNS, Column
+from engine_mount.fleet.job import COLUMNS, Column
 
 PAGE = PAGES / 'fleet_columns.md'
 

@@ -13,10 +13,9 @@ from served_stores import BreakingWay, Bucket, name_s3_store, s3_server
 
 from engine_mount.drives.replay import parsed_changes
 from engine_mount.fleet import job
-from engine_mount.fleet.job import OUTAGES
+from engine_mount.fleet.job import OUTAGES, WritingError
 from engine_mount.fleet.replay import replay_fleet
 from engine_mount.fleet.runner import Done
-from engine_mount.fleet.tables import WritingError
 from engine_mount.signals.sources import remote
 from engine_mount.signals.sources.uris import StoreAwayError
 

@@ -15,9 +15,8 @@ from engine_mount.drives.external_excitation import FOLDER, ExternalExcitation
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreChain
 from engine_mount.recordings.screen import Screen
-from engine_mount.settings.amounts import checked_recorder
 from engine_mount.settings.chosen import Parameters, check_effect
-from engine_mount.settings.options import mounts_of, settings_of_mounts, with_sample_rate
+from engine_mount.settings.options import checked_recorder, mounts_of, settings_of_mounts, with_sample_rate
 from engine_mount.settings.run_folder import RunFolder, make_run_folder
 from engine_mount.signals.excitation import build_excitation
 from mount_bringup.graph.domain import chosen_domain

@@ -56,8 +56,8 @@ class Fleet:
 
     def report(self, by: str = '', count: int = 10) -> 'pyarrow.Table':
         """Write report.html beside the last result; return its worst `count` rows by the column `by`."""
+        from engine_mount.fleet.job import COLUMNS, table_of
         from engine_mount.fleet.page import write_page
-        from engine_mount.fleet.tables import COLUMNS, table_of
 
         _, looks = write_page(self.result or self.catalogue, None, by, count)
         return table_of(COLUMNS['result'], [look.row for look in looks])

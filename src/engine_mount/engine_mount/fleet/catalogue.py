@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from engine_mount.drives.inputs.input import has
-from engine_mount.fleet.job import Rows, TableJob
+from engine_mount.fleet.job import Row, Rows, TableJob
 from engine_mount.fleet.places import Place, places
-from engine_mount.fleet.tables import Row
 from engine_mount.recordings.answers import peak_current
 from engine_mount.recordings.audit import audit, control_spans
 from engine_mount.recordings.events import event_time, recorded_events, switching_places
@@ -104,7 +103,7 @@ def rows_of(path: Path, place: Place) -> Rows:
                 row |= _lost_figures(part, audits)
                 row |= _state_figures(part, audits)
                 events += _events(part, row)
-            except (ReadingError, SeriesError, ValueError, KeyError, IndexError) as error:
+            except (ValueError, LookupError) as error:
                 reasons.append(f'not all could be told: {error}')
         with contextlib.suppress(ValueError):
             if without_friction(seat_of(session_parameters(content))):

@@ -6,12 +6,10 @@ engine on a simulated mount, once with each controller, and these two are compar
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine_mount.drives.core import ControlAnswers
 from engine_mount.drives.inputs.consumed_samples import ReplayError
@@ -70,12 +68,12 @@ def compare_motion(recorded: Recorded, changes: Parameters) -> Compared:
     first, other = (drive.column('displacement') for drive in drives)
     row = {
         'activations': 1,
-        **compared_answers(time, zero, [drive.answers for drive in drives], 1.0 / sim.sample_rate),
+        **compared_answers(time, zero, drives, 1.0 / sim.sample_rate),
         **drives[0].motion(),
         **drives[1].motion('_changed'),
         **difference('displacement_difference', 'm', time, other, first),
     }
-    setpoints = drives[0].answers.setpoints, drives[1].answers.setpoints
+    setpoints = drives[0].setpoints, drives[1].setpoints
     acceleration = drives[0].column('chassis_acceleration')
     return Compared(row, Signals((stamps - zero) * 1e-9, acceleration, setpoints, (first, other)))
 
@@ -104,20 +102,15 @@ def _recorded_excitation(recording: Recording, start: float) -> Excitation:
     return Excitation(Seat.ACCELERATED_CHASSIS, values, STEP_TIME, start)
 
 
-class _Drive:
+class _Drive(AnswerFigures):
     """A simulated drive: what the controller answered, and columns of its samples from `start` (ns) on."""
 
     def __init__(self, parameters: Parameters, excitation: Excitation):
+        super().__init__()
         self.start = round(excitation.start * 1e9)
-        self.answers = AnswerFigures()
-        self._columns: dict[str, list[NDArray[Any]]] = defaultdict(list)
         self._trace = trace_dtype(CoreChain(parameters).control.policy)
         self._is_initialised = False
         run_core_into(self, parameters, excitation=excitation)
-
-    def column(self, name: str) -> NDArray[Any]:
-        """Return a column of the samples (n,): `stamp` in ns, m, N, or m/s^2."""
-        return np.concatenate(self._columns[name])
 
     def motion(self, changed: str = '') -> dict[str, Any]:
         """Return the figures of the motion as columns, with `changed` before their unit."""
@@ -139,15 +132,15 @@ class _Drive:
         traced = samples.traced[part].copy()
         traces = samples.traces[part].copy().view(self._trace)[:, 0]
         traces[~traced] = np.zeros(1, self._trace)[0]
-        self.answers.add(ControlAnswers(stamps, setpoints, traced, traces, SampleCounts()))
-        self._columns['stamp'].append(stamps)
+        self.add(ControlAnswers(stamps, setpoints, traced, traces, SampleCounts()))
+        self.columns['stamp'].append(stamps)
         truth = samples.truths[part].view(TRUTH)[:, 0]
         for name in _KEPT:
-            self._columns[name].append(truth[name].copy())
+            self.columns[name].append(truth[name].copy())
 
     def write_result(self, stamp: int, result: InitialisationResult) -> None:
         """Take the table with which the controller begins."""
-        self.answers.begin_run(*result.table)
+        self.begin_run(*result.table)
         self._is_initialised = True
 
     def write_off(self, stamp: int) -> None:

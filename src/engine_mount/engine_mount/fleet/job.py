@@ -2,29 +2,34 @@
 
 journal.jsonl   a line for each recording that is done, with the fingerprint of its files
 order.json      of a result: what was ordered; another order is refused
-NAME.parquet    a table, written whole once the order is done
+NAME.parquet    a table, its columns declared in columns.yaml, written whole once the order is done
 """
 
 import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
+import yaml
+
 from engine_mount.fleet.places import Place
 from engine_mount.fleet.runner import run_tasks
-from engine_mount.fleet.tables import COLUMNS, Row, explained_errors, replaced, table_of, write_table
+from engine_mount.signals.signal import required
 from engine_mount.signals.sources.stores import local_copy
 from engine_mount.signals.sources.uris import StoreAwayError
 
 if TYPE_CHECKING:
     import pyarrow
 
+Row = dict[str, Any]
 Rows = Mapping[str, Sequence[Row]]
 """{table: rows}."""
+NEEDED_FOR = 'a table of a fleet'
+"""What a missing library is needed for."""
 
 JOURNAL, ORDER = 'journal.jsonl', 'order.json'
 OUTAGES = 4
@@ -33,6 +38,27 @@ OUTAGES = 4
 
 class OrderError(ValueError):
     """A folder cannot take the rows of an order; the text says why, and what would help."""
+
+
+class WritingError(OSError):
+    """A folder of a fleet cannot be written; the text says why, and what would help."""
+
+
+class Column(NamedTuple):
+    """One column: its name, its type as pyarrow names it, its unit ('': none), and a sentence about it."""
+
+    name: str
+    type: str
+    unit: str
+    meaning: str
+
+
+_DECLARED = Path(__file__).with_name('columns.yaml').read_text(encoding='utf-8')
+COLUMNS = {
+    table: tuple(Column(name, *declared) for name, declared in columns.items())
+    for table, columns in yaml.safe_load(_DECLARED).items()
+}
+"""{table: its columns} of `recordings`, `events` and `result`."""
 
 
 class Answer(NamedTuple):
@@ -126,7 +152,14 @@ class TableJob(NamedTuple):
             if order is not None:
                 if not kept_order.exists():
                     _write(kept_order, json.dumps(order, indent=2, sort_keys=True) + '\n')
-                _check_same(folder, json.loads(kept_order.read_text(encoding='utf-8')), order)
+                before = json.loads(kept_order.read_text(encoding='utf-8'))
+                for name in sorted(before.keys() | order.keys()):
+                    if before.get(name) != order.get(name):
+                        raise OrderError(
+                            f'{folder} holds the result of another order: {name} was '
+                            f'{json.dumps(before.get(name))}, now it is {json.dumps(order.get(name))}; '
+                            'choose another folder with --out'
+                        )
             journal = (folder / JOURNAL).open('a', encoding='utf-8')
             try:
                 yield journal
@@ -186,15 +219,6 @@ def read_place(
         return Answer(rows_of_failure(place, str(error)))
 
 
-def _check_same(folder: Path, before: Mapping[str, Any], order: Mapping[str, Any]) -> None:
-    for name in sorted(before.keys() | order.keys()):
-        if before.get(name) != order.get(name):
-            raise OrderError(
-                f'{folder} holds the result of another order: {name} was {json.dumps(before.get(name))}, now '
-                f'it is {json.dumps(order.get(name))}; choose another folder with --out'
-            )
-
-
 def _line(uri: str, answer: Answer) -> str:
     return json.dumps([uri, answer.fingerprint, answer.rows]) + '\n'
 
@@ -203,3 +227,68 @@ def _write(file: Path, text: str) -> None:
     """Write a file whole or not at all; raises `WritingError`."""
     with replaced(file) as beside:
         beside.write_text(text, encoding='utf-8')
+
+
+def schema_of(columns: Sequence[Column]) -> 'pyarrow.Schema':
+    """Return the schema of a table; unit and meaning are metadata of its fields."""
+    pyarrow = required('pyarrow', NEEDED_FOR)
+    return pyarrow.schema(
+        pyarrow.field(name, pyarrow.type_for_alias(kind), metadata={'unit': unit, 'meaning': meaning})
+        for name, kind, unit, meaning in columns
+    )
+
+
+def table_of(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> 'pyarrow.Table':
+    """Return rows, {column: value}, as a table; a value that a row lacks, and NaN, is null.
+
+    Times are ISO texts in rows. Raises `ValueError` for a name that is no column.
+    """
+    pyarrow = required('pyarrow', NEEDED_FOR)
+    rows, schema = list(rows), schema_of(columns)
+    if unknown := {name for row in rows for name in row} - set(schema.names):
+        raise ValueError(
+            f'{", ".join(sorted(unknown))}: no such column; there are {", ".join(sorted(schema.names))}'
+        )
+    arrays = [
+        pyarrow.array([row.get(field.name) for row in rows], from_pandas=True).cast(field.type)  # NaN: null
+        for field in schema
+    ]
+    return pyarrow.table(arrays, schema=schema)
+
+
+def write_table(table: 'pyarrow.Table', file: Path) -> None:
+    """Write a table as Parquet, whole or not at all; the same table gives the same bytes.
+
+    Raises `WritingError`.
+    """
+    parquet = required('pyarrow.parquet', NEEDED_FOR)
+    with replaced(file) as beside:
+        parquet.write_table(table, beside, compression='zstd')
+
+
+@contextlib.contextmanager
+def replaced(file: Path) -> Iterator[Path]:
+    """Give the place of a new file that takes the place of `file` when the block ends, whole or not at all.
+
+    Raises `WritingError`.
+    """
+    beside = file.with_name(f'.{file.name}.{os.getpid()}')
+    with explained_errors(file):
+        try:
+            yield beside
+            beside.replace(file)
+        finally:
+            beside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def explained_errors(file: Path) -> Iterator[None]:
+    """Raise a `WritingError` where `file` cannot be written in the block, as on a full disk."""
+    try:
+        yield
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise WritingError(
+            f'{file} cannot be written: {why}; what was written stands, and once that is mended the same '
+            'command goes on where it stopped'
+        ) from error

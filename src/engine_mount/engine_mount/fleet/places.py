@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from engine_mount.fleet.tables import NEEDED_FOR
-from engine_mount.signals.extras import required
+from engine_mount.signals.signal import required
 from engine_mount.signals.sources.stores import entries
 from engine_mount.signals.sources.uris import Entry, SourceError, is_uri, local_path, scheme_of, shown
 from mount_recorder.metadata import METADATA_NAME
@@ -71,7 +70,7 @@ def select_recordings(sources: Sequence[str]) -> list[Place]:
 
 
 def _of_catalogue(table: Path) -> list[Place]:
-    parquet = required('pyarrow.parquet', NEEDED_FOR)
+    parquet = required('pyarrow.parquet', 'a table of a fleet')
     columns = parquet.read_table(table, columns=['uri', 'recording', 'size_bytes', 'fingerprint']).to_pydict()
     rows = zip(*columns.values(), strict=True)  # one for each mount
     return list(dict.fromkeys(Place(uri, name, size or 0, mark or '') for uri, name, size, mark in rows))

@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import JOURNAL, ORDER
-from engine_mount.fleet.tables import COLUMNS, NEEDED_FOR
-from engine_mount.signals.extras import required
+from engine_mount.fleet.job import COLUMNS, JOURNAL, NEEDED_FOR, ORDER
+from engine_mount.signals.signal import required
 from mount_models.quantity import nearest
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import Rows, TableJob
+from engine_mount.fleet.job import Row, Rows, TableJob
 from engine_mount.fleet.places import Place, root_of, select_recordings
 from engine_mount.fleet.setpoints import (
     Compared,
@@ -18,7 +18,6 @@ from engine_mount.fleet.setpoints import (
     compare_setpoints,
     recorded_in,
 )
-from engine_mount.fleet.tables import Row
 from engine_mount.recordings.recording import open_mount, open_run, recording_hash, recording_place
 from engine_mount.recordings.session import versions_told
 from engine_mount.reports.fleet.looks import Signals

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine_mount.drives.agreement import SETTLED, SETTLING
 from engine_mount.drives.core import ControlAnswers, ControlReplay
@@ -192,7 +193,8 @@ class AnswerFigures:
     """What one controller did: setpoints, damping, and the friction that its force model predicts."""
 
     def __init__(self) -> None:
-        self._columns: dict[str, list[Column]] = defaultdict(list)
+        self.columns: dict[str, list[NDArray[Any]]] = defaultdict(list)
+        """Blocks of samples by name."""
         self._steps: list[list[tuple[Times, Column]]] = []  # of each run: stamps (ns), degree of damping
         self._table: Sequence[Column] = ()
 
@@ -214,15 +216,15 @@ class AnswerFigures:
         power = np.copysign(force, traces['desired_force']) * traces['velocity']
         columns = {'setpoint': answers.setpoints, 'force': force[known], 'power': power[known]}
         for name, column in columns.items():
-            self._columns[name].append(column)
+            self.columns[name].append(column)
         steps = answers.traces['damping_active'][answers.traced]
         self._steps[-1].append((answers.stamps[answers.traced], steps))
-        self._columns['damped'].append(is_damped)
+        self.columns['damped'].append(is_damped)
 
     @property
     def setpoints(self) -> Column:
         """The setpoints (A) of all samples."""
-        return self._column('setpoint')
+        return self.column('setpoint')
 
     def switching(self, zero: int) -> tuple[Column, Column]:
         """Return when damping went on and off, s from the stamp `zero` (ns) on."""
@@ -235,19 +237,20 @@ class AnswerFigures:
 
     def row(self, sample_time: float, changed: str = '') -> dict[str, Any]:
         """Return the figures as columns, with `changed` (`_changed`) before their unit."""
-        setpoints, force = self.setpoints, self._column('force')
+        setpoints, force = self.setpoints, self.column('force')
         known = setpoints[~np.isnan(setpoints)]
         return {
             f'peak_current{changed}_a': known.max(initial=0.0) if known.size else math.nan,
             f'mean_current{changed}_a': ordered_sum(known) / known.size if known.size else math.nan,
-            f'damping{changed}_s': np.count_nonzero(self._column('damped')) * sample_time,
+            f'damping{changed}_s': np.count_nonzero(self.column('damped')) * sample_time,
             f'peak_friction{changed}_n': force.max(initial=0.0),
             f'rms_friction{changed}_n': math.sqrt(ordered_sum(force * force) / setpoints.size),
-            f'pad_energy{changed}_j': ordered_sum(self._column('power')) * sample_time,
+            f'pad_energy{changed}_j': ordered_sum(self.column('power')) * sample_time,
         }
 
-    def _column(self, name: str) -> Column:
-        return np.concatenate(self._columns[name])
+    def column(self, name: str) -> NDArray[Any]:
+        """Return a column (n,) of the samples."""
+        return np.concatenate(self.columns[name])
 
 
 def difference(what: str, unit: str, time: Column, values: Column, others: Column) -> dict[str, float]:

@@ -2,9 +2,8 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from engine_mount.recordings.audit import TopicAudit
 from engine_mount.recordings.audit import audit as audit_topics
@@ -19,8 +18,7 @@ Source: TypeAlias = str | os.PathLike[str] | Recording
 """A recording, or the path of one: its folder, one of its files, or the folder of a run."""
 
 
-@dataclass(frozen=True)
-class Audit:
+class Audit(NamedTuple):
     """What a recording lacks and what went wrong in it: by topic, and in all."""
 
     topics: dict[str, TopicAudit]

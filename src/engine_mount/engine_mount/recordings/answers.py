@@ -3,7 +3,6 @@
 import contextlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -46,34 +45,23 @@ class Control(NamedTuple):
     handovers: Times
     inactive: Times | None = None
 
-    def is_control(self, begin: int, end: int) -> bool:
-        """Return whether answers from `begin` to `end` are control rather than a ramp."""
-        return _has_any(self.steps, begin, end) if len(self.steps) else end not in self.handovers
-
     def stayed_active(self, begin: int, end: int) -> bool:
         """Return whether diagnostics were there to say that control was deactivated, and did not."""
         return self.inactive is not None and not _has_any(self.inactive, begin, end + _PAUSE)
 
 
-class Silence(NamedTuple):
-    """Between two setpoints (stamps in ns) none came in time while control was active: 0 A."""
-
-    begin: int
-    end: int
-
-
-@dataclass(frozen=True)
-class Answers:
+class Answers(NamedTuple):
     """How control answered: counts of samples, and the spans in which it was active.
 
     `asked` were taken while it was active; of these `unanswered` have no setpoint and `late` have one that
     was sent more than 20 ms after it, which the driver refuses (None: its clock is not that of the stamps).
+    Between the setpoints of a span of `silences` none came in time: 0 A.
     """
 
     asked: int = 0
     unanswered: int = 0
     late: int | None = None
-    silences: tuple[Silence, ...] = ()
+    silences: tuple[Span, ...] = ()
     spans: tuple[Span, ...] = ()
 
 
@@ -95,11 +83,11 @@ def judge_answers(samples: Times, setpoints: Setpoints, control: Control) -> Ans
         too_late = stamps[setpoints.sent[first] - stamps > _LATE]
         late = int(np.count_nonzero(spanned(too_late, spans) >= 0))
         in_time = answers[~is_in(answers, too_late)]
-    silences = []
+    silences = list[Span]()
     for begin, end in spans:
         ticks = np.concatenate([[begin], in_time[(in_time >= begin) & (in_time <= end)], [end]])
         long = np.flatnonzero(np.diff(ticks) > _LATE + _HALF_SAMPLE)
-        silences += [Silence(int(ticks[place]), int(ticks[place + 1])) for place in long]
+        silences += zip(ticks[long].tolist(), ticks[long + 1].tolist(), strict=True)
     unanswered = int(np.count_nonzero(~is_in(asked, answers)))
     return Answers(len(asked), unanswered, late, tuple(silences), tuple(spans))
 
@@ -120,7 +108,10 @@ def _spans(answers: Times, last_sample: int, control: Control) -> list[Span]:
     handed_over = True  # at the beginning, and behind a ramp, silence says nothing
     for part in np.split(answers, np.flatnonzero(breaks) + 1):
         begin, end = int(part[0]), int(part[-1])
-        if not control.is_control(begin, end):
+        is_ramp = end in control.handovers
+        if len(control.steps):
+            is_ramp = not _has_any(control.steps, begin, end)
+        if is_ramp:
             handed_over = True
             continue
         if found and not handed_over and control.stayed_active(found[-1][1], begin):
@@ -138,8 +129,7 @@ def _has_any(times: Times, begin: int, end: int) -> bool:
     return bool(((times >= begin) & (times <= end)).any())
 
 
-@dataclass(frozen=True)
-class Latency:
+class Latency(NamedTuple):
     """Latencies in s."""
 
     median: float

@@ -6,7 +6,6 @@ are held against the samples, not against their own stamps.
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +52,7 @@ from mount_ros.topics import (
 )
 
 
-@dataclass(frozen=True)
-class TopicAudit:
+class TopicAudit(NamedTuple):
     """What is there of a topic and what is not; None and NaN where it cannot be told, as `remark` says.
 
     `present` counts messages, `duplicated` those of them that repeat a sample, so that
@@ -134,8 +132,7 @@ def audit(recording: Recording) -> dict[str, TopicAudit]:
         measured = [mount.stamps(each) for each in (DISPLACEMENT, COIL_RIPPLE)]
         own = [audits.get(mount.namespace + each.name) for each in (DISPLACEMENT, COIL_RIPPLE)]
         lost = [entry.lost or 0 for entry in own if entry is not None]
-        audits[name] = replace(
-            audits[name],
+        audits[name] = audits[name]._replace(
             lost_samples=max(missing_samples(measured, topics[name].rate), *lost),
             answers=answers,
         )
@@ -199,19 +196,19 @@ def _from_stamps(name: str, topics: Mapping[str, _Topic]) -> TopicAudit:
     if why:
         return TopicAudit(None, present, None, remark=f'{why}: only counted')
     entry = TopicAudit(
-        **asdict(stamp_statistics(stamps, rate)),
+        **stamp_statistics(stamps, rate)._asdict(),
         misdated=int(np.count_nonzero(wrong)) or None,
         rate_hz=rate,
         remark=_misdated_remark(series.stamps, wrong) if wrong.any() else '',
     )
-    entry = replace(
-        entry, duplicated=(entry.duplicated or 0) - closed, expected=(entry.expected or 0) + closed
+    entry = entry._replace(
+        duplicated=(entry.duplicated or 0) - closed, expected=(entry.expected or 0) + closed
     )
     if topic in (CURRENT_SETPOINT, CONTROL_TRACE):
         if len(_Mount(name.removesuffix(topic.name), topics).stamps(DISPLACEMENT)):
-            entry = replace(entry, expected=entry.present - (entry.duplicated or 0), lost=0)
+            entry = entry._replace(expected=entry.present - (entry.duplicated or 0), lost=0)
         if topic is CURRENT_SETPOINT:
-            entry = replace(entry, latency=setpoint_latency(stamps, series.receive_times))
+            entry = entry._replace(latency=setpoint_latency(stamps, series.receive_times))
     return entry
 
 
@@ -230,9 +227,9 @@ def _with_counts(entry: TopicAudit, missing: int, recorded: int | None) -> Topic
     absent = max(missing, (recorded or 0) - entry.present)
     if absent <= 0:
         counted = recorded is not None and entry.expected is None
-        return replace(entry, expected=entry.present, lost=0) if counted else entry
+        return entry._replace(expected=entry.present, lost=0) if counted else entry
     lost = max(absent, entry.lost or 0)
-    return replace(entry, expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
+    return entry._replace(expected=entry.present - (entry.duplicated or 0) + lost, lost=lost)
 
 
 def _answers(recording: Recording, mount: _Mount) -> Answers | None:

@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
+from typing import Any
 
 import numpy as np
 
@@ -71,9 +71,7 @@ class BagCopy:
     def __enter__(self) -> 'BagCopy':
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: Any) -> None:
         if kind is not None:
             with contextlib.suppress(OSError):
                 self._file.file.close()
@@ -82,7 +80,7 @@ class BagCopy:
     @property
     def added(self) -> int:
         """How many messages were added."""
-        return sum(self._file.message_counts.values()) + self._file.pending
+        return self._file.message_counts.total() + self._file.pending
 
     @property
     def seconds(self) -> float:

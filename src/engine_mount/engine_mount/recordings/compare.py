@@ -1,8 +1,7 @@
 """Two recordings against each other: every signal of every topic that both have, sample by sample."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine_mount.recordings.difference import SHOWN, SignalDifference, Tolerances, few, signal_sentences
 from engine_mount.recordings.events import (
@@ -28,16 +27,15 @@ from mount_ros.topics import DIAGNOSTICS, EVENT, SESSION, Topic
 # Sessions have words of their own; diagnostics hold clock time and load, which are never equal.
 _NOT_BY_SAMPLES = (SESSION, EVENT, DIAGNOSTICS)
 _LACKING = {
-    'samples missing in B': 'only_a',
-    'samples missing in A': 'only_b',
-    'samples of A before or behind those of B': 'outside_a',
-    'samples of B before or behind those of A': 'outside_b',
+    'samples missing in B': 'missing_in_b',
+    'samples missing in A': 'missing_in_a',
+    'samples of A before or behind those of B': 'outside_in_a',
+    'samples of B before or behind those of A': 'outside_in_b',
     'messages that differ': 'differing_messages',
 }
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """What two recordings have in common and what not; times in s on the time axis of A."""
 
     name_a: str
@@ -97,11 +95,11 @@ class Comparison:
             *self.difference_sentences(),
             *([f'the sessions differ: {few(self.sessions, "; ")}'] if self.sessions else []),
             *(
-                f'{what}: {few([f"{count} of {name}" for name, count in found], ", ")}'
+                f'{what}: {few([f"{count} of {name}" for name, count in found])}'
                 for what, found in self.incomplete.items()
             ),
             *(f'{topic.name}: {topic.remark}' for topic in self.topics if topic.remark),
-            *(f'{what}: {few(names, ", ")}' for what, names in alone.items() if names),
+            *(f'{what}: {few(names)}' for what, names in alone.items() if names),
             self._rest(),
         ]
 

@@ -3,8 +3,7 @@
 import math
 import re
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +31,7 @@ class ToleranceError(ValueError):
     """A tolerance is not understood or names no signal; the text says how to write it."""
 
 
-@dataclass(frozen=True)
-class Tolerance:
+class Tolerance(NamedTuple):
     """A bound on the difference: in the signal's unit, or as a share of its largest value in A."""
 
     value: float = 0.0
@@ -94,8 +92,7 @@ def _read(text: str) -> tuple[str, Tolerance]:
     return name, Tolerance(value / 100.0 if relative else value, relative)
 
 
-@dataclass(frozen=True)
-class Moment:
+class Moment(NamedTuple):
     """One matched sample: time in s, values in A and B."""
 
     time: float
@@ -113,8 +110,7 @@ class Moment:
         return {'time_s': self.time, **{name: known(number) for name, number in numbers.items()}}
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One signal of matched samples: times (s), values in A and B.
 
     `mount` is the part of its name before the topic: `mount_left/`, or nothing.
@@ -133,8 +129,7 @@ class Column:
         return Moment(float(self.time[place]), float(self.a[place]), float(self.b[place]))
 
 
-@dataclass(frozen=True)
-class SignalDifference:
+class SignalDifference(NamedTuple):
     """One signal in both recordings; values in `unit`, unknown is NaN.
 
     `differing` samples are beyond the tolerance; NaN in one recording alone always is, NaN in both never.
@@ -243,7 +238,7 @@ def signal_sentences(signals: Iterable[SignalDifference]) -> list[str]:
     """Return the sentences about the most important of the differing `signals`."""
     ordered = by_importance(signals)
     others = [signal.name for signal in ordered[SHOWN:]]
-    more = [f'{len(others)} more signals differ: {few(others, ", ")}'] if others else []
+    more = [f'{len(others)} more signals differ: {few(others)}'] if others else []
     return [*(signal.sentence for signal in ordered[:SHOWN]), *more]
 
 
@@ -260,10 +255,10 @@ def signal_table(signals: Iterable[SignalDifference]) -> Table:
     )
 
 
-def few(names: Sequence[str], separator: str) -> str:
+def few(names: Sequence[str], separator: str = ', ', most: int = SHOWN) -> str:
     """Return the first names, and how many more there are."""
-    more = f'{separator}{len(names) - SHOWN} more' if len(names) > SHOWN else ''
-    return separator.join(names[:SHOWN]) + more
+    more = f'{separator}{len(names) - most} more' if len(names) > most else ''
+    return separator.join(names[:most]) + more
 
 
 def known(value: float | None) -> float | None:

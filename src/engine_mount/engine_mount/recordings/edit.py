@@ -3,8 +3,8 @@
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ class CutError(ValueError):
     """A recording has nothing in the asked range, or the range is none; the text says what there is."""
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """What was cut; `begin` and `end` in s on the time axis of the original."""
 
     folder: Path
@@ -125,8 +124,7 @@ class RecoveryError(ValueError):
     """Nothing of a recording can be recovered; the text says why."""
 
 
-@dataclass(frozen=True)
-class Recovery:
+class Recovery(NamedTuple):
     """What was kept and what is lost; `lost` is None where no summary or description counts the messages."""
 
     folder: Path
@@ -173,7 +171,7 @@ def recover(
         bag.complete(recording, {**custom_data(recording.information), **origin})
     expected = recording.described_count
     if recording.proven:
-        expected = sum(sum(file.message_counts.values()) for file in recording.files)
+        expected = sum(file.message_counts.total() for file in recording.files)
     complete = recording.whole and (expected is None or expected <= bag.added)
     return Recovery(
         folder=bag.folder,

@@ -1,13 +1,12 @@
 """What happened in a recording: marks, the switching of damping, and what the nodes said of themselves."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine_mount.recordings.difference import SHOWN, quantity_text, time_text
+from engine_mount.recordings.difference import few, quantity_text, time_text
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import Series, SeriesError
@@ -32,8 +31,7 @@ class EventError(ValueError):
     """An event that was asked for is not in the recording; the text lists those that are."""
 
 
-@dataclass(frozen=True)
-class RecordedEvent:
+class RecordedEvent(NamedTuple):
     """Something worth finding again: when it was logged, and its time on the clock of the stamps, in ns."""
 
     log_time: int
@@ -115,36 +113,32 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     if not events:
         return 'it has none, and damping was never switched; cut by --from and --to'
     axis = recording.time_axis
-    shown = [
-        f'{number} {event.kind} at {event_time(event, axis):.3f} s'
-        for number, event in enumerate(events[:_LISTED], 1)
+    all_of_them = [
+        f'{number} {event.kind} at {event_time(event, axis):.3f} s' for number, event in enumerate(events, 1)
     ]
-    more = f' and {len(events) - _LISTED} more' if len(events) > _LISTED else ''
-    return f'it has {", ".join(shown)}{more}'
+    return f'it has {few(all_of_them, most=_LISTED)}'
 
 
 # Switching.
 
 
-@dataclass(frozen=True)
-class Switching:
+class Switching(NamedTuple):
     """When damping went on and off, s."""
 
     on: Sequence[float]
     off: Sequence[float]
 
     def sentence(self, digits: int = 3) -> str:
-        """Return the first `SHOWN` stretches in words, times with so many digits behind the point."""
+        """Return the first stretches in words, times with so many digits behind the point."""
         if not self.on:
             return 'never on'
         ends = (next((f'{off:.{digits}f} s' for off in self.off if off > on), 'the end') for on in self.on)
-        shown = [f'{on:.{digits}f} s to {end}' for on, end in zip(self.on, ends, strict=True)]
-        more = f' and {len(shown) - SHOWN} more' if len(shown) > SHOWN else ''
-        return f'on from {", ".join(shown[:SHOWN])}{more}'
+        return (
+            f'on from {few([f"{on:.{digits}f} s to {end}" for on, end in zip(self.on, ends, strict=True)])}'
+        )
 
 
-@dataclass(frozen=True)
-class SwitchingChange:
+class SwitchingChange(NamedTuple):
     """One switching: `on` or off, its times (s) in A and B, None where there is none, and of which mount."""
 
     on: bool
@@ -228,8 +222,7 @@ def paired_switchings(
 # Reports of the nodes.
 
 
-@dataclass(frozen=True, slots=True)
-class NodeReport:
+class NodeReport(NamedTuple):
     """One status: when it was logged (ns), of which node below which namespace, and what it said."""
 
     log_time: int
@@ -258,7 +251,7 @@ def node_reports(recording: Recording) -> list[NodeReport]:
             for time, message in zip(series.receive_times.tolist(), series.messages(), strict=True)
             for verdict in verdicts_in(message)
         ]
-    except (ReadingError, SeriesError):
+    except ReadingError:
         return []
     return sorted(reports, key=lambda report: report.log_time)
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -39,8 +39,7 @@ class LayoutError(ValueError):
     """A message is not as its definition says."""
 
 
-@dataclass(frozen=True)
-class Definition:
+class Definition(NamedTuple):
     """The fields of a type and of all types within it, by names such as `std_msgs/msg/Header`."""
 
     name: str

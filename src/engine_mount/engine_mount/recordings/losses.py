@@ -6,10 +6,10 @@ Faults are errors of nodes, marks of faults, and a coil without setpoints.
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 from engine_mount.recordings.audit import TopicAudit
+from engine_mount.recordings.difference import few
 from engine_mount.recordings.events import CONTROL, node_reports, recorded_marks
 from engine_mount.recordings.recording import Recording
 from engine_mount.recordings.screen import Table
@@ -84,11 +84,7 @@ def faults(recording: Recording, audits: Mapping[str, TopicAudit]) -> list[Fault
     return sorted((fault for fault in found if begin <= fault.time <= end), key=lambda fault: fault.time)
 
 
-_SHOWN = 5  # faults named one by one
-
-
-@dataclass(frozen=True)
-class Losses:
+class Losses(NamedTuple):
     """The figures of one recording, of all its mounts together.
 
     `lost_samples` of `samples` were taken by the electronics and lack their displacement or ripple;
@@ -157,9 +153,7 @@ class Losses:
         """Return how many faults there are, and the first in words, each on a line of its own."""
         if not self.faults:
             return f'not judged: {self.unjudged}' if self.unjudged else 'none'
-        rest = len(self.faults) - _SHOWN
-        more = [f'and {rest} more'] if rest > 0 else []
-        return f'{len(self.faults)}:\n' + ';\n'.join([*map(str, self.faults[:_SHOWN]), *more])
+        return f'{len(self.faults)}:\n' + few([*map(str, self.faults)], ';\n')
 
     def as_json(self) -> dict[str, Any]:
         """Return the figures as JSON knows them: unknown is null, times are in s."""
@@ -226,7 +220,7 @@ def as_json(audits: Mapping[str, TopicAudit], found: Losses) -> dict[str, Any]:
     for name, entry in audits.items():
         figures = {figure: getattr(entry, figure) for figure in _FIGURES}
         topics[name] = {figure: None if value != value else value for figure, value in figures.items()}
-        latency = entry.latency and {f'{key}_s': value for key, value in asdict(entry.latency).items()}
+        latency = entry.latency and {f'{key}_s': value for key, value in entry.latency._asdict().items()}
         topics[name]['latency'] = latency
     return {**found.as_json(), 'topics': topics}
 

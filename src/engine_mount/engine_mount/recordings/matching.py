@@ -1,9 +1,8 @@
 """Which sample of one recording belongs to which of another, topic by topic, and what time it has."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +30,7 @@ class ComparisonError(ValueError):
     """Two recordings have nothing that could be compared; the text says what they have."""
 
 
-@dataclass(frozen=True)
-class Alignment:
+class Alignment(NamedTuple):
     """How samples of A and B of one mount become one time axis.
 
     With `same_stamps` samples of equal stamp belong together, else samples of equal number, counted from the
@@ -129,24 +127,23 @@ def _alignment(a: Series, b: Series, axis: TimeAxis) -> Alignment:
     )
 
 
-@dataclass(frozen=True)
-class TopicComparison:
+class TopicComparison(NamedTuple):
     """One topic of both: its signals, and how many samples are in one recording alone.
 
-    `only_a` and `only_b` are samples within the time that both recordings cover with this topic,
-    `outside_a` and `outside_b` those before and behind it.
+    Samples are missing within the time that both recordings cover with this topic, those before and behind it
+    are outside.
     """
 
     mount: str  # `mount_left/`, or nothing
     topic: str
     samples: int
-    signals: tuple[SignalDifference, ...]
-    only_a: int
-    only_b: int
-    outside_a: int
-    outside_b: int
+    missing_in_b: int
+    missing_in_a: int
+    outside_in_a: int
+    outside_in_b: int
     differing_messages: int  # in what no signal shows
     remark: str
+    signals: tuple[SignalDifference, ...]
 
     @property
     def name(self) -> str:
@@ -155,16 +152,8 @@ class TopicComparison:
 
     def figures(self) -> dict[str, Any]:
         """Return the figures for JSON."""
-        return {
-            'samples': self.samples,
-            'missing_in_b': self.only_a,
-            'missing_in_a': self.only_b,
-            'outside_in_a': self.outside_a,
-            'outside_in_b': self.outside_b,
-            'differing_messages': self.differing_messages,
-            'remark': self.remark,
-            'signals': {signal.signal: signal.figures() for signal in self.signals},
-        }
+        own = {name: value for name, value in self._asdict().items() if name not in ('mount', 'topic')}
+        return {**own, 'signals': {signal.signal: signal.figures() for signal in self.signals}}
 
 
 class MatchedTopic:
@@ -240,13 +229,13 @@ class MatchedTopic:
             mount=self.mount,
             topic=self.topic,
             samples=self.samples,
-            signals=tuple(signals),
-            only_a=within[0] - self.samples,
-            only_b=within[1] - self.samples,
-            outside_a=len(self._keys[0]) - within[0],
-            outside_b=len(self._keys[1]) - within[1],
+            missing_in_b=within[0] - self.samples,
+            missing_in_a=within[1] - self.samples,
+            outside_in_a=len(self._keys[0]) - within[0],
+            outside_in_b=len(self._keys[1]) - within[1],
             differing_messages=self._differing_messages(),
             remark=self._remark,
+            signals=tuple(signals),
         )
 
     @cached_property

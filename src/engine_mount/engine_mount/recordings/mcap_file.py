@@ -21,7 +21,7 @@ from engine_mount.recordings.mcap_records import (
     FOOTER_LENGTH,
     RECORD,
     Chunk,
-    StorageError,
+    ReadingError,
     StoredMessages,
     StoredTopic,
     Summary,
@@ -54,7 +54,7 @@ class McapFile:
         self.topics: dict[int, StoredTopic] = {}
         self.records: list[tuple[str, dict[str, str]]] = []  # of metadata
         self.warnings: list[str] = []
-        self.message_counts: dict[int, int] = {}  # by topic: as written where proven, else as readable
+        self.message_counts = Counter[int]()  # by topic: as written where proven, else as readable
         self.time_range: tuple[int, int] | None = None  # log times in ns, None without messages
         self.chunks: list[Chunk] = []
         self.unexplained: list[tuple[int, int]] = []
@@ -69,7 +69,7 @@ class McapFile:
         self.proven = bool(summary.sound)
         """Whether its own account of its content can be relied upon."""
         if self._data[:_BEGIN] != MCAP0_MAGIC and not summary.sound and not any(scattered_chunks(self._data)):
-            raise StorageError(f'{path} is no MCAP file: its first bytes are not those of one')
+            raise ReadingError(f'{path} is no MCAP file: its first bytes are not those of one')
         if summary.complete:
             self._use_summary(summary)
         else:
@@ -183,12 +183,12 @@ class McapFile:
         self._warn(f'the chunk at byte {chunk.position} is left out: it is damaged')
 
     def _use_summary(self, summary: Summary) -> None:
-        assert summary.statistics is not None
-        self.chunks, self._schemas, self._channels = summary.chunks, summary.schemas, summary.channels
+        self.chunks, content = list(summary.chunks), summary.content
+        self._schemas, self._channels = content.schemas, content.channels
         for begin, limit in gaps(self.chunks, _BEGIN, summary.begin):
             self._walk(begin, limit)
         self._data_end = summary.begin
-        self.message_counts = dict(summary.statistics.channel_message_counts)
+        self.message_counts = Counter(content.statistics.channel_message_counts)
         if self._data[-_BEGIN:] != MCAP0_MAGIC:
             self._warn('its last bytes are damaged; all else is read')
 
@@ -233,8 +233,7 @@ class McapFile:
             elif opcode == Opcode.CHANNEL and (channel := parsed(Channel.read, declaration)):
                 self._channels.setdefault(channel.id, channel)
         counts = Counter(messages.heads['topic'].tolist())
-        for number, count in counts.items():
-            self.message_counts[number] = self.message_counts.get(number, 0) + count
+        self.message_counts.update(counts)
         chunk.indexes = dict.fromkeys(counts, 0)
         if counts:
             times = messages.heads['log_time']
@@ -246,7 +245,7 @@ class McapFile:
         """Use the records from `position` on; return where the last sensible one before `limit` ends."""
         for opcode, begin, end in records_in(self._data, position, limit):
             if opcode == Opcode.MESSAGE and not self.chunks:
-                raise StorageError(
+                raise ReadingError(
                     f'{self.path} has messages outside of chunks: '
                     f'copy it by rosbags-convert --src {self.path.name} --dst FOLDER and read that'
                 )
@@ -280,6 +279,6 @@ def _mapped(path: Path) -> mmap.mmap:
         with path.open('rb') as file:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
-        raise StorageError(f'{path} cannot be read: {error.strerror or error}') from None
+        raise ReadingError(f'{path} cannot be read: {error.strerror or error}') from None
     except ValueError:
-        raise StorageError(f'{path} is empty') from None
+        raise ReadingError(f'{path} is empty') from None

@@ -8,9 +8,9 @@ import mmap
 import struct
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import lz4.frame
 import numpy as np
@@ -19,7 +19,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel, ChunkIndex, Footer, Schema, Statistics
+from mcap.records import ChunkIndex, Footer
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
@@ -51,12 +51,11 @@ _TAGS = (b'\x04\x00\x00\x00zstd', b'\x03\x00\x00\x00lz4')
 FOOTER_LENGTH = 20  # bytes behind opcode and length
 
 
-class StorageError(ValueError):
-    """A file holds no recording that can be read; the text gives the reason."""
+class ReadingError(ValueError):
+    """A recording, a topic or a column of it cannot be read; the text gives the reason."""
 
 
-@dataclass(frozen=True)
-class StoredTopic:
+class StoredTopic(NamedTuple):
     """A topic as a file declares it: its type and the definition of that, empty where the file has none.
 
     `encoding` is that of the messages (`cdr`), `definition_encoding` that of the text (`ros2msg`); `details`
@@ -68,7 +67,7 @@ class StoredTopic:
     encoding: str
     definition: bytes = b''
     definition_encoding: str = ''
-    details: Mapping[str, str] = field(default_factory=dict)
+    details: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,26 +126,23 @@ class Chunk:
         return self.indexes is None or not self.indexes.keys().isdisjoint(channels)
 
 
-@dataclass
-class Summary:
+class Summary(NamedTuple):
     """The end of a file; empty unless its checksum holds (`sound`; None where none was written)."""
 
     sound: bool | None
     begin: int = 0  # of the summary in the file; the data section ends before
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
-    statistics: Statistics | None = None
+    chunks: Sequence[Chunk] = ()
+    content: Any = None  # as `mcap` reads it: schemas, channels, statistics
 
     @property
     def complete(self) -> bool:
         """Whether it is sound and the file need not be searched."""
-        known = self.statistics
-        if not self.sound or known is None or known.chunk_count != len(self.chunks):
+        known, there = self.content and self.content.statistics, self.content
+        if known is None or known.chunk_count != len(self.chunks):
             return False
-        if known.channel_count > len(self.channels) or known.schema_count > len(self.schemas):
+        if known.channel_count > len(there.channels) or known.schema_count > len(there.schemas):
             return False  # not repeated in the summary
-        return known.channel_message_counts.keys() <= self.channels.keys()
+        return bool(known.channel_message_counts.keys() <= there.channels.keys())
 
 
 def records_in(data: mmap.mmap | bytes, position: int, limit: int) -> Iterator[tuple[int, int, int]]:
@@ -186,14 +182,7 @@ def read_summary(data: mmap.mmap) -> Summary:
     known = [chunk for chunk in chunks if chunk is not None]
     if content is None or len(known) < len(chunks):
         return Summary(False)
-    return Summary(
-        True,
-        footer.summary_start,
-        content.schemas,
-        content.channels,
-        sorted(known, key=lambda chunk: chunk.position),
-        content.statistics,
-    )
+    return Summary(True, footer.summary_start, sorted(known, key=lambda chunk: chunk.position), content)
 
 
 def gaps(chunks: Sequence[Chunk], begin: int, end: int) -> list[tuple[int, int]]:

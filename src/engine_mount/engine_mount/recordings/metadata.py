@@ -12,16 +12,12 @@ from pydantic import BaseModel, NonNegativeInt, ValidationError
 from rosbags.interfaces import QosTime
 from rosbags.rosbag2.metadata import parse_qos
 
-from engine_mount.recordings.mcap_records import StoredTopic
+from engine_mount.recordings.mcap_records import ReadingError, StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_recorder.metadata import ROOT, Offers
 from mount_ros.topics import RACK_TOPICS, SHADOW_TOPICS, TOPICS, Topic
 
 T = TypeVar('T')
-
-
-class MetadataError(ValueError):
-    """A description of a recording is not understood."""
 
 
 # Recordings have the same few names, and of each it is asked again and again.
@@ -99,7 +95,7 @@ class BagInformation(BaseModel, strict=True):
 
 
 def read_metadata(text: str) -> BagInformation:
-    """Return what `metadata.yaml` or a metadata record says; raises `MetadataError`."""
+    """Return what `metadata.yaml` or a metadata record says; raises `ReadingError`."""
     try:
         document = plain_yaml(text)
         return BagInformation.model_validate(document.get(ROOT, document))
@@ -110,7 +106,7 @@ def read_metadata(text: str) -> BagInformation:
         )
     except (ValueError, AttributeError) as error:
         reason = str(error)
-    raise MetadataError(f'description of the recording not understood: {reason}')
+    raise ReadingError(f'description of the recording not understood: {reason}')
 
 
 # The topics of a recording, and of many recordings, have the same few texts.

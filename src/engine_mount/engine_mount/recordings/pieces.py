@@ -20,10 +20,9 @@ from engine_mount.recordings.layout import (
     text_definition,
 )
 from engine_mount.recordings.mcap_file import McapFile
-from engine_mount.recordings.mcap_records import StorageError
+from engine_mount.recordings.mcap_records import ReadingError
 from engine_mount.recordings.metadata import (
     BagInformation,
-    MetadataError,
     TopicInformation,
     read_metadata,
     readable_qos,
@@ -45,7 +44,7 @@ class Pieces(NamedTuple):
 
 
 def find_pieces(path: Path) -> Pieces:
-    """Return the files of a recording that is a folder or a single file; raises `StorageError`."""
+    """Return the files of a recording that is a folder or a single file; raises `ReadingError`."""
     if not path.is_dir():
         return Pieces([path])
     matches = {file: match for file in path.iterdir() if (match := _PIECE.fullmatch(file.name))}
@@ -59,11 +58,11 @@ def find_pieces(path: Path) -> Pieces:
     else:
         try:
             information, obstacle = read_metadata(text_of_file(path / METADATA_NAME)), ''
-        except (YamlError, MetadataError) as error:
+        except (YamlError, ReadingError) as error:
             information, obstacle = None, f'{METADATA_NAME} is not readable ({error})'
     if information is None:
         if not present:
-            raise StorageError(f'{path} holds no MCAP file')
+            raise ReadingError(f'{path} holds no MCAP file')
         complete = [numbers[file] for file in present] == list(range(len(present)))
         return Pieces(present, None, (f'{obstacle}; topics and times are those in the files',), complete)
     if information.storage_identifier == 'sqlite3' or (
@@ -71,7 +70,7 @@ def find_pieces(path: Path) -> Pieces:
     ):
         return Pieces([path], information)
     if information.storage_identifier != 'mcap':
-        raise StorageError(f'{path} is stored as {information.storage_identifier}; convert it to mcap')
+        raise ReadingError(f'{path} is stored as {information.storage_identifier}; convert it to mcap')
     listed = [path / Path(file).name for file in information.relative_file_paths]
     missing = [file.name for file in listed if not file.is_file()]
     here = [file for file in listed if file.is_file()] or present
@@ -87,19 +86,19 @@ def find_pieces(path: Path) -> Pieces:
 
 
 def open_piece(path: Path) -> McapFile:
-    """Open one file of a recording; raises `StorageError`.
+    """Open one file of a recording; raises `ReadingError`.
 
     What is no MCAP file of plain messages is read from a copy: files and folders of bags in sqlite3 and of
     compressed ones.
     """
     if path.suffix in ('.zstd', '.zst'):
-        raise StorageError(f'{path} is compressed as a whole; unpack it by zstd -d first')
+        raise ReadingError(f'{path} is compressed as a whole; unpack it by zstd -d first')
     if path.suffix != '.db3' and not path.is_dir():
         return McapFile(path)
     folder = path if path.is_dir() else path.parent
     logs = [log.name for log in folder.glob('*.db3-*') if log.stat().st_size]
     if logs:
-        raise StorageError(
+        raise ReadingError(
             f'{path} was not closed by its writer, messages stand in {logs[0]}: close a copy by '
             f"sqlite3 {logs[0].rpartition('-')[0]} 'PRAGMA journal_mode=DELETE' and read that"
         )
@@ -108,7 +107,7 @@ def open_piece(path: Path) -> McapFile:
         try:
             convert([path], Path(copy, 'bag'), 'mcap', 9, None, 'file', store, None, (), (), (), ())
         except ConverterError as error:
-            raise StorageError(f'{path} cannot be converted to MCAP: {error}') from None
+            raise ReadingError(f'{path} cannot be converted to MCAP: {error}') from None
         file = McapFile(Path(copy, 'bag', 'bag.mcap'))  # it stays open
     file.path = path
     return file
@@ -133,7 +132,7 @@ def declared_topics(
                 topic.other_types.add(stored.type)
                 continue
             topic.places.setdefault(file, []).append(number)
-            topic.message_count += file.message_counts.get(number, 0)
+            topic.message_count += file.message_counts[number]
     return topics
 
 

@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from engine_mount.recordings.mcap_file import McapFile
-from engine_mount.recordings.mcap_records import HEAD, StorageError
+from engine_mount.recordings.mcap_records import HEAD, ReadingError
 from engine_mount.recordings.metadata import (
     ZERO_KEY,
     BagInformation,
-    MetadataError,
     TopicInformation,
     origin,
     read_metadata,
@@ -35,11 +34,6 @@ from mount_ros.topics import CURRENT_SETPOINT, DISPLACEMENT, JOINT_STATE
 
 # Times among columns: no field has such a name, behind the / is that of the property of a `Series`.
 _STAMPS, _RECEIVED, _SENT = '/stamps', '/receive_times', '/publish_times'
-_AT_ONCE = 1 << 20  # bytes read at once for a hash, chosen
-
-
-class ReadingError(ValueError):
-    """A recording, or a topic of it, cannot be read; the text gives the reason."""
 
 
 def open_recording(path: str | os.PathLike[str]) -> 'Recording':
@@ -56,15 +50,18 @@ def open_run(path: Path) -> 'Recording':
     return open_recording(recording_place(path))
 
 
-def open_mount(path: Path, mount: str = '') -> 'Recording':
-    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`."""
+def open_mount(path: Path, mount: str = '', option: str = '--mount') -> 'Recording':
+    """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`.
+
+    `option` is that of a command by which it is chosen.
+    """
     recording = open_run(path)
     if not mount and len(recording.mounts) < 2:
         return recording
     if mount.strip('/') not in recording.mounts:
         what = f'no mount {mount!r}' if mount else 'several mounts'
         known = ', '.join(recording.mounts) or 'none with a name'
-        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --mount')
+        raise ReadingError(f'{path} has {what}; it has {known}: choose one with {option}')
     return recording.of_mount(mount.strip('/'))
 
 
@@ -83,8 +80,7 @@ def recording_hash(path: Path) -> str:
     files = [part for part in path.rglob('*') if part.is_file()] if path.is_dir() else [path]
     for part in sorted(part for part in files if part.match('*.mcap*')) or sorted(files):
         with part.open('rb') as stream:
-            while content := stream.read(_AT_ONCE):
-                digest.update(content)
+            hashlib.file_digest(stream, lambda: digest)
     return digest.hexdigest()
 
 
@@ -97,18 +93,14 @@ class Recording:
         """Of which of several mounts these are the topics; empty: of all."""
         self.files: list[McapFile] = []
         self._series: dict[str, Series] = {}
-        reasons = []
-        try:
-            pieces = find_pieces(path)
-            for place in pieces.paths:
-                try:
-                    self.files.append(open_piece(place))
-                except StorageError as error:
-                    reasons.append(str(error))
-            if not self.files:
-                raise StorageError('; '.join(reasons) or f'{path} holds no MCAP file')
-        except StorageError as error:
-            raise ReadingError(str(error)) from None
+        reasons, pieces = [], find_pieces(path)
+        for place in pieces.paths:
+            try:
+                self.files.append(open_piece(place))
+            except ReadingError as error:
+                reasons.append(str(error))
+        if not self.files:
+            raise ReadingError('; '.join(reasons) or f'{path} holds no MCAP file')
         self.warnings: list[str] = [*pieces.warnings, *reasons]
         for file in self.files:
             self.warnings += file.warnings
@@ -252,19 +244,12 @@ class Recording:
         Only these are in memory. Raises `ReadingError`.
         """
         counts = {self.resolve(name): 0 for name in names}
-        places = {
-            file: {
-                name: self.topics[name].places[file] for name in counts if file in self.topics[name].places
-            }
-            for file in self.files
-        }
-        for file in filter(places.get, self.files):
-            names = list(places[file])
-            for place, part in file.blocks(list(places[file].values())):
-                counts[names[place]] += len(part)
-                yield self._make_series(
-                    names[place], (Payloads([part.at(slice(most)).payloads()]), part.heads[:most])
-                )
+        for file in self.files:
+            stored = {name: here for name in counts if (here := self.topics[name].places.get(file))}
+            for place, part in file.blocks(list(stored.values())) if stored else ():
+                name, first = list(stored)[place], part.at(slice(most))
+                counts[name] += len(part)
+                yield self._make_series(name, (Payloads([first.payloads()]), first.heads))
         for name, present in counts.items():
             expected = self.topics[name].message_count
             if self.missing.get(name, 0) < expected - present:
@@ -300,7 +285,7 @@ class Recording:
         text = self.files[0].metadata.get('rosbag2', {}).get('serialized_metadata')
         try:
             return read_metadata(text) if text else None
-        except MetadataError as error:
+        except ReadingError as error:
             self.warnings.append(f'{self.files[0].path.name}: {error}')
             return None
 

@@ -1,11 +1,11 @@
 """Reference recordings: short drives in the repository whose setpoints a replay must meet to the bit."""
 
 import re
-import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -45,8 +45,7 @@ class AcceptError(ValueError):
     """A recording cannot become a reference; the text says why and what to do."""
 
 
-@dataclass(frozen=True)
-class Accepted:
+class Accepted(NamedTuple):
     """A reference recording as it stands now; sizes in bytes."""
 
     folder: Path
@@ -76,11 +75,10 @@ def accept(
         if comparison.equal and not comparison.sessions:
             raise AcceptError(f'{run.path} is equal to {before.path} to the bit; there is nothing to accept')
         changes = comparison.sentences()
-    made = folder / f'.{name}.new'
-    shutil.rmtree(made, ignore_errors=True)
-    try:
-        made.mkdir(parents=True)
-        with BagCopy(made / name, _CHUNK_SIZE) as bag:
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=folder, prefix='.') as made:
+        new = Path(made, name)
+        with BagCopy(new, _CHUNK_SIZE) as bag:
             bag.add(parts)
             bag.complete()
         entry = {
@@ -90,15 +88,13 @@ def accept(
             'versions': dict(versions or {}),
             'changes': changes or ['new reference'],
         }
-        _write_history(made / name, target, entry)
-        aside = folder / f'.{name}.old'
-        shutil.rmtree(aside, ignore_errors=True)
+        earlier = target / ACCEPTED_NAME
+        entries = [*((yaml_in_file(earlier) or []) if earlier.is_file() else []), entry]
+        history = yaml.safe_dump(entries, sort_keys=False, allow_unicode=True, width=100)
+        (new / ACCEPTED_NAME).write_text(history, encoding='utf-8')
         if target.exists():
-            target.rename(aside)
-        (made / name).rename(target)
-        shutil.rmtree(aside, ignore_errors=True)
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
+            target.rename(Path(made, 'before'))
+        new.rename(target)
     return Accepted(target, _size(target), sum(map(_size, folder.iterdir())), tuple(changes))
 
 
@@ -110,12 +106,12 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
                 name = source.resolve(topic.name)
                 messages = read_messages(source, name)
                 if messages is not None and len(messages):
-                    parts[topic] = replace(messages, topic=replace(messages.topic, name=f'/{topic.name}'))
+                    parts[topic] = replace(messages, topic=messages.topic._replace(name=f'/{topic.name}'))
     for topic in (*ANSWERS, DISPLACEMENT, AIR_GAP, CURRENT_FORCE_TABLE):
         if topic not in parts:
             raise AcceptError(f'{run.path} has no {topic.name}, without which nothing can be replayed')
-    source = run if _has_displacement(run) else before
-    assert source is not None
+    has_displacement = DISPLACEMENT.name in run and len(run[DISPLACEMENT.name])
+    source = run if has_displacement or before is None else before
     stamps = source[DISPLACEMENT.name].stamps
     for topic in ANSWERS:
         without = np.setdiff1d(run[topic.name].stamps, stamps)
@@ -132,14 +128,8 @@ def _parts(run: Recording, before: Recording | None) -> list[Messages]:
         session = parts[SESSION].at(np.array([len(parts[SESSION]) - 1]))
         content = session_content(recorded_session(run) or recorded_session(before or run))
         shortened = string_message(session_text(_shortened(content)))
-        parts[SESSION] = (
-            session if _shortened(content) == content else replace(session, payloads=Payloads([[shortened]]))
-        )
+        parts[SESSION] = replace(session, payloads=Payloads([[shortened]]))
     return list(parts.values())
-
-
-def _has_displacement(recording: Recording) -> bool:
-    return DISPLACEMENT.name in recording and len(recording[DISPLACEMENT.name]) > 0
 
 
 def _shortened(content: Any) -> Any:
@@ -151,13 +141,6 @@ def _shortened(content: Any) -> Any:
     if isinstance(content, str) and content.startswith('/') and len(Path(content).parts) > 2:
         return Path(content).name
     return content
-
-
-def _write_history(made: Path, target: Path, entry: dict[str, Any]) -> None:
-    earlier = target / ACCEPTED_NAME
-    entries = (yaml_in_file(earlier) or []) if earlier.is_file() else []
-    text = yaml.safe_dump([*entries, entry], sort_keys=False, allow_unicode=True, width=100)
-    (made / ACCEPTED_NAME).write_text(text, encoding='utf-8')
 
 
 def _size(folder: Path) -> int:

@@ -2,14 +2,12 @@
 
 import contextlib
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from itertools import zip_longest
-from typing import Protocol, TextIO
+from typing import NamedTuple, TextIO
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Rows of texts below `heads` (none: no head); `columns` has `l` or `r` for each: where its texts stand.
 
     The rows `marked` are not as they should be; `ruled`: rows of long texts, with lines between them.
@@ -24,19 +22,13 @@ class Table:
     ruled: bool = False
 
 
-class Bar(Protocol):
-    """Takes the share that is done (0..1) and, where it has changed, what is being done.
+Bar = Callable[..., None]
+"""Takes the share that is done (0..1) and, where it has changed, `what` is being done.
 
-    `detail` is a sentence about this moment.
-    """
-
-    def __call__(self, share: float, what: str = '', detail: str = '') -> None: ...
-
-
-class Line(Protocol):
-    """Takes the text that stands there from now on."""
-
-    def __call__(self, text: str) -> None: ...
+`detail` is a sentence about this moment.
+"""
+Line = Callable[[str], None]
+"""Takes the text that stands there from now on."""
 
 
 class Screen:

@@ -17,6 +17,7 @@ from engine_mount.recordings.layout import (
     installed_definition,
     layout_of,
 )
+from engine_mount.recordings.mcap_records import ReadingError
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.times import NO_TIMES, Times
 from mount_ros.topics import JOINT_STATE, Scalar, Topic
@@ -27,7 +28,7 @@ STAMP = ('header.stamp.sec', 'header.stamp.nanosec')
 _OTHER_CLOCK = 86_400 * 1_000_000_000  # ns, chosen: stamps so far off are of another clock
 
 
-class SeriesError(ValueError):
+class SeriesError(ReadingError):
     """The messages of a topic have no such column or message; the text has those that are there."""
 
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from engine_mount.recordings.difference import few
 from engine_mount.recordings.metadata import registered_topic
 from engine_mount.recordings.recording import ReadingError, Recording
-from engine_mount.recordings.series import SeriesError
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_models.sampling import HIGHEST_SAMPLE_RATE, LOWEST_SAMPLE_RATE, SAMPLE_RATE
 from mount_ros.topics import SESSION
@@ -19,7 +19,7 @@ _OF_THE_MOMENT = re.compile(r'started|.*\.(uri|port)')  # differs from run to ru
 _LISTED = 3  # parameters that only one names
 
 
-class SessionError(ValueError):
+class SessionError(ReadingError):
     """A session message is not understood; the text says why."""
 
 
@@ -36,7 +36,11 @@ def session_content(text: str) -> dict[str, Any]:
 
 def session_parameters(content: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return {node: {parameter: value}} of a session, {} where it tells none."""
-    return {str(node): values for node, values in _mapping(content, 'parameters') if isinstance(values, dict)}
+    return {
+        str(node): values
+        for node, values in _mapping(content, 'parameters').items()
+        if isinstance(values, dict)
+    }
 
 
 def session_sample_rate(content: Mapping[str, Any]) -> float:
@@ -81,7 +85,7 @@ def recorded_sample_rate(recording: Recording, namespace: str = '/') -> float:
         found = recorded_sessions(recording)
         text = found.get(f'{namespace}{SESSION.name}') or recorded_session(recording)
         return session_sample_rate(session_content(text))
-    except (SessionError, ReadingError, SeriesError):
+    except ReadingError:
         return SAMPLE_RATE
 
 
@@ -90,7 +94,7 @@ def told_session(recording: Recording) -> dict[str, Any]:
     try:
         text = recorded_session(recording) or next(iter(recorded_sessions(recording).values()), '')
         return session_content(text)
-    except (SessionError, SeriesError, ReadingError):
+    except ReadingError:
         return {}
 
 
@@ -113,8 +117,7 @@ def session_differences(a: str, b: str) -> list[str]:
     for where, here, there in (('A', one, other), ('B', other, one)):
         alone = [f'{name} ({text})' for name, text in here.items() if name not in there]
         if alone:
-            more = f' and {len(alone) - _LISTED} more' if len(alone) > _LISTED else ''
-            found.append(f'only {where} tells {", ".join(alone[:_LISTED])}{more}')
+            found.append(f'only {where} tells {few(alone, most=_LISTED)}')
     return found
 
 
@@ -145,9 +148,8 @@ def versions_told(content: Mapping[str, Any]) -> dict[str, str]:
 
     A recorded replay has its own versions beside those of the drive; its answers are of its own.
     """
-    replay = content.get('replay')
-    source = replay if isinstance(replay, Mapping) else content
-    return {str(name): str(value) for name, value in _mapping(source, 'versions')}
+    source = _mapping(content, 'replay') or content
+    return {str(name): str(value) for name, value in _mapping(source, 'versions').items()}
 
 
 def version_differences(session: Mapping[str, Any], here: Mapping[str, str]) -> dict[str, str | None]:
@@ -169,9 +171,9 @@ def versions_sentence(differences: Mapping[str, str | None], here: Mapping[str, 
     return f'the recording was made with {which}{more}'
 
 
-def _mapping(content: Mapping[str, Any], key: str) -> list[tuple[Any, Any]]:
+def _mapping(content: Mapping[str, Any], key: str) -> Mapping[Any, Any]:
     found = content.get(key)
-    return list(found.items()) if isinstance(found, Mapping) else []
+    return found if isinstance(found, Mapping) else {}
 
 
 def _flat(content: Mapping[Any, Any], prefix: str = '') -> dict[str, Any]:

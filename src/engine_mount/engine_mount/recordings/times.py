@@ -12,7 +12,7 @@ A stamp far from those of the samples around it is no time of a sample: misdated
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +37,8 @@ def distinct(times: Times) -> Times:
     """Return the distinct times, rising; `np.unique` hashes them, which takes ten times as long."""
     if bool((times[1:] > times[:-1]).all()):
         return times
-    times = ordered(times)
+    times = np.sort(times)
     return times[np.append(True, times[1:] > times[:-1])]
-
-
-def ordered(times: Times) -> Times:
-    """Return times sorted; no copy where they are."""
-    return times if bool((times[1:] >= times[:-1]).all()) else np.sort(times)
 
 
 def each_once(times: Times) -> tuple[Times, 'slice | NDArray[np.intp]']:
@@ -60,8 +55,7 @@ def is_in(times: Times, known: Times) -> NDArray[np.bool_]:
     return known[np.minimum(np.searchsorted(known, times), len(known) - 1)] == times
 
 
-@dataclass(frozen=True)
-class StampStatistics:
+class StampStatistics(NamedTuple):
     """Counts of samples; `longest_gap_s` between neighbouring stamps in s, NaN below two samples."""
 
     expected: int
@@ -76,8 +70,7 @@ def stamp_statistics(stamps: Times, rate: float) -> StampStatistics:
     """Return the statistics of `stamps` (ns, in the order of arrival) of a topic with `rate` in Hz."""
     if not len(stamps):
         return StampStatistics(0, 0, 0, 0, 0, math.nan)
-    rising = ordered(stamps)
-    differences = np.diff(rising)
+    differences = np.diff(np.sort(stamps))
     periods = differences * (rate / _NANOSECONDS)
     steps = np.rint(periods)
     expected, filled = 1 + int(steps.sum()), 1 + int(np.count_nonzero(steps))
@@ -88,7 +81,7 @@ def stamp_statistics(stamps: Times, rate: float) -> StampStatistics:
         present=len(stamps),
         lost=expected - filled,
         duplicated=len(stamps) - filled,
-        out_of_order=0 if rising is stamps else _out_of_order(stamps),
+        out_of_order=int(np.count_nonzero(stamps[1:] < np.maximum.accumulate(stamps)[:-1])),
         longest_gap_s=int(differences.max()) / _NANOSECONDS if len(stamps) > 1 else math.nan,
     )
 
@@ -97,11 +90,6 @@ def jitter_share(stamps: Times, rate: float) -> float:
     """Return the share of stamps (ns) that are more than a quarter of a period beside the rate (Hz)."""
     periods = np.diff(distinct(stamps)) * (rate / _NANOSECONDS)
     return float(np.mean(np.abs(periods - np.rint(periods)) > _JITTER)) if periods.size else 0.0
-
-
-def _out_of_order(stamps: Times) -> int:
-    """Return how many stamps are below one before them."""
-    return int(np.count_nonzero(stamps[1:] < np.maximum.accumulate(stamps)[:-1]))
 
 
 def misdated(stamps: Times) -> NDArray[np.bool_]:
@@ -182,13 +170,13 @@ class TimeAxis:
 
     def of_log(self, log_time: int) -> float:
         """Return the time at which a message was logged (ns)."""
-        return float(self.of_logs(np.array([log_time]))[0])
+        return float(self.of_logs(np.int64(log_time)))
 
-    def of_logs(self, log_times: Times) -> NDArray[np.float64]:
+    def of_logs(self, log_times: Any) -> NDArray[np.float64]:
         """Return the times at which messages were logged (ns)."""
         return self.of_stamps(self.stamps_at(log_times))
 
-    def stamps_at(self, log_times: Times) -> Times:
+    def stamps_at(self, log_times: Any) -> Times:
         """Return the stamps (ns) that samples would have which came in at log times (ns)."""
         return _related(log_times, self._received, self._stamps)
 
@@ -200,7 +188,7 @@ class TimeAxis:
 
     def log_time(self, seconds: float) -> int:
         """Return the log time (ns) that belongs to a time."""
-        return int(_related(np.array([self.zero + round(1e9 * seconds)]), self._stamps, self._received)[0])
+        return int(_related(self.zero + round(1e9 * seconds), self._stamps, self._received))
 
 
 def anchors(types: Mapping[str, str]) -> list[str]:
@@ -210,7 +198,7 @@ def anchors(types: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _related(times: Times, known: Times, wanted: Times) -> Times:
+def _related(times: Any, known: Times, wanted: Times) -> Times:
     """Return what belongs to times: linear between known ones, at the same pace before and behind (ns)."""
     passed = ((each - each[0]).astype(float) for each in (known, wanted))
     inside = np.rint(np.interp(times - known[0], *passed)).astype(np.int64)

@@ -5,10 +5,9 @@ Those that drive something are written at its rate, others as sampled.
 
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,8 +39,7 @@ SCENARIO = 'imported'
 _BLOCK = 5_000_000_000  # ns, chosen: 5 s at 1 kHz are 2 MB of messages for each topic
 
 
-@dataclass(frozen=True, eq=False)
-class Channel:
+class Channel(NamedTuple):
     """What is written in a `field` of a topic: values (n,) in the SI unit `unit`.
 
     Their `times` (n,), rising, are in s after `begin` (ns).

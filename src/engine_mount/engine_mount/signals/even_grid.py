@@ -6,7 +6,7 @@ true: cubics through four neighbours lead to an even grid, over gaps up to a lim
 samples that came in bursts, are refused, for no number tells when these were taken; a stated rate does.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +30,7 @@ CROWDED = 0.25
 _SLOW_CLOCK = 0.005  # chosen: so much slower than its name may a sensor of just the lowest rate be
 
 
-@dataclass(frozen=True, eq=False)
-class EvenSignal:
+class EvenSignal(NamedTuple):
     """Values (n,) `period` s apart from `begin` (ns) on; `notes` say what was done to get them."""
 
     name: str

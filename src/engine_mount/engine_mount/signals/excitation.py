@@ -91,4 +91,4 @@ def acceleration_at(even: EvenSignal, step_time: float) -> StreamedSeries:
         'a chassis is not shaken so (the limit is chosen): is its unit another one (--scale), the column no '
         'acceleration, or this sample a fault to cut or repair?',
     )  # fmt: skip
-    return resampled(replace(even, values=values), step_time)
+    return resampled(even._replace(values=values), step_time)

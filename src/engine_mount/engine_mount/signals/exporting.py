@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.signals.extras import required
 from engine_mount.signals.formats.reading import read
-from engine_mount.signals.signal import SECOND, FloatArray, SignalError
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError, required
 
 Table = dict[str, tuple[FloatArray, str]]
 """Values and unit by name."""

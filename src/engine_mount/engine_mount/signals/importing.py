@@ -76,21 +76,18 @@ def import_file(
     parts, cuts = _parts_of(selection.signals)
     own = (note for signal in selection.signals.values() for note in signal.notes)
     notes = [*selection.notes, *own, *cuts]
-    selection = replace(selection, signals={})  # else an hour is held to the end
     shift = 0
     if parts[0][0] < SECOND:  # a replay dates the force table before the first sample
         shift = SECOND - min(parts[0][0], 0)
         notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
-    imported, written = Imported(), []
-    while parts:
-        begin, end, inside = parts.pop(0)
-        signals = {name: replace(one, begin=one.begin + shift) for name, one in inside.items()}
+    written = []
+    for _, _, inside in parts:
+        signals = {name: one._replace(begin=one.begin + shift) for name, one in inside.items()}
         channels, done = channels_of(signals, selection.quantities)
         notes += done
         written.append(channels)
-        imported.lengths.append((end - begin) / SECOND)
-    del inside, signals
-    imported.notes = list(dict.fromkeys(notes))
+    notes = list(dict.fromkeys(notes))
+    imported = Imported(lengths=[(end - begin) / SECOND for begin, end, _ in parts], notes=notes)
     for number, channels in enumerate(written):
         folder = Path(out)
         if len(written) > 1:
@@ -201,5 +198,5 @@ def _part(signals: Keys[str, Signal], span: Span) -> Part:
         elif np.count_nonzero(inside) >= FEWEST:
             times, values = signal.times[inside], signal.values[inside]
             first = signal.begin + round(SECOND * float(times[0]))
-            found[name] = replace(signal, times=times - times[0], values=values, begin=first)
+            found[name] = signal._replace(times=times - times[0], values=values, begin=first)
     return *span, found

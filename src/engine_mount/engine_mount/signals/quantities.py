@@ -1,14 +1,13 @@
 """What signals can be: each quantity with its dimension, and the size that it has at an engine mount."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from engine_mount.signals.signal import SignalError
 from engine_mount.signals.units import Unit, si_unit
 from mount_models.quantity import nearest
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """One quantity: its name, dimension, and between which bounds its values vary (SI, peak to peak).
 
     The bounds are chosen wide: they tell a wrong unit, never a rough road from a smooth one. With `by_size`

@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Sequence
 from collections.abc import Mapping as Keys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,7 @@ _ROWS = 'rows'  # of columns that need no times
 _SAME_TIME = 0.5e-3  # s, chosen: half a sample at 1 kHz, for frames of one sample are not sent at once
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
+class Selection(NamedTuple):
     """Signals in SI by quantity, what these are, and where they came from.
 
     `columns` is plain data for a session: column, unit, factor to SI and times of each quantity; `notes` are
@@ -65,7 +64,7 @@ def select(
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
     uri = measured.provenance.uri
-    signals, quantities, columns, chosen = {}, {}, {}, []
+    signals, quantities, columns = {}, {}, {}
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
         if name not in mapping.others:
@@ -82,10 +81,6 @@ def select(
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
-        chosen.append((name, choice, wanted, column, base, notes))
-    measured = replace(measured, columns={})  # what the file holds of a column goes when it is converted
-    while chosen:
-        name, choice, wanted, column, base, notes = chosen.pop(0)
         where = f'{name_of(uri)}, column {column.name!r}'
         is_known = _known(where, column, base, whole=whole)
         own = replace(column, values=column.values[is_known])
@@ -101,8 +96,7 @@ def select(
         begin = base.begin + round(SECOND * float(times[0]))
         if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        times = times - times[0] if missing else base.from_first
-        signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
+        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
             'times': base.told, 'samples': int(values.size),

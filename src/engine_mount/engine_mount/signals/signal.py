@@ -1,8 +1,10 @@
-"""A signal as it was recorded, and the sentence why one cannot be used."""
+"""A signal as it was recorded, and the sentences why one cannot be used."""
 
-from dataclasses import dataclass
+import importlib
 from functools import reduce
 from operator import add
+from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +19,11 @@ class SignalError(ValueError):
     """A recorded signal cannot be used; the text says why, where, and what would help."""
 
 
-@dataclass(frozen=True, eq=False)
-class Signal:
+class MissingLibraryError(ValueError):
+    """A library is not installed; the text says what needs it and how it is installed."""
+
+
+class Signal(NamedTuple):
     """Samples in the order of the file: times in s after `begin` (ns) and values, both (n,).
 
     `clock` says in words whose times they are, `notes` what of the recording is not in the samples.
@@ -84,3 +89,17 @@ def check_size(name: str, values: FloatArray, step_time: float, limit: float, un
         f'{name}: sample {place} at {place * step_time:.4f} s is {values[place]:.4g} {unit}, beyond '
         f'+-{limit:g} {unit} ({np.count_nonzero(np.abs(values) > limit)} such of {len(values)}); {remedy}'
     )
+
+
+def required(module: str, what: str) -> ModuleType:
+    """Return the module `module`; raises `MissingLibraryError` where it, or what it needs, is not installed.
+
+    `what` is what needs it, as the subject of a sentence: 'reading s3:// places'.
+    """
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        raise MissingLibraryError(
+            f'{what} needs the Python package {error.name or module}, which is not installed; '
+            'make setup-desk installs it'
+        ) from None

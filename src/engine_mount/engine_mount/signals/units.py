@@ -8,7 +8,7 @@ not `ms`), but that of words of three letters or more is not (`Sec`). Factors ar
 
 import difflib
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from engine_mount.signals.signal import FloatArray, SignalError
 
@@ -25,8 +25,7 @@ _TURN = 6.283185307179586  # rad
 _WORD = 3  # letters, chosen: shorter spellings differ by case alone (mS and ms, MN and mN)
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit: one of it is `factor` of the SI unit of its `dimension`, its zero lies at `zero` of that."""
 
     symbol: str

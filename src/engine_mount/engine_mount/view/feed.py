@@ -1,18 +1,19 @@
-"""Where messages come from: a running graph (`running_graph.py`), or a recording by the clock."""
+"""Where messages come from: a running graph, or a recording by the clock."""
 
 import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.recordings.recording import open_run
+from engine_mount.recordings.recording import open_mount
 from mount_bringup.graph.nodes import GraphError
 from mount_ros.topics import DISPLACEMENT, TOPICS, Topic
 
 _PERIOD = 0.01  # s, chosen
+_PERIOD_OF_GRAPH = 0.02  # s, chosen: less than a picture of the page
 
 
 class FeedError(GraphError):
@@ -33,20 +34,6 @@ Fail = Callable[[str], None]
 """Takes the sentence on the exception that has ended a feed."""
 
 
-class Feed(Protocol):
-    """The messages of the topics of one mount, {name with namespace: topic}, in the order of arrival."""
-
-    topics: Mapping[str, Topic]
-    title: str
-    zero: int | None  # the stamp (ns) at which time begins; None: the first that comes
-
-    def start(self, receive: Receive, on_failure: Fail) -> None:
-        """Call `receive` with each message, from a thread, until `stop` or until `on_failure` was called."""
-
-    def stop(self) -> None:
-        """Return when no message comes any more; safe to call twice."""
-
-
 class RecordedFeed:
     """A recording of one mount, `rate` times as fast as it was recorded.
 
@@ -55,16 +42,9 @@ class RecordedFeed:
 
     def __init__(self, path: Path, rate: float = 1.0, begin: float = 0.0, namespace: str = ''):
         """Raises a `ValueError` for what is no recording, or for a `begin` that lies beyond it."""
-        recording = open_run(path)
-        mounts, wanted = recording.mounts, namespace.strip('/')
-        if not wanted and len(mounts) == 1:
-            wanted = mounts[0]
-        if mounts and wanted not in mounts:
-            named = ', '.join(mount or '/' for mount in sorted(mounts))
-            raise ValueError(f'{path} holds the mounts {named}: choose one with --namespace')
-        part = recording.of_mount(wanted)
+        part = open_mount(path, namespace, '--namespace')
         self.topics: Mapping[str, Topic] = {part.resolve(t.name): t for t in TOPICS if t.name in part}
-        self.title = f'{recording.short_name} at {rate:g} x'
+        self.title = f'{part.short_name} at {rate:g} x'
         part.load(self.topics)
         self.zero: int | None = part.time_axis.zero
         self._series = [(topic, part[name]) for name, topic in self.topics.items()]
@@ -126,3 +106,61 @@ class RecordedFeed:
             while due < end and not self._ending.is_set():
                 receive(self.message(due))
                 due += 1
+
+
+class RunningGraph:
+    """The graph of one mount in a ROS domain and namespace."""
+
+    def __init__(self, domain: int, namespace: str = ''):
+        """Raises `FeedError` where no process can reach another."""
+        # ROS, which no recording needs
+        from rclpy.context import Context
+        from rclpy.node import Node
+
+        from mount_ros.environment import loopback_refusal, prepare_environment
+
+        if refusal := loopback_refusal():
+            raise FeedError(refusal)
+        prepare_environment()
+        self._context = Context()
+        self._context.init(domain_id=domain)
+        self._node = Node(
+            'engine_mount_view', namespace=namespace, context=self._context, enable_rosout=False
+        )
+        self._collector: Any = None
+        self.topics = {self._node.resolve_topic_name(topic.name): topic for topic in TOPICS}
+        self.title = f'running graph, ROS domain {domain}, namespace {self._node.get_namespace()}'
+        self.zero: int | None = None
+        self._stopped = False
+
+    def start(self, receive: Receive, on_failure: Fail) -> None:
+        """Begin to take messages."""
+        from mount_recorder.collector import Collector
+        from mount_ros.qos import control_qos
+
+        self._collector = Collector(self._node, period=_PERIOD_OF_GRAPH, on_failure=on_failure)
+        for topic in TOPICS:
+            self._collector.collect(
+                topic,
+                lambda *found, own=topic: receive(Message(own, *found)),
+                control_qos(topic, lockstep=False),
+            )
+        self._collector.start()
+
+    def stop(self) -> None:
+        """End the subscriptions and leave the middleware."""
+        if self._stopped:
+            return
+        self._stopped = True
+        if self._collector is not None:
+            self._collector.stop()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+Feed = RecordedFeed | RunningGraph
+"""The messages of the topics of one mount, {name with namespace: topic}, in the order of arrival.
+
+`zero` is the stamp (ns) at which time begins; None: the first that comes. `start` calls `receive` with each
+message, from a thread, until `stop`, which is safe to call twice, or until `on_failure` was called.
+"""

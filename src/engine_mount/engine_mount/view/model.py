@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine_mount.recordings.layout import LayoutError
 from engine_mount.recordings.mcap_records import HEAD
-from engine_mount.recordings.series import Payloads, Series, SeriesError
+from engine_mount.recordings.series import Payloads, Series
 from engine_mount.reports.drawing.chart import COLOUR_OF, Chart, Curve, Panel, level_lines, look_of
 from engine_mount.reports.drawing.detail import browser_chart
 from engine_mount.reports.drive.beside import MOUNTS, THIS, name_of
@@ -298,7 +298,7 @@ def _column(series: Mapping[Topic, Series], topic: Topic, name: str) -> Array:
     """Return a column in SI, empty where the topic has no message or its messages lack it."""
     try:
         return np.asarray(series[topic][name], float)
-    except (KeyError, SeriesError, ValueError):
+    except (KeyError, ValueError):
         return np.empty(0)
 
 
@@ -307,6 +307,6 @@ def _latencies(series: Mapping[Topic, Series]) -> Array:
     try:
         samples, answers = series[DISPLACEMENT], series[CURRENT_SETPOINT]
         _, first, second = np.intersect1d(samples.stamps, answers.stamps, return_indices=True)
-    except (KeyError, SeriesError, ValueError):
+    except (KeyError, ValueError):
         return np.empty(0)
     return (answers.publish_times[second] - samples.publish_times[first]) * 1e-9

@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine_mount.view.feed import Feed, FeedError, Receive, RecordedFeed
+from engine_mount.view.feed import Feed, FeedError, Receive, RecordedFeed, RunningGraph
 from engine_mount.view.model import BESIDE, Model, namespace_of
 from mount_bringup.graph.shutdown import ending_signals
 
@@ -28,13 +28,7 @@ def open_feed(
 
     Raises `FeedError` or a `ValueError`.
     """
-    feed: Feed
-    if recording is not None:
-        feed = RecordedFeed(recording, rate, begin, namespace)
-    else:
-        from engine_mount.view.running_graph import RunningGraph  # ROS, which no recording needs
-
-        feed = RunningGraph(domain, namespace)
+    feed = RecordedFeed(recording, rate, begin, namespace) if recording else RunningGraph(domain, namespace)
     try:
         yield feed
     finally:
@@ -74,8 +68,7 @@ def serve_view(
 
     Raises `FeedError`, also amid it.
     """
-    from engine_mount.view.foxglove_server import FoxgloveServer
-    from engine_mount.view.web import Web
+    from engine_mount.view.web import FoxgloveServer, Web
 
     ending = threading.Event()
     with ExitStack() as stack:

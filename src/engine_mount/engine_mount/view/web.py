@@ -1,19 +1,28 @@
-"""The page at localhost: HTTP for its files, a WebSocket for what happens; both in a thread of their own."""
+"""What viewers connect to: the page at localhost, and a server for Foxglove or Lichtblick.
+
+The page is HTTP for its files and a WebSocket for what happens, both in a thread of their own. Foxglove's own
+library passes messages as they are, CDR with their `ros2msg` definition. It has no tokens and checks no
+origin, so its server listens on loopback alone and takes no message.
+"""
 
 import asyncio
 import json
 import secrets
 import threading
-from collections import deque
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
 
 from aiohttp import web
+from foxglove import Channel, Context, Schema, start_server
+from foxglove.websocket import Capability
 
 from engine_mount.reports.drawing.page import asset
-from engine_mount.view.feed import FeedError
+from engine_mount.view.feed import FeedError, Message
 from engine_mount.view.model import INTERVALS_PER_SECOND, WINDOW, Interval, Model
 from mount_control.policy.registry import DEFAULT
+from mount_recorder.schemas import schema_text
+from mount_ros.topics import Topic
 
 LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 _CLOSE_LIMIT = 2.0  # s, chosen
@@ -21,29 +30,28 @@ _BACKLOG = 90  # intervals of a viewer, chosen: 3 s; one that lags behind them m
 _STATE_EVERY = 10  # intervals, chosen: three times a second
 _OWN, _OF_REPORTS = ('view.html', 'view.js', 'view.css'), ('chart.js', 'page.css')
 _TYPES = {'html': 'text/html', 'js': 'text/javascript', 'css': 'text/css'}
+_FOXGLOVE_BACKLOG = 8192  # messages of a viewer, chosen: about a second of all topics
+_TIME_STEP = 50_000_000  # ns, chosen: how often viewers receive the time
 _POLICY = "default-src 'self'; connect-src 'self' ws: wss:; img-src 'self' data:; frame-ancestors 'none'"
 
 
-class Viewer:
-    """A connection with the messages that it has yet to receive; of too many the oldest are dropped."""
+class Viewer(asyncio.Queue[str]):
+    """The messages that a connection has yet to receive; of too many the oldest are dropped."""
 
     def __init__(self, socket: web.WebSocketResponse):
+        super().__init__(_BACKLOG)
         self._socket = socket
-        self._waiting: deque[str] = deque(maxlen=_BACKLOG)
-        self._ready = asyncio.Event()
 
     def add(self, message: str) -> None:
         """Let `send` send a message."""
-        self._waiting.append(message)
-        self._ready.set()
+        if self.full():
+            self.get_nowait()
+        self.put_nowait(message)
 
     async def send(self) -> None:
         """Send what is added, until the task is cancelled or the connection ends."""
         while not self._socket.closed:
-            await self._ready.wait()
-            self._ready.clear()
-            while self._waiting:
-                await self._socket.send_str(self._waiting.popleft())
+            await self._socket.send_str(await self.get())
 
 
 class Web:
@@ -174,3 +182,41 @@ async def _file(request: web.Request) -> web.Response:
     text = asset(name) if name in _OF_REPORTS else own.read_text(encoding='utf-8')
     headers = {'Content-Security-Policy': _POLICY, 'Cache-Control': 'no-store'}
     return web.Response(text=text, content_type=_TYPES[name.rpartition('.')[2]], headers=headers)
+
+
+class FoxgloveServer:
+    """Serves the topics of a feed until `stop`."""
+
+    def __init__(self, topics: Mapping[str, Topic], port: int):
+        """Begin to serve; raises `FeedError` with the remedy where the port is taken."""
+        self._context = context = Context()  # the server holds none of it
+        self._channels = {
+            topic: Channel(
+                name,
+                schema=Schema(name=topic.type, encoding='ros2msg', data=schema_text(topic.type).encode()),
+                message_encoding='cdr',
+                context=context,
+            )
+            for name, topic in topics.items()
+        }
+        self._last_time = 0
+        host = LOOPBACK[0]
+        try:
+            self._server = start_server(
+                name='engine mount', host=host, port=port, capabilities=[Capability.Time], context=context,
+                message_backlog_size=_FOXGLOVE_BACKLOG,
+            )  # fmt: skip
+        except RuntimeError as error:
+            raise FeedError(
+                f'the Foxglove server cannot listen at {host}:{port} ({error}): choose another '
+                '--foxglove-port, or 0 for none'
+            ) from None
+        self.address = f'ws://{host}:{port}/'
+        self.stop = self._server.stop
+
+    def take(self, message: Message) -> None:
+        """Pass a message on to the viewers that have subscribed to its topic."""
+        self._channels[message.topic].log(message.raw, log_time=message.received)
+        if message.received - self._last_time > _TIME_STEP:
+            self._last_time = message.received
+            self._server.broadcast_time(message.received)

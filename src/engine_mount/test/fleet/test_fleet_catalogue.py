@@ -11,8 +11,8 @@ from references import REFERENCES_FOLDER
 
 import engine_mount
 from engine_mount.fleet.catalogue import index, rows_of
+from engine_mount.fleet.job import COLUMNS, schema_of
 from engine_mount.fleet.places import places
-from engine_mount.fleet.tables import COLUMNS, schema_of
 from engine_mount.signals.sources.uris import SourceError
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from engine_mount.fleet.job import Column, table_of, write_table
 from engine_mount.fleet.questions import QueryError, query
-from engine_mount.fleet.tables import Column, table_of, write_table
 
 COLUMNS = (Column('uri', 'string', '', 'which'), Column('peak', 'double', 'm', 'largest displacement'))
 

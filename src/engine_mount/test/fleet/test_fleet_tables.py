@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from engine_mount.fleet.tables import COLUMNS as DECLARED
-from engine_mount.fleet.tables import Column, schema_of, table_of, write_table
+from engine_mount.fleet.job import COLUMNS as DECLARED
+from engine_mount.fleet.job import Column, schema_of, table_of, write_table
 
 COLUMNS = (
     Column('recording', 'string', '', 'URI of the recording'),

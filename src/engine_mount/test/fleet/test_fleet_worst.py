@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from engine_mount.fleet.job import COLUMNS, table_of, write_table
 from engine_mount.fleet.questions import QueryError, query, result_of, worst
-from engine_mount.fleet.tables import COLUMNS, table_of, write_table
 
 CHANGES = json.dumps({'mount_control': {'switch_on_level': 0.0006, 'policy': 'switched_viscous'}})
 BY = 'setpoint_difference_largest_a'

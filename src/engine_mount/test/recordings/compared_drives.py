@@ -30,6 +30,22 @@ def bag_of(folder: Path, topic: str, type_name: str, messages) -> Recording:
     return engine_mount.open(folder)
 
 
+def messages_of(recording: Recording) -> dict[str, list[tuple[bytes, int, int]]]:
+    """Return bytes, receive time and publish time (ns) of the messages of each topic."""
+    return {
+        name: list(
+            zip(
+                map(bytes, series.payloads),
+                series.receive_times.tolist(),
+                series.publish_times.tolist(),
+                strict=True,
+            )
+        )
+        for name in recording
+        for series in [recording[name]]
+    }
+
+
 def answers(count: int, *, on: int = 100, off: int = 300, phase: float = 0.0) -> dict[str, np.ndarray]:
     """Return the signals of a drive of `count` ms: 8 Hz, damping from sample `on` to `off`; `phase` in s."""
     time = np.arange(count) * 1e-3

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from compared_drives import START, answers, write_answers
+from compared_drives import START, answers, messages_of, write_answers
 
 import engine_mount
 from engine_mount.recordings.compare import compare
@@ -27,13 +27,8 @@ def whole(tmp_path_factory):
 
 
 def _messages(recording) -> dict[str, list[tuple[int, int, bytes]]]:
-    found = {}
-    for name in recording:
-        series = recording[name]
-        times = zip(series.receive_times.tolist(), series.publish_times.tolist(), strict=True)
-        rows = [(log, publish, series.payloads[i]) for i, (log, publish) in enumerate(times)]
-        found[name] = sorted(rows, key=lambda row: row[0])
-    return found
+    found = messages_of(recording).items()
+    return {name: sorted((log, publish, raw) for raw, log, publish in rows) for name, rows in found}
 
 
 def _cut(recording, folder, *times, **options):
@@ -100,9 +95,6 @@ def test_an_event_is_found_by_number_kind_or_both(whole, wanted, sample):
 def test_an_event_that_is_not_there_is_refused_with_those_that_are(whole, wanted):
     with pytest.raises(EventError, match=r'1 fault at 0.050 s, 2 switch_on at 0.100 s'):
         find_event(whole, wanted)
-
-
-# Bags of others.
 
 
 # Time.

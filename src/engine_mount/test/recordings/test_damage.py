@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from compared_drives import messages_of
 from samples import PERIOD, START, sample
 
 import engine_mount
@@ -41,17 +42,9 @@ def intact(tmp_path_factory) -> Path:
     return folder
 
 
-def messages_of(recording):
-    """Return (topic, payload, receive time, publish time) of every message that is read."""
-    return Counter(
-        (name, bytes(raw), int(received), int(sent))
-        for name in recording
-        for raw, received, sent in zip(*raw_columns(recording[name]), strict=True)
-    )
-
-
-def raw_columns(series):
-    return series.payloads, series.receive_times, series.publish_times
+def counted(recording):
+    """Return how often each message (topic, payload, receive time, publish time) is read."""
+    return Counter((name, *each) for name, found in messages_of(recording).items() for each in found)
 
 
 def before_all_messages(intact, change, place, error):
@@ -81,50 +74,36 @@ def flip(content, place, generator):
 
 
 @pytest.mark.parametrize('change', [cut, pytest.param(flip, marks=pytest.mark.slow)])
-def test_what_is_read_is_what_was_written_and_a_sentence_says_the_rest(intact, tmp_path, change):
-    original = messages_of(engine_mount.open(intact))
+def test_what_is_read_and_recovered_is_what_was_written_and_sentences_say_the_rest(intact, tmp_path, change):
+    original = counted(engine_mount.open(intact))
     for copy, place in damaged_copies(intact, tmp_path, change):
-        alone = place % 2  # with and without the description beside the file
+        alone, out = place % 2, tmp_path / 'out'  # with and without the description beside the file
+        path = copy / 'bag_0.mcap' if alone else copy
         try:
-            recording = engine_mount.open(copy / 'bag_0.mcap' if alone else copy)
-        except ReadingError as error:
+            recording = engine_mount.open(path)
+            recovery = recover(path, out)
+        except (ReadingError, RecoveryError) as error:
             before_all_messages(intact, change, place, error)
+            assert not out.exists()
             continue
-        listed = recording.message_count
-        found = messages_of(recording)
+        listed, found = recording.message_count, counted(recording)
         assert found <= original, place
         assert listed in (found.total(), original.total()), place
         assert recording.warnings, place
-        assert recording.whole == (found == original) or (alone and change is cut), place
-        assert recording.whole <= (found == original), place
         entries = audit(recording)
         told = losses(recording, entries)
         as_json(entries, told)
         as_table(entries)
         assert sentences(entries, told), place
-
-
-@pytest.mark.parametrize('change', [cut, pytest.param(flip, marks=pytest.mark.slow)])
-def test_what_is_recovered_is_what_was_written_and_the_sentence_says_how_much(intact, tmp_path, change):
-    original = messages_of(engine_mount.open(intact))
-    for copy, place in damaged_copies(intact, tmp_path, change):
-        out = tmp_path / 'out'
-        alone = place % 2
-        try:
-            found = recover(copy / 'bag_0.mcap' if alone else copy, out)
-        except (ReadingError, RecoveryError) as error:
-            before_all_messages(intact, change, place, error)
-            assert not out.exists()
-            continue
         recovered = engine_mount.open(out)
-        messages = messages_of(recovered)
-        assert messages <= original, place
+        assert counted(recovered) == found, place
         assert recovered.whole, place
         assert recovered.warnings == [], place
-        assert found.kept == messages.total(), place
-        assert found.complete == (messages == original) or (alone and change is cut), place
-        assert found.complete <= (messages == original), place
-        assert ('lost' in str(found)) != found.complete, place
-        if found.lost is not None:
-            assert found.lost == original.total() - messages.total(), place
+        assert recovery.kept == found.total(), place
+        for whole in (recording.whole, recovery.complete):
+            assert whole == (found == original) or (alone and change is cut), place
+            assert whole <= (found == original), place
+        assert ('lost' in str(recovery)) != recovery.complete, place
+        if recovery.lost is not None:
+            assert recovery.lost == original.total() - found.total(), place
         shutil.rmtree(out)

@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from compared_drives import messages_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -39,17 +40,7 @@ def of_topic(messages, topic):
 
 def read(folder):
     recording = engine_mount.open(folder)
-    found = {
-        name: list(
-            zip(
-                map(bytes, recording[name].payloads),
-                recording[name].receive_times.tolist(),
-                recording[name].publish_times.tolist(),
-                strict=True,
-            )
-        )
-        for name in recording
-    }
+    found = messages_of(recording)
     assert recording.warnings == []
     assert recording.whole
     assert {name: topic.message_count for name, topic in recording.topics.items()} == {

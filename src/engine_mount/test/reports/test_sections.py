@@ -1,7 +1,5 @@
 """What a report computes, against signals whose answer is known."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -168,6 +166,6 @@ SOUND = Losses(
 )
 def test_whatever_is_lost_unanswered_or_misdated_is_to_be_looked_at(lacking, judgement):
     subject = Known()
-    subject.losses = replace(SOUND, **lacking)
+    subject.losses = SOUND._replace(**lacking)
     judged = {finding.what: finding.judgement for finding in findings(subject)}
     assert judged['Losses'] == judgement

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engine_mount.settings.amounts import checked_recorder, duration_in_nanoseconds, recorder_options
+from engine_mount.settings.options import checked_recorder, duration_in_nanoseconds, recorder_options
 from mount_models.quantity import ParameterError
 
 

@@ -14,10 +14,9 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from engine_mount.view.feed import FeedError, RecordedFeed
-from engine_mount.view.foxglove_server import FoxgloveServer
 from engine_mount.view.model import Model
 from engine_mount.view.view import open_feed, running_model, serve_view
-from engine_mount.view.web import Web
+from engine_mount.view.web import FoxgloveServer, Web
 from mount_control.policy.contract import trace_fields
 from mount_control.policy.registry import POLICIES
 

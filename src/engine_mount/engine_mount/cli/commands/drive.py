@@ -164,7 +164,7 @@ def drive(
     from engine_mount.drives.drive import drive as run_drive
     from engine_mount.drives.drive import report_early_end
     from engine_mount.reports.drive.results import evaluate_drive
-    from engine_mount.settings.amounts import recorder_options
+    from engine_mount.settings.options import recorder_options
 
     screen = TerminalScreen()
     if 'list' in (fault or []):

@@ -84,7 +84,7 @@ def names_in(text: str, known: Collection[str], what: str) -> list[str]:
 
 def seconds(text: str) -> float:
     """Return a time such as 12s or 1500ms in s, of nothing 0; raises `ValueError`."""
-    from engine_mount.settings.amounts import duration_in_nanoseconds
+    from engine_mount.settings.options import duration_in_nanoseconds
 
     plain = text.replace('.', '', 1).isdigit()
     return duration_in_nanoseconds(f'{text}s' if plain else text) / 1e9 if text else 0.0

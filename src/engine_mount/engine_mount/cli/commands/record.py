@@ -53,7 +53,7 @@ def record(
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
     from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.record import record as run_record
-    from engine_mount.settings.amounts import checked_recorder, recorder_options
+    from engine_mount.settings.options import checked_recorder, recorder_options
     from engine_mount.settings.run_folder import new_place
     from mount_bringup.graph.domain import chosen_domain
 

@@ -337,10 +337,10 @@ class Subject:
                 stamps, places = each_once(series.stamps)
                 return Signal(self.seconds(stamps), np.asarray(series[column], np.float64)[places])
             lack = f'{topic} has no message'
-        except ReadingError:
-            lack = f'there is no topic {topic}'
         except SeriesError as error:
             lack = f'not as this project records it: {error}'
+        except ReadingError:
+            lack = f'there is no topic {topic}'
         if lack not in self.missing:
             self.missing.append(lack)
         return None

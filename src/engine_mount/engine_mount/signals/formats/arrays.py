@@ -1,7 +1,6 @@
 """Arrays as columns; NPY and NPZ files, and folders of pairs of times and values (as comma2k19 has them)."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -134,8 +133,8 @@ def _pair(name: str, values: Path, times: Path, notes: list[str]) -> list[Leaf]:
 
     leaves = leaves_of(name, array, notes)
     if len(leaves) == 1:
-        leaves = [replace(leaves[0], name=f'{name}.0')]
-    return [replace(leaf, clock=clock) for leaf in leaves]
+        leaves = [leaves[0]._replace(name=f'{name}.0')]
+    return [leaf._replace(clock=clock) for leaf in leaves]
 
 
 def _loaded(path: Path) -> NDArray[Any]:

@@ -1,8 +1,9 @@
 """MCAP files and rosbag2 folders: every number of every topic as `/topic.field`."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 
@@ -25,8 +26,6 @@ UNITS = {
 
 def open_bag(path: Path, stated: Stated) -> Content:
     """Return the fields of a recording of ROS 2, whole or in part; raises `SignalError`."""
-    values: dict[tuple[str, str], FloatArray] = {}
-    clocks: dict[str, TimeBase] = {}
     try:
         recording = open_recording(path)
         fields = list(_fields(recording))
@@ -34,27 +33,22 @@ def open_bag(path: Path, stated: Stated) -> Content:
         raise SignalError(str(error)) from None
 
     def prepare(numbers: Sequence[int]) -> None:
-        wanted: dict[str, list[str]] = {}
-        for number in numbers:
-            topic, field, _ = fields[number]
-            wanted.setdefault(topic, []).append(field)
+        wanted = defaultdict[str, list[str]](list)
+        for topic, field, _ in map(fields.__getitem__, numbers):
+            wanted[topic].append(field)
+        recording.load_columns(wanted)
+
+    def column(topic: str, field: str) -> FloatArray:
         try:
-            recording.load_columns(wanted)
-            for topic, names in wanted.items():
-                clocks[topic] = _clock(recording[topic])
-                values.update(
-                    {(topic, name): np.asarray(recording[topic][name], np.float64) for name in names}
-                )
-        except (ReadingError, SeriesError) as error:
+            return np.asarray(recording[topic][field], np.float64)
+        except ReadingError as error:
             raise SignalError(str(error)) from None
 
+    clock = cache(lambda topic: _clock(recording[topic]))
     leaves = [
-        Leaf(
-            f'{topic}.{field}', partial(values.__getitem__, (topic, field)), unit, field,
-            clock=partial(clocks.__getitem__, topic),
-        )
+        Leaf(f'{topic}.{field}', partial(column, topic, field), unit, field, clock=partial(clock, topic))
         for topic, field, unit in fields
-    ]  # fmt: skip
+    ]
     notes = recording.warnings
     if not fields:
         notes = [*notes, f'its topics: {", ".join(recording) or "none"}']

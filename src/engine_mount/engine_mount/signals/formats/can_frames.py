@@ -22,7 +22,6 @@ FRAME = 'CAN_DataFrame'
 """The channel of an MDF file that holds frames, a record of what `_MEMBERS` name and others."""
 NO_DATABASE = 'name the database that decodes them with --dbc, as .dbc or .kcd'
 _MEMBERS = ('ID', 'DataLength', 'DataBytes')
-_AT_ONCE = 1 << 17  # frames, chosen: 10 MB of classic frames
 
 
 class Frames:
@@ -156,9 +155,7 @@ def open_can_log(path: Path, stated: Stated) -> Content:
         raise SignalError(f'{path} holds CAN frames; {NO_DATABASE}')
     notes: list[str] = []
     frames, other = Frames(path, stated.dbc, notes), 0
-    suffix = path.suffix.lower()
-    arguments = {'relative_timestamp': False} if suffix == '.asc' else {}
-    with readable(path, 'CAN log'), can.LogReader(str(path), **arguments) as reader:
+    with readable(path, 'CAN log'), can.LogReader(str(path), relative_timestamp=False) as reader:
         for one in reader:
             if one.is_error_frame or one.is_remote_frame:
                 other += 1
@@ -167,7 +164,7 @@ def open_can_log(path: Path, stated: Stated) -> Content:
             frames.add(bus, one.arbitration_id, one.is_extended_id, one.timestamp, bytes(one.data))
     if other:
         notes.append(f'{other} error and remote frames are left out')
-    return Content(path, f'CAN log {suffix}', 'python-can, cantools', frames.leaves(), notes)
+    return Content(path, f'CAN log {path.suffix.lower()}', 'python-can, cantools', frames.leaves(), notes)
 
 
 def is_can_log(path: Path) -> bool:
@@ -190,10 +187,7 @@ def frames_in_mdf(file: Any, path: Path, dbc: Path, notes: list[str]) -> Frames:
     for number, group in enumerate(file.groups):
         for index, channel in enumerate(group.channels):
             if channel.name == FRAME:
-                for first in range(0, int(group.channel_group.cycles_nr), _AT_ONCE):
-                    _add_records(frames, path, file.get(
-                        group=number, index=index, record_offset=first, record_count=_AT_ONCE
-                    ))  # fmt: skip
+                _add_records(frames, path, file.get(group=number, index=index))
     return frames
 
 

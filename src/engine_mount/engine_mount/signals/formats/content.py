@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +43,7 @@ class Stated:
 NOT_STATED = Stated()
 
 
-@dataclass(frozen=True, eq=False)
-class Leaf:
+class Leaf(NamedTuple):
     """A column before it is read.
 
     `read` returns its samples (n,) as the file holds them, dates as datetime64; None for a column without
@@ -136,7 +135,7 @@ def with_dates(path: Path, leaves: Sequence[Leaf]) -> list[Leaf]:
         told = f'dates in column {header!r}, taken as UTC where they name no zone'
         return TimeBase((numbers - numbers[0]) / SECOND, int(numbers[0]), told)
 
-    return [replace(leaf, clock=clock) for leaf in leaves]
+    return [leaf._replace(clock=clock) for leaf in leaves]
 
 
 @contextmanager

@@ -9,8 +9,8 @@ import operator
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from engine_mount.signals.formats.cells import ALONE, BLANK, cells_of, kind_of
 from engine_mount.signals.formats.content import Stated
@@ -28,8 +28,7 @@ Lines = Sequence[tuple[int, str]]
 """Lines of a file with their numbers from 1 on."""
 
 
-@dataclass(frozen=True)
-class Dialect:
+class Dialect(NamedTuple):
     """One way to read the lines: the kinds of the columns, and which line is the first of the samples.
 
     `rows` are the cells of the samples that were looked at.

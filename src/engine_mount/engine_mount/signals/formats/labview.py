@@ -5,7 +5,6 @@ Keys and meaning: National Instruments, "Specification for the LabVIEW Measureme
 
 from bisect import bisect
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -53,12 +52,12 @@ def on_own_times(leaves: Sequence[Leaf], header: Header) -> list[Leaf]:
     places, units, found = x_places(header, len(leaves)), header.get('Y_Unit_Label', []), list(leaves)
     channels = [place for place in range(1, len(leaves)) if place not in places]
     for channel, place in enumerate(channels if header.get('X_Dimension', ['Time'])[0] == 'Time' else ()):
-        leaf = replace(leaves[place], unit=(units[channel:] or [''])[0] or leaves[place].unit)
+        leaf = leaves[place]._replace(unit=(units[channel:] or [''])[0] or leaves[place].unit)
         if places:
             x = places[bisect(places, place) - 1]
-            found[place] = replace(leaf, read=partial(samples, place, x), clock=partial(clock, x))
+            found[place] = leaf._replace(read=partial(samples, place, x), clock=partial(clock, x))
         else:
-            found[place] = replace(leaf, clock=partial(even, channel, place))
+            found[place] = leaf._replace(clock=partial(even, channel, place))
     return found
 
 

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.signals.extras import required
 from engine_mount.signals.formats.can_frames import FRAME, NO_DATABASE, frames_in_mdf
 from engine_mount.signals.formats.content import Content, Leaf, NoNumbersError, Stated, readable
 from engine_mount.signals.formats.measured import TimeBase
-from engine_mount.signals.signal import SECOND, FloatArray, SignalError
+from engine_mount.signals.signal import SECOND, FloatArray, SignalError, required
 
 _FRAGMENT = 1 << 22  # B read at once, chosen: an hour at 1 kHz is read within 0.3 GB, and not slower
 _DATED = 100_000_000  # s since 1970, chosen: an earlier start is a clock that was not set

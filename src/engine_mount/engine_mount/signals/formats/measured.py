@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine_mount.signals.signal import FloatArray, SignalError
 from engine_mount.signals.sources.uris import is_local, name_of, shown
@@ -12,8 +11,7 @@ from engine_mount.signals.units import unit_of
 _LISTED = 40  # names in a refusal, chosen
 
 
-@dataclass(frozen=True)
-class Provenance:
+class Provenance(NamedTuple):
     """Where a recording came from: URI, SHA-256 of its bytes, size in bytes, format, and what read it.
 
     Of a folder the SHA-256 is that of the lines `sha256  relative path` of its files, sorted by path.
@@ -32,8 +30,7 @@ class Provenance:
         return {'file': name_of(self.uri), **uri, **own}
 
 
-@dataclass(frozen=True, eq=False)
-class TimeBase:
+class TimeBase(NamedTuple):
     """When the samples of a column were taken: s after `begin` (ns since 1970, or 0), shape (n,).
 
     `told` says in words where these times come from. Columns that were sampled together share one. With
@@ -43,11 +40,6 @@ class TimeBase:
     times: FloatArray
     begin: int
     told: str
-
-    @cached_property
-    def from_first(self) -> FloatArray:
-        """The times in s after the first, shared by the columns too."""
-        return self.times - self.times[0] if self.times[0] else self.times
 
 
 @dataclass(frozen=True)
@@ -77,8 +69,7 @@ class MeasuredColumn(Heading):
     time: TimeBase | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(NamedTuple):
     """A file as named columns, with what a reader must know: `notes` are sentences.
 
     `others` are the headings of columns that were not asked for.

@@ -1,18 +1,16 @@
 """What nests, as columns by their paths (`imu.acc.z`): JSON, MATLAB, HDF5 and Parquet."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from engine_mount.signals.extras import required
 from engine_mount.signals.formats.arrays import leaves_of
 from engine_mount.signals.formats.cells import date_in, name_and_unit
 from engine_mount.signals.formats.content import Content, Leaf, Stated, readable, with_dates
-from engine_mount.signals.signal import SignalError
+from engine_mount.signals.signal import SignalError, required
 
 _DEEPEST = 32  # groups of an HDF5 file, whose links may form circles, chosen
 _MOST = 4096  # elements of an array of structs or cells, chosen
@@ -195,27 +193,26 @@ def open_parquet(path: Path, stated: Stated) -> Content:
     parquet = required('pyarrow.parquet', 'reading Parquet files')
     with readable(path, 'Parquet file'):
         file = parquet.ParquetFile(path)
-        leaves = list(_arrow_leaves(file, file.schema_arrow))
+        leaves = [_arrow_leaf(file, field) for field in _flat(file.schema_arrow.empty_table()).schema]
     return Content(path, 'Parquet', 'pyarrow', with_dates(path, leaves))
 
 
-def _arrow_leaves(file: Any, fields: Iterable[Any], above: str = '') -> Iterator[Leaf]:
-    for field in fields:
-        path, kind = f'{above}.{field.name}'.lstrip('.'), str(field.type)
-        if kind.startswith('struct'):
-            yield from _arrow_leaves(file, map(field.type.field, range(field.type.num_fields)), path)
-            continue
-        told = _text(
-            {key.decode(errors='replace'): text for key, text in (field.metadata or {}).items()}, *_UNITS
-        )
-        name, unit = (path, told) if told else name_and_unit(path)
-        date = kind.startswith('timestamp')
-        read = partial(_arrow_values, file, path, 'timestamp[ns]' if date else 'float64')
-        yield Leaf(name, read if kind.startswith(_ARROW_NUMBERS) else None, unit, path, date)
+def _arrow_leaf(file: Any, field: Any) -> Leaf:
+    path, kind = field.name, str(field.type)
+    metadata = {key.decode(errors='replace'): text for key, text in (field.metadata or {}).items()}
+    told = _text(metadata, *_UNITS)
+    name, unit = (path, told) if told else name_and_unit(path)
+    date = kind.startswith('timestamp')
+
+    def read() -> Any:
+        column = _flat(file.read(columns=[path])).column(0)
+        return column.cast('timestamp[ns]' if date else 'float64', safe=False).to_numpy()
+
+    return Leaf(name, read if kind.startswith(_ARROW_NUMBERS) else None, unit, path, date)
 
 
-def _arrow_values(file: Any, path: str, kind: str) -> Any:
-    table = file.read(columns=[path])
+def _flat(table: Any) -> Any:
+    """Return a table of Arrow with the fields of structs as columns of their own."""
     while any(str(field.type).startswith('struct') for field in table.schema):
         table = table.flatten()
-    return table.column(0).cast(kind, safe=False).to_numpy()
+    return table

@@ -84,15 +84,11 @@ def read_track(name: str, content: bytes, lateral: float) -> Track:
 def _sections(name: str, content: bytes) -> tuple[Sections, bytes, int]:
     """Return the lines of each section, and the numbers behind them with their first line."""
     sections: Sections = {}
-    keyword, at, number = '', 0, 0
-    while at < len(content):
-        end = content.find(b'\n', at) % (len(content) + 1)
-        line = content[at:end].decode('latin-1').rstrip('\r')[:72]
-        at, number = end + 1, number + 1
-        if not keyword and line.startswith('$$'):
-            return sections, content[at:], number + 1
-        text = line.partition('!')[0].strip()
-        if line.startswith('$') and not line.startswith('$$'):
+    head, *data = re.split(rb'^\$\$.*\n?', content, maxsplit=1, flags=re.MULTILINE)
+    keyword, lines = '', head.decode('latin-1').split('\n')
+    for line in lines:
+        text = line.rstrip('\r')[:72].partition('!')[0].strip()
+        if line.startswith('$'):
             word = text[1:].split(' ')[0].upper()
             if word and keyword:
                 raise SignalError(f'{name}: section ${word} begins before the end ($) of section ${keyword}')
@@ -100,6 +96,8 @@ def _sections(name: str, content: bytes) -> tuple[Sections, bytes, int]:
             sections.setdefault(keyword, [])
         elif keyword and text and not line.startswith('*'):
             sections[keyword].append(text)
+    if data and not keyword:
+        return sections, data[0], len(lines) + 1
     if keyword:
         raise SignalError(
             f'{name}: the file ends within section ${keyword}; is it cut off, or no OpenCRG file?'

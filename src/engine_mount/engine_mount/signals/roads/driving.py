@@ -5,7 +5,6 @@ long waves, averaged over the length on which a tyre stands, and is faded in as 
 """
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -136,8 +135,7 @@ def kept_frequency(profile: RoadProfile, speed: float) -> float:
     return _KEPT * min(speed / profile.spacing, 1.0 / STEP_TIME)
 
 
-@dataclass(frozen=True, eq=False)
-class Road:
+class Road(NamedTuple):
     """A measured road: its profile, what that is by ISO 8608, and a speed (m/s) at which it is driven."""
 
     profile: RoadProfile

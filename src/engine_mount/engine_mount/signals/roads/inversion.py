@@ -5,8 +5,8 @@ divided out, within `BAND`. What lies outside, left and right, the other axle, a
 to the chassis cannot be told from one acceleration: all of it within the band is put down to the road.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,7 @@ WEAKEST = 1e-3
 back by the ratio, for there the sensor's noise would be taken for a road."""
 
 
-@dataclass(frozen=True, eq=False)
-class InvertedRoad:
+class InvertedRoad(NamedTuple):
     """Places and heights (n,) in m, and sentences."""
 
     distance: FloatArray

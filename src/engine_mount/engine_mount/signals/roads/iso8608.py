@@ -6,7 +6,6 @@ thirds of them up to 0.25, in twelfths above, and a line Gd(n0) (n / n0)^-w is f
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +29,7 @@ _CLIFF = 30.0  # chosen: no road falls so far below all that it was before, but 
 _FADED = 3  # bands, chosen: what a filter took before that
 
 
-@dataclass(frozen=True, eq=False)
-class RoadProfile:
+class RoadProfile(NamedTuple):
     """Heights (n,) in m at places `spacing` m apart from `first` m on, under one track of wheels.
 
     `effective`: the heights are those that the axle feels, after the tyre has rounded the road. `notes` are

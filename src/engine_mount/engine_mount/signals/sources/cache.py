@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from engine_mount.settings.amounts import size_in_bytes
+from engine_mount.settings.options import size_in_bytes
 from engine_mount.signals.sources.uris import SourceError
 
 FOLDER_VARIABLE, LIMIT_VARIABLE = 'ENGINE_MOUNT_CACHE', 'ENGINE_MOUNT_CACHE_LIMIT'

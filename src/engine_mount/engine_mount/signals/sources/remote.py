@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
-from engine_mount.signals.extras import MissingLibraryError, required
+from engine_mount.signals.signal import MissingLibraryError, required
 from engine_mount.signals.sources.cache import cached_copy
 from engine_mount.signals.sources.uris import (
     Entry,

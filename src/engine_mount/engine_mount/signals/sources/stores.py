@@ -22,7 +22,10 @@ def entries(uri: str) -> Iterator[Entry]:
         yield from (entry for entry, _ in list_files(uri))
         return
     place = local_path(uri)
-    for path in sorted(_files(place)) if place.is_dir() else [place]:
+    found = (file for file in place.rglob('*') if not file.is_dir()) if place.is_dir() else [place]
+    for path in sorted(found):
+        if any(part.startswith('.') for part in path.relative_to(place).parts):
+            continue
         try:
             status = path.stat()
         except OSError as error:
@@ -64,9 +67,3 @@ def local_copy(uri: str, progress: Callable[[int, int], None] = lambda done, of:
 def uri_of(path: str | os.PathLike[str]) -> str:
     """Return the URI that `fetched` got the local `path` from, or what it lies in; '' for any other path."""
     return next((_kept[place] for place in (Path(path), *Path(path).parents) if place in _kept), '')
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    for place, folders, names in os.walk(folder):
-        folders[:] = [name for name in folders if not name.startswith('.')]
-        yield from (Path(place, name) for name in names if not name.startswith('.'))

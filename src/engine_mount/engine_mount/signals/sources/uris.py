@@ -1,8 +1,8 @@
 """Places by URI: how they are written and shown, a file in a store, and the errors of stores."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import parse_qsl, unquote, urlsplit, urlunsplit
 
 
@@ -14,8 +14,7 @@ class StoreAwayError(SourceError):
     """A store did not answer in any attempt; the text says how many there were."""
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """A file in a store: its URI, size in bytes, and what changes when its content does.
 
     `modified` is in s since 1970 on a disk, else NaN; `etag` is the store's own mark, or its time of change.

@@ -1,7 +1,5 @@
 """From a profile and a speed to the height under the wheel."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -57,7 +55,7 @@ def test_a_tyre_averages_over_what_it_stands_on_unless_the_road_is_effective():
 def test_hills_are_taken_out_and_what_the_mount_feels_is_kept():
     plain = wave(length=600.0)
     hills = 50.0 + 0.03 * plain.distance + 5.0 * np.sin(plain.distance / 200.0)
-    roads = (replace(plain, height=plain.height + hills), plain)
+    roads = (plain._replace(height=plain.height + hills), plain)
     over, flat = (wheel_height(road, 30.0).height for road in roads)
     assert np.abs(over).max() < 0.5
     assert np.std((over - flat)[4000:-4000]) < 0.03
