@@ -69,12 +69,12 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
 same mount. `{PAPER}`, the paper's, waits until the magnitude has exceeded 0.8 mm for one period and then
 damps by a characteristic of the velocity in the band. `{CONTINUOUS}` engages a viscous damper with the
 amplitude in the band, by half at 0.13 mm, without waiting, takes the force from the unfiltered velocity,
-and cancels the line of the engine (`mount_control/policy/continuous_viscous.py`):
+and cancels the lines of the engine (`mount_control/policy/continuous_viscous.py`):
 
-    |F| = min(max(c g v_n sgn v - K kappa x_l sgn v, 0), 2 c g |v|),  g -> A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2)
+    |F| = min(max(c g v_n sgn v - K x_l sgn v, 0), 2 c g |v|),  g -> A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2)
 
-v: velocity, v_n without the line of the engine; x_l: the line when the force acts; A, A_l, A_n: amplitudes of
-motion in the band, line and noise. `mount_control.policy` selects the policy. All figures are
+v: velocity, v_n without the lines of the engine; x_l: the lines when the force acts; A, A_l, A_n: amplitudes of
+motion in the band, lines and noise. `mount_control.policy` selects the policy. All figures are
 simulated; vehicle and hydromount are chosen, not measured.
 
 All ratios are to the original hydromount (displacement) or to the same mount without current (acceleration):
@@ -266,7 +266,7 @@ worst and the mean of all frequencies of the engine's line and forces; the line'
 {engine}
 The price of quiet: where a strong line meets a smooth road, the damper stays nearly off and the \
 engine moves more than on the hydromount, which transmits the line instead. `line_weight` weighs one \
-against the other. A bank of resonators finds the line; `speed known`: the vehicle sends the speed of its \
+against the other. A bank of resonators finds the lines; `speed known`: the vehicle sends the speed of its \
 engine (`mount_sim.idle.speed_sent`).
 
 ## Noise
