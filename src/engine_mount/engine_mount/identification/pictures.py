@@ -130,6 +130,30 @@ def draw_friction(result: Any, file: Path) -> None:
     _draw(file, panels, min(2, len(panels)))
 
 
+def draw_pads(history: Any, file: Path) -> None:
+    """Write the picture of gap and friction over the starts, and of all pulses, to `file` (PNG)."""
+    starts, number = history.starts, np.arange(len(history.starts)) + 1
+
+    def column(name: str, factor: float = 1.0) -> Any:
+        return factor * np.array([getattr(each, name) for each in starts], float)
+
+    gap, limit = column('contact_gap', 1e6), column('contact_gap', 1e6) - column('wear_reserve', 1e6)
+    panels = [
+        Panel('', 'start', 'contact gap (µm)', [
+            Curve(number, gap, 'ko', errors=column('contact_gap_std', 1e6)),
+            Curve(number, limit, 'r--', 'worn out'),
+        ]),
+        Panel('', 'start', 'friction over that in the first probe', [
+            Curve(number, column('friction'), 'ko', errors=column('friction_std')),
+        ]),
+        Panel('', 'normal force (N)', "engine's line over that in the pause", [
+            Curve(each.probe.normal_force, each.probe.pressed / each.probe.free, '.-')
+            for each in starts if each.probe
+        ]),
+    ]  # fmt: skip
+    _draw(file, panels, len(panels))
+
+
 def _stroke_lines(result: Any) -> Panel:
     name, curves = result.lines[0].recording, []
     for line in (each for each in result.lines if each.recording == name):

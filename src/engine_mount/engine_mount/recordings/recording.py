@@ -64,7 +64,7 @@ def open_mount(path: Path, mount: str = '') -> 'Recording':
     if mount.strip('/') not in recording.mounts:
         what = f'no mount {mount!r}' if mount else 'several mounts'
         known = ', '.join(recording.mounts) or 'none with a name'
-        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --mount')
+        raise ReadingError(f'{path} has {what}; it has {known}: choose one with --position')
     return recording.of_mount(mount.strip('/'))
 
 
