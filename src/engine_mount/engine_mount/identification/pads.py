@@ -28,12 +28,15 @@ from mount_models.specimen import Specimen, chosen_specimen, friction_coefficien
 from mount_ros.messages import force_table
 
 SOUND = (0.85, 1.15)  # chosen: pads for which the default of `continuous_viscous` was chosen, see policy.md
+_ENGINE = (LOWEST_FREQUENCY, LOWEST_FREQUENCY + RESONATORS - 1)  # Hz, as in the law
 _SETTLED = 0.6  # chosen: share of pulse and pause, at its end, that is used; before, the engine swings freely
 _PADDED = 1 << 15  # chosen: the lines of a spectrum lie 0.03 Hz apart
 _SMALLEST_LINE = 8e-6  # m, chosen: four times the noise of the sensor
+_SWING = (3.0, 16.0)  # Hz, chosen: where the engine swings on its mounts while the car moves
+_LARGEST_SWING = 0.1  # chosen: over the line in the pause; measured 0.01 at rest, 0.7 on a road at 43 km/h
 _SAME_SPEED = 0.05  # chosen: of the frequency of the first probe
 _SPEED_ERROR = 2.2  # measured in simulation: error of the friction over that of the frequency, both relative
-_FORCE_ERROR = 0.01  # measured in simulation: scatter of the normal force from activation to activation
+_FORCE_ERROR = 0.015  # measured in simulation: by the scatter of both tables of force
 _STICKS, _FREE = 0.2, 0.95  # chosen: a / a_0 between which the pads slide and slow the engine
 _CONFIDENCE = 0.95
 _NEVER = 1 << 62  # ns
@@ -154,13 +157,14 @@ def pads(recordings: Sequence[str | Path], *, mount: str = '', base: str | Path 
     seen: dict[str, Path] = {}
     starts: list[Start] = []
     for place in map(Path, recordings):
-        digest = recording_hash(place)
+        recording = open_mount(place, mount)
+        digest = recording_hash(recording.path)
         if digest in seen:
             raise IdentificationError(
                 f'{place} and {seen[digest]} are the same to the bit: give each recording once'
             )
         seen[digest] = place
-        starts += _starts_in(open_mount(place, mount), specimen)
+        starts += _starts_in(recording, specimen)
     if not starts:
         raise IdentificationError('0 recordings; give those of one car, the first start among them')
     starts.sort(key=lambda start: start.time.timestamp() if start.time else 0.0)
@@ -276,26 +280,32 @@ def _probe_between(begin: int, end: int, recording: Recording) -> Probe | None:
     for before, first, last in zip(edges, edges[1:], edges[2:], strict=False):
         whole = first - before >= used and last - first > 0.9 * longest
         if whole and pulse[before] == 0.0 < pulse[first]:
-            frequency, free = _line(displacement[first - used : first], 1e-9 * period)
-            _, pressed = _line(displacement[last - used : last], 1e-9 * period, frequency)
-            pulses.append((frequency, normal_force[last - 1], pressed, free))
+            pause, rubbing = displacement[first - used : first], displacement[last - used : last]
+            frequency, free = _line(pause, 1e-9 * period, _ENGINE)
+            _, pressed = _line(rubbing, 1e-9 * period, (0.9 * frequency, 1.1 * frequency))
+            _, swing = _line(rubbing, 1e-9 * period, _SWING)
+            pulses.append((frequency, swing / free, normal_force[last - 1], pressed, free))
     if not pulses:
         raise IdentificationError('0 whole pulses of a probe: did the car move? Probe at standstill')
-    frequencies, forces, *amplitudes = np.array(pulses).T
-    if np.median(amplitudes[1]) < _SMALLEST_LINE:
+    frequencies, swings, forces, pressed, free = np.array(pulses).T
+    if np.median(free) < _SMALLEST_LINE:
         raise IdentificationError(
-            f"engine's line is {1e6 * np.median(amplitudes[1]):.1f} um in the pauses of the probe (limit "
+            f"engine's line is {1e6 * np.median(free):.1f} um in the pauses of the probe (limit "
             f'{1e6 * _SMALLEST_LINE:.0f} um): probe with an idling engine'
         )
-    return Probe(float(np.median(frequencies)), forces, *amplitudes)
+    if np.median(swings) > _LARGEST_SWING:
+        raise IdentificationError(
+            f'mount swings in a pulse by {np.median(swings):.0%} of the line (limit {_LARGEST_SWING:.0%}): '
+            'probe at standstill'
+        )
+    return Probe(float(np.median(frequencies)), forces, pressed, free)
 
 
-def _line(displacement: FloatArray, period: float, near: float = 0.0) -> tuple[float, float]:
-    """Return frequency (Hz) and amplitude (m) of the largest line of an engine, or of that `near` one."""
+def _line(displacement: FloatArray, period: float, band: tuple[float, float]) -> tuple[float, float]:
+    """Return frequency (Hz) and amplitude (m) of the largest line within a `band` (Hz)."""
     window = np.hanning(displacement.size)
     spectrum = np.abs(np.fft.rfft((displacement - displacement.mean()) * window, _PADDED))
     frequencies = np.fft.rfftfreq(_PADDED, period)
-    low, high = (0.9 * near, 1.1 * near) if near else (LOWEST_FREQUENCY, LOWEST_FREQUENCY + RESONATORS)
-    inside = (frequencies >= low) & (frequencies <= high)
+    inside = (frequencies >= band[0]) & (frequencies <= band[1])
     peak = int(np.argmax(np.where(inside, spectrum, 0.0)))
     return float(frequencies[peak]), float(2.0 * spectrum[peak] / window.sum())

@@ -27,7 +27,7 @@ class Parameters(NamedTuple):
     friction_force: Annotated[
         float, Quantity('N', 'F: friction of the last pulse, as it is assumed', 5.0, 200.0)
     ] = 50.0
-    pulses: Annotated[float, Quantity('1', 'n: number of pulses', 1.0, 100.0)] = 8.0
+    pulses: Annotated[float, Quantity('1', 'n: number of pulses', 1.0, 100.0)] = 10.0
     pulse_duration: Annotated[float, Quantity('s', 'length of a pulse, and of each pause', 0.2, 10.0)] = 1.0
     wait: Annotated[float, Quantity('s', '0 A before the first pulse', 0.1, 60.0)] = 3.0
     largest_movement: Annotated[
@@ -81,7 +81,7 @@ def transfer(law, new_law, state, window, new_window):
 
 
 @compiled
-def step(law, table, state, window, trace, displacement):
+def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N) and velocity (m/s) of the pads, and 1 in a pulse, else 0."""
     movement = displacement - state.mean
     state.mean += law.averaging * movement
