@@ -30,6 +30,7 @@ from mount_ros.messages import force_table
 SOUND = (0.85, 1.15)  # chosen: pads for which the default of `continuous_viscous` was chosen, see policy.md
 _ENGINE = (LOWEST_FREQUENCY, LOWEST_FREQUENCY + RESONATORS - 1)  # Hz, as in the law
 _SETTLED = 0.6  # chosen: share of pulse and pause, at its end, that is used; before, the engine swings freely
+_SHORTEST = 1e8  # ns, chosen: less of a pulse shows no line
 _PADDED = 1 << 15  # chosen: the lines of a spectrum lie 0.03 Hz apart
 _SMALLEST_LINE = 8e-6  # m, chosen: four times the noise of the sensor
 _SWING = (3.0, 16.0)  # Hz, chosen: where the engine swings on its mounts while the car moves
@@ -52,7 +53,7 @@ class Probe(NamedTuple):
 
 
 class Start(NamedTuple):
-    """What one activation measured: gaps in m; friction over that in the first probe, None where unknown."""
+    """What one activation measured: gaps in m, friction over that in the first probe with its deviation."""
 
     name: str
     time: datetime | None
@@ -61,8 +62,7 @@ class Start(NamedTuple):
     wear_reserve: float
     probe: Probe | None = None
     note: str = ''
-    friction: float | None = None
-    friction_std: float | None = None
+    friction: tuple[float, float] | None = None
 
 
 class Trend(NamedTuple):
@@ -78,7 +78,7 @@ class PadHistory:
     def __init__(self, starts: Sequence[Start]):
         self.starts = starts
         self.wear = trend([start.contact_gap for start in starts])
-        self.friction = trend([start.friction for start in starts])
+        self.friction = trend([start.friction and start.friction[0] for start in starts])
 
     def sentences(self) -> list[str]:
         """Return what wear and friction have become: value, limit and remedy."""
@@ -89,10 +89,10 @@ class PadHistory:
             worn += f' (limit {1e6 * WEAR_RESERVE:.0f} um): replace the pads'
         elif self.wear and self.wear.slope < -self.wear.interval:
             worn += f', for about {-last.wear_reserve / self.wear.slope:.0f} starts'
-        probed = [start for start in self.starts if start.friction and start.friction_std]
+        probed = [start.friction for start in self.starts if start.friction]
         if not probed:
             return [worn, 'friction of the pads is unknown: record a start with the policy pad_probe']
-        value, std = probed[-1].friction or 0.0, probed[-1].friction_std or 0.0
+        value, std = probed[-1]
         rubs = f'friction is {value:.2f} ± {std:.2f} of that in the first probe'
         if not SOUND[0] - 2.0 * std < value < SOUND[1] + 2.0 * std:
             rubs += (
@@ -103,12 +103,10 @@ class PadHistory:
 
     def figures(self) -> dict[str, Any]:
         """Return all figures, SI units."""
-        starts = []
-        for start in self.starts:
-            probe = start.probe and {
-                name: np.array(each).tolist() for name, each in start.probe._asdict().items()
-            }
-            starts.append({**start._asdict(), 'time': start.time and start.time.isoformat(), 'probe': probe})
+        starts = [
+            {**start._asdict(), 'time': str(start.time), 'probe': start.probe and start.probe.frequency}
+            for start in self.starts
+        ]
         return {
             'starts': starts,
             'contact_gap_a_start': self.wear and self.wear._asdict(),
@@ -121,15 +119,14 @@ class PadHistory:
         rows = [
             (
                 start.name,
-                f'{start.time:%Y-%m-%d %H:%M}' if start.time else '',
                 f'{start.contact_gap * 1e6:.1f} ± {start.contact_gap_std * 1e6:.1f}',
                 f'{start.wear_reserve * 1e6:.0f}',
-                f'{start.friction:.3f} ± {start.friction_std:.3f}' if start.friction else '-',
+                '{:.3f} ± {:.3f}'.format(*start.friction) if start.friction else '-',
             )
             for start in self.starts
         ]
-        heads = ('start', 'time', 'contact gap (µm)', 'reserve (µm)', 'friction')
-        screen.table(Table('', 'llrrr', rows, heads))
+        heads = ('start', 'contact gap (µm)', 'reserve (µm)', 'friction')
+        screen.table(Table('', 'lrrr', rows, heads))
         for start in self.starts:
             if start.note:
                 screen.note(f'{start.name}: {start.note}')
@@ -170,7 +167,14 @@ def pads(recordings: Sequence[str | Path], *, mount: str = '', base: str | Path 
     starts.sort(key=lambda start: start.time.timestamp() if start.time else 0.0)
     reference = next((start.probe for start in starts if start.probe), None)
     coefs = friction_coefficients(specimen.friction)
-    return PadHistory([_with_friction(start, reference, coefs) for start in starts])
+    for number, start in enumerate(starts):
+        if start.probe and reference:
+            try:
+                found = start._replace(friction=relative_friction(reference, start.probe, coefs))
+            except IdentificationError as error:
+                found = start._replace(note=str(error))
+            starts[number] = found
+    return PadHistory(starts)
 
 
 def trend(values: Sequence[float | None]) -> Trend | None:
@@ -229,16 +233,6 @@ def _curve(probe: Probe, coefs: FrictionCoefficients) -> tuple[FloatArray, Float
     return np.log(np.array(mu) * force / probe.free[slides]), fall, (ratio * (1.0 - ratio**2)) ** 2
 
 
-def _with_friction(start: Start, reference: Probe | None, coefs: FrictionCoefficients) -> Start:
-    if start.probe is None or reference is None:
-        return start
-    try:
-        friction, std = relative_friction(reference, start.probe, coefs)
-    except IdentificationError as error:
-        return start._replace(note=str(error))
-    return start._replace(friction=friction, friction_std=std)
-
-
 def _starts_in(recording: Recording, specimen: Specimen) -> list[Start]:
     """Return the activations of a recording."""
     gaps, tables = recording['air_gap'], recording['current_force_table'].messages()
@@ -252,7 +246,8 @@ def _starts_in(recording: Recording, specimen: Specimen) -> list[Start]:
     starts: list[Start] = []
     for (stamp, place), end in zip(places.items(), [*list(places)[1:], _NEVER], strict=True):
         contact, std = (float(gaps[name][place]) for name in ('contact_gap', 'contact_gap_std'))
-        name = recording.short_name + (f' {len(starts) + 1}' if len(places) > 1 else '')
+        name = recording.short_name.removesuffix('/recording')
+        name += f' {len(starts) + 1}' if len(places) > 1 else ''
         start = Start(name, time, contact, std, wear_reserve(contact, forces[stamp], specimen))
         try:
             start = start._replace(probe=_probe_between(stamp, end, recording))
@@ -278,7 +273,7 @@ def _probe_between(begin: int, end: int, recording: Recording) -> Probe | None:
     longest = max((last - first for first, last in pairwise(edges) if pulse[first:last].any()), default=0)
     used, pulses = round(_SETTLED * longest), []
     for before, first, last in zip(edges, edges[1:], edges[2:], strict=False):
-        whole = first - before >= used and last - first > 0.9 * longest
+        whole = first - before >= used > _SHORTEST / period and last - first > 0.9 * longest
         if whole and pulse[before] == 0.0 < pulse[first]:
             pause, rubbing = displacement[first - used : first], displacement[last - used : last]
             frequency, free = _line(pause, 1e-9 * period, _ENGINE)

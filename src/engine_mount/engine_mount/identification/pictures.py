@@ -132,25 +132,22 @@ def draw_friction(result: Any, file: Path) -> None:
 
 def draw_pads(history: Any, file: Path) -> None:
     """Write the picture of gap and friction over the starts, and of all pulses, to `file` (PNG)."""
-    starts, number = history.starts, np.arange(len(history.starts)) + 1
-
-    def column(name: str, factor: float = 1.0) -> Any:
-        return factor * np.array([getattr(each, name) for each in starts], float)
-
-    gap, limit = column('contact_gap', 1e6), column('contact_gap', 1e6) - column('wear_reserve', 1e6)
+    starts = history.starts
+    number = np.arange(len(starts)) + 1
+    gap, gap_std, reserve = 1e6 * np.array([each[2:5] for each in starts]).T
+    friction, friction_std = np.array([each.friction or (np.nan, np.nan) for each in starts]).T
+    pulses = [
+        Curve(probe.normal_force, probe.pressed / probe.free, '.-')
+        for probe in (each.probe for each in starts)
+        if probe
+    ]
+    gaps = [Curve(number, gap, 'ko', errors=gap_std), Curve(number, gap - reserve, 'r--', 'worn out')]
+    frictions = [Curve(number, friction, 'ko', errors=friction_std)]
     panels = [
-        Panel('', 'start', 'contact gap (µm)', [
-            Curve(number, gap, 'ko', errors=column('contact_gap_std', 1e6)),
-            Curve(number, limit, 'r--', 'worn out'),
-        ]),
-        Panel('', 'start', 'friction over that in the first probe', [
-            Curve(number, column('friction'), 'ko', errors=column('friction_std')),
-        ]),
-        Panel('', 'normal force (N)', "engine's line over that in the pause", [
-            Curve(each.probe.normal_force, each.probe.pressed / each.probe.free, '.-')
-            for each in starts if each.probe
-        ]),
-    ]  # fmt: skip
+        Panel('', 'start', 'contact gap (µm)', gaps),
+        Panel('', 'start', 'friction over that in the first probe', frictions),
+        Panel('', 'normal force (N)', "engine's line over that in the pause", pulses),
+    ]
     _draw(file, panels, len(panels))
 
 
