@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from engine_mount.export.controller_in_c import NAME, sequence_hash, write_controller
 from engine_mount.settings.chosen import chosen_control
-from mount_control.policy.registry import POLICIES
+from mount_control.policy.registry import DAMPERS
 
 SAMPLES = 20_000
 HERE = Path(__file__).parent
@@ -76,7 +76,7 @@ def main(name: str) -> int:
     for tool in (target.compiler[0], target.emulator[0]):
         print(subprocess.run([tool, '--version'], capture_output=True, text=True).stdout.splitlines()[0])
     equal = True
-    for policy in POLICIES:
+    for policy in DAMPERS:
         values = {'mount_control': {'policy': policy}}
         with tempfile.TemporaryDirectory() as folder:
             write_controller(values, Path(folder))

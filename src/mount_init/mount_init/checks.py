@@ -17,6 +17,7 @@ from mount_models.actuator import checked_force
 from mount_models.coil.copper import resistance_at
 from mount_models.specimen import Specimen
 
+WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
 _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside, more than losses in a ramp
 _BIN = 0.05  # A, chosen: some ten samples each
 _FEWEST_IN_BIN = 3
@@ -161,6 +162,14 @@ def check_contact(
                 f'{largest * 1e6:.2f} um; the ripple is too noisy: check its sensors, or lengthen '
                 'dwell_duration and ramp_duration'
             )
+
+
+def wear_reserve(contact_gap: float, highest_force: float, specimen: Specimen) -> float:
+    """Return how much (m) the pads may wear before the pressed gap leaves the range of the force law.
+
+    `contact_gap` in m; `highest_force` is the last normal force (N) of the current-force table.
+    """
+    return contact_gap - highest_force / specimen.pad_stiffness - specimen.force_law.gap_low
 
 
 def check_peak_force(table: FloatArray, parameters: InitParameters) -> None:

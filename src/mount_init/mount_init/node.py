@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from mount_init.checks import WEAR_RESERVE, wear_reserve
 from mount_init.dialogue import CoilDialogue, DriverReport
 from mount_init.errors import InitialisationError
 from mount_init.estimate import TemperatureReadings
@@ -21,7 +22,6 @@ from mount_ros.nodes.parameters import declare, read
 from mount_ros.nodes.process import run_node
 
 _GAPS = ('rest_gap', 'contact_gap', 'rest_gap_std', 'contact_gap_std')
-_WEAR_RESERVE = 10e-6  # m, chosen: early enough to order pads
 
 
 class MountInit(SafeLifecycleNode):
@@ -143,7 +143,7 @@ def verdict(result: InitialisationResult, specimen: Specimen) -> Verdict:
         'coil_temperature_from': evidence.temperature.source,
         'resistance_ohm': f'{supply.whole.ohm:.3f}',
         'link_voltage_V': f'{supply.whole.link_voltage:.2f}',
-        'wear_reserve_um': f'{wear_reserve(result, specimen) * 1e6:.1f}',
+        'wear_reserve_um': f'{_reserve(result, specimen) * 1e6:.1f}',
         'samples_used': evidence.samples,
         'samples_invalid': evidence.skipped,
     }
@@ -152,19 +152,17 @@ def verdict(result: InitialisationResult, specimen: Specimen) -> Verdict:
     return verdict_on(findings, _summary(result), figures)
 
 
-def wear_reserve(result: InitialisationResult, specimen: Specimen) -> float:
-    """Return how much (m) the pads may wear before the pressed gap leaves the range of the force law."""
-    pressed_gap = result.contact_gap - result.table[1, -1] / specimen.pad_stiffness
-    return float(pressed_gap - specimen.force_law.gap_low)
+def _reserve(result: InitialisationResult, specimen: Specimen) -> float:
+    return wear_reserve(result.contact_gap, result.table[1, -1], specimen)
 
 
 def _warning(result: InitialisationResult, specimen: Specimen) -> str:
     """Return what a result that holds is warned of, empty where it is nothing."""
-    reserve = wear_reserve(result, specimen)
-    if reserve < _WEAR_RESERVE:
+    reserve = _reserve(result, specimen)
+    if reserve < WEAR_RESERVE:
         return (
             f'pads are nearly worn: {reserve * 1e6:.1f} um until the gap leaves the calibrated range, less '
-            f'than {_WEAR_RESERVE * 1e6:.0f} um; replace the pads'
+            f'than {WEAR_RESERVE * 1e6:.0f} um; replace the pads'
         )
     if specimen.temperature is not None and math.isnan(result.evidence.temperature.celsius):
         return (

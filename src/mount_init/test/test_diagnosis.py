@@ -3,7 +3,8 @@
 import pytest
 from simulated_actuator import SPECIMEN, SimulatedActuator, run_initialisation
 
-from mount_init.node import verdict, wear_reserve
+from mount_init.checks import wear_reserve
+from mount_init.node import verdict
 from mount_init.parameters import InitParameters
 from mount_ros.nodes.diagnostics import Level
 
@@ -26,7 +27,7 @@ def test_a_good_result_is_told_with_its_figures(result):
 
 def test_worn_pads_are_a_warning_before_they_are_a_refusal():
     worn = run_initialisation(SimulatedActuator(contact_gap=295e-6))
-    assert 0.0 < wear_reserve(worn, SPECIMEN) < 10e-6
+    assert 0.0 < wear_reserve(worn.contact_gap, worn.table[1, -1], SPECIMEN) < 10e-6
     said = verdict(worn, SPECIMEN)
     assert said.level == Level.WARN
     assert 'pads are nearly worn' in said.sentence

@@ -165,6 +165,8 @@ CONTROL_TRACE = Topic(
         Scalar('line_amplitude', 'm'),
         Scalar('line_frequency', 'Hz'),
         Scalar('engine_velocity', 'm/s'),
+        Scalar('movement', 'm'),
+        Scalar('pulse', '1'),
     ),
 )
 

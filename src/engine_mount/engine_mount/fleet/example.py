@@ -21,7 +21,7 @@ from engine_mount.fleet.runner import Done, run_tasks
 from engine_mount.recordings.edit import cut
 from engine_mount.settings.options import settings_of_mounts, with_sample_rate
 from mount_bringup.settings import checked_settings
-from mount_control.policy.registry import POLICIES
+from mount_control.policy.registry import DAMPERS
 from mount_recorder.metadata import METADATA_NAME
 from mount_recorder.session import session_text
 from mount_recorder.versions import versions
@@ -171,7 +171,7 @@ def _spoil(folder: Path, damage: str) -> None:
 
 
 def prepare(
-    scenarios: Sequence[str] = ('bench', 'motorway'), policies: Sequence[str] = tuple(POLICIES)
+    scenarios: Sequence[str] = ('bench', 'motorway'), policies: Sequence[str] = tuple(DAMPERS)
 ) -> None:
     """Compile for these scenarios and policies, or load what is compiled already.
 

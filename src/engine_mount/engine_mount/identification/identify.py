@@ -1,7 +1,7 @@
-"""Identify parameters from recordings: `friction` of the pads.
+"""Identify from recordings: `friction` of the pads on a rack, `pads` of a car over its life.
 
-It returns a result with `figures()` in SI units, `report(screen)` for people, `draw(file)` and
-`specimen(name)`. The laws that it fits and the checks of recordings: `engine_mount.identification.friction`.
+Each returns a result with `figures()` in SI units, `report(screen)` for people and `draw(file)`,
+that of `friction` a `specimen(name)` too. Its laws and its checks: `engine_mount.identification.friction`.
 """
 
 import functools
@@ -20,6 +20,7 @@ from engine_mount.identification.friction.recording import FrictionRecording
 from engine_mount.identification.friction.result import FrictionIdentification, Pair, validate
 from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
 from engine_mount.identification.friction.screening import case_of, subtract_zero
+from engine_mount.identification.pads import pads as pads
 from engine_mount.recordings.recording import recording_hash
 from engine_mount.signals.mapping import Mapping
 from mount_models.quantity import nearest

@@ -130,6 +130,27 @@ def draw_friction(result: Any, file: Path) -> None:
     _draw(file, panels, min(2, len(panels)))
 
 
+def draw_pads(history: Any, file: Path) -> None:
+    """Write the picture of gap and friction over the starts, and of all pulses, to `file` (PNG)."""
+    starts = history.starts
+    number = np.arange(len(starts)) + 1
+    gap, gap_std, reserve = 1e6 * np.array([each[2:5] for each in starts]).T
+    friction, friction_std = np.array([each.friction or (np.nan, np.nan) for each in starts]).T
+    pulses = [
+        Curve(probe.normal_force, probe.pressed / probe.free, '.-')
+        for probe in (each.probe for each in starts)
+        if probe
+    ]
+    gaps = [Curve(number, gap, 'ko', errors=gap_std), Curve(number, gap - reserve, 'r--', 'worn out')]
+    frictions = [Curve(number, friction, 'ko', errors=friction_std)]
+    panels = [
+        Panel('', 'start', 'contact gap (µm)', gaps),
+        Panel('', 'start', 'friction over that in the first probe', frictions),
+        Panel('', 'normal force (N)', "engine's line over that in the pause", pulses),
+    ]
+    _draw(file, panels, len(panels))
+
+
 def _stroke_lines(result: Any) -> Panel:
     name, curves = result.lines[0].recording, []
     for line in (each for each in result.lines if each.recording == name):

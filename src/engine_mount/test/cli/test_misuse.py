@@ -26,6 +26,7 @@ WRONG = {
     'fleet report ?': MISSING,
     'fleet worst ? --by duration_s': MISSING,
     'identify friction --train ?': MISSING,
+    'identify pads ?': MISSING,
     'import ? --out made': MISSING,
     'info ?': MISSING,
     'ls ?': MISSING,

@@ -22,14 +22,16 @@ CHANGES = {
                          {'eigenfrequency': 2.0}, {'damper': 'degressive'}, {'switching': 'always'}),
     'continuous_viscous': ({'eigenfrequency': 10.0, 'quality': 0.7}, {'damping_coefficient': 1500.0},
                            {'position_gain': 0.4}, {'eigenfrequency': 4.0}),
+    'pad_probe': ({'friction_force': 90.0}, {'pulses': 30.0}, {'wait': 0.2}, {'largest_movement': 0.001}),
 }  # fmt: skip
+BASE = {'pad_probe': {'wait': 0.1, 'pulse_duration': 0.2, 'largest_movement': 0.005}}
 SAMPLES = 100_000
 MORE = 1_000_000
 
 
 def values_of(policy: str, changes: dict | None = None) -> dict:
     prefix = '' if policy == 'switched_viscous' else f'{policy}.'
-    own = {f'{prefix}{name}': value for name, value in (changes or {}).items()}
+    own = {f'{prefix}{name}': value for name, value in (BASE.get(policy, {}) | (changes or {})).items()}
     return {'policy': policy, **UNLIMITED, **own}
 
 

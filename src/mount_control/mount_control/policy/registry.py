@@ -1,6 +1,6 @@
 """The policies by their names."""
 
-from mount_control.policy import continuous_viscous, switched_viscous
+from mount_control.policy import continuous_viscous, pad_probe, switched_viscous
 from mount_control.policy.contract import Policy
 from mount_models.quantity import ParameterError, nearest
 
@@ -8,10 +8,12 @@ DEFAULT = 'continuous_viscous'
 UNPREFIXED = 'switched_viscous'
 """The first policy: its parameters have no prefix, and recordings that name none were made with it."""
 
-POLICIES: dict[str, Policy] = {
+DAMPERS: dict[str, Policy] = {
     'switched_viscous': switched_viscous,
     'continuous_viscous': continuous_viscous,
 }
+POLICIES: dict[str, Policy] = {**DAMPERS, 'pad_probe': pad_probe}
+"""The dampers, and what is no damper but a diagnosis."""
 
 
 def chosen_policy(name: str) -> Policy:

@@ -1,4 +1,4 @@
-"""`engine-mount identify`: from recordings of a rack to parameters."""
+"""`engine-mount identify`: from recordings to parameters of the pads, and to what became of them."""
 
 from typing import Annotated
 
@@ -9,7 +9,9 @@ from engine_mount.cli.commands.options import (
     Figure,
     JsonFile,
     MapFile,
+    Position,
     Rate,
+    RecordingPlaces,
     TimeColumn,
     mapping_of,
     option,
@@ -19,9 +21,9 @@ from engine_mount.cli.fetching import local
 from engine_mount.cli.help import Command, group
 from engine_mount.cli.rack import EXIT_CODES, Base, Name, Out, progress, publish
 
-app = group('identify', 'Identify parameters from recordings of a rack.')
+app = group('identify', 'Identify the pads from recordings, of a rack or of a car.')
 
-EPILOG = (
+FRICTION_EXAMPLES = (
     EXIT_CODES
     + """
 
@@ -39,12 +41,7 @@ EPILOG = (
 )
 
 
-@app.callback()
-def _top() -> None:
-    """Keep sub-commands even while there is only one."""
-
-
-@app.command(cls=Command, epilog=EPILOG)
+@app.command(cls=Command, epilog=FRICTION_EXAMPLES)
 def friction(
     train: Annotated[
         list[str] | None, option('recordings to fit: files of any format, recordings, URIs', 'FILE...')
@@ -100,3 +97,35 @@ def friction(
             base=base or '', progress=bar,
         )  # fmt: skip
     publish(result, json_file, figure, out, name)
+
+
+PADS_EXAMPLES = (
+    EXIT_CODES
+    + """
+
+`engine-mount identify pads bags/*/recording --figure pads.png` - wear and friction over the starts of a car
+
+`engine-mount identify pads bags/first bags/today --json pads.json` - today against the first probe
+"""
+)
+
+
+@app.command(cls=Command, epilog=PADS_EXAMPLES)
+def pads(
+    recordings: RecordingPlaces,
+    position: Position = '',
+    base: Base = None,
+    json_file: JsonFile = None,
+    figure: Figure = None,
+) -> None:
+    """Show wear and friction of the pads over the starts of a car.
+
+    Wear is the contact gap of each activation against the first. Friction needs recordings with the policy
+    pad_probe at standstill, the engine idling; it is that of the first probe times the figure.
+    """
+    from engine_mount.cli.screen import TerminalScreen
+    from engine_mount.identification import identify
+
+    screen = TerminalScreen()
+    places = [local(place, screen) for place in recordings]
+    publish(identify.pads(places, mount=position, base=base or ''), json_file, figure)

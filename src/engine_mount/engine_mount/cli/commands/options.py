@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.help import Completer, recordings, setting
+from engine_mount.cli.help import Completer, named, recordings, setting
 from mount_models.quantity import nearest
 
 if TYPE_CHECKING:
@@ -107,6 +107,7 @@ def write_figures(figures: Figures[str, Any], file: Path | None) -> None:
 
 RecordingPlace = Annotated[str, recording_argument()]
 RecordingPlaces = Annotated[list[str], recording_argument('RECORDING...')]
+Position = Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))]
 NewFolder = Annotated[Path | None, option('folder to create; default: a new one in bags', panel=OUTPUT)]
 JsonFile = Annotated[
     Path | None,

@@ -7,6 +7,7 @@ import typer
 from engine_mount.cli.commands.options import (
     JsonFile,
     NewFolder,
+    Position,
     RecordingPlace,
     Settings,
     changes_of,
@@ -14,7 +15,6 @@ from engine_mount.cli.commands.options import (
     write_figures,
 )
 from engine_mount.cli.fetching import local
-from engine_mount.cli.help import named
 
 EPILOG = """Exit code: 0 when the setpoints equal the recorded ones, or a change was requested; 1 when they
 differ; 2 when the order was refused.
@@ -35,7 +35,7 @@ def replay(
     table: Annotated[str, option('current-force table of another RECORDING, or "default": calculated')] = '',
     out: NewFolder = None,
     json_file: JsonFile = None,
-    position: Annotated[str, option('one of several mounts, such as left', 'NAME', named('place'))] = '',
+    position: Position = '',
 ) -> None:
     """Replay a recorded displacement through the same controller and compare the answers with the recording.
 
