@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.commands.options import OUTPUT, option, target, write_figures
+from engine_mount.cli.commands.options import OUTPUT, new_screen, option, target, write_figures
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -86,19 +86,17 @@ EXIT_CODES = 'Exit code: 0 when all requested files are written, 2 with the reas
 
 def progress() -> AbstractContextManager[Callable[[float, str], None]]:
     """Return a bar of a fit that is gone when the work is done."""
-    from engine_mount.cli.screen import TerminalScreen
 
-    return TerminalScreen().bar('reading', transient=True)
+    return new_screen().bar('reading', transient=True)
 
 
 def publish(
     result: Any, json_file: Path | None, figure: Path | None, out: Path | None = None, name: str = ''
 ) -> None:
     """Show a result and write what is wanted of it; nothing where its specimen is refused."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification.specimen import PARTS, foreign_parts, save_specimen
 
-    screen = TerminalScreen()
+    screen = new_screen()
     specimen = result.specimen(name) if out else None
     result.report(screen)
     if figure:

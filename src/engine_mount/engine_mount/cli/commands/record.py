@@ -11,6 +11,7 @@ from engine_mount.cli.commands.options import (
     NewFolder,
     Split,
     argument,
+    new_screen,
     option,
 )
 from engine_mount.cli.help import named
@@ -51,7 +52,6 @@ def record(
     namespace: Namespace = '',
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.record import record as run_record
     from engine_mount.settings.amounts import checked_recorder, recorder_options
     from engine_mount.settings.run_folder import new_place
@@ -60,7 +60,7 @@ def record(
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
     options = {'on_full': on_full, **recorder_options(split)}
-    screen, folder = TerminalScreen(), out or new_place('record')
+    screen, folder = new_screen(), out or new_place('record')
     outcome = run_record(
         folder, checked_recorder(options), screen, topics=topics or (),
         duration=duration, domain=chosen_domain(domain), namespace=namespace,

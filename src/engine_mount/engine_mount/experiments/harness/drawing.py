@@ -4,10 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import matplotlib
-
-matplotlib.use('Agg')
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
