@@ -16,8 +16,7 @@ from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.loop.run import CoreOutcome, run_core
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.series import Series
-from engine_mount.reports.drive.evaluation import tracking_error
-from engine_mount.reports.drive.signals import DriveSignals, load_drive
+from engine_mount.reports.drive.signals import DriveSignals, load_drive, tracking_error
 from engine_mount.settings.chosen import policy_of
 from engine_mount.signals.excitation import build_excitation
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER

@@ -29,8 +29,7 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.reports.drive.evaluation import switching
-from engine_mount.reports.drive.signals import DriveSignals, FloatArray
+from engine_mount.reports.drive.signals import DriveSignals, FloatArray, switching
 from mount_control.policy import switched_viscous
 from mount_models.quantity import Quantity
 

@@ -28,8 +28,7 @@ from engine_mount.experiments.harness.experiment import (
     table,
 )
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.reports.drive.evaluation import switching
-from engine_mount.reports.drive.signals import DriveSignals, FloatArray
+from engine_mount.reports.drive.signals import DriveSignals, FloatArray, switching
 from engine_mount.reports.sections.periodic import rms_in_bands
 from engine_mount.signals.excitation import recorded_signal
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER

@@ -17,8 +17,14 @@ from engine_mount.recordings.audit import audit
 from engine_mount.recordings.losses import losses
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
-from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
-from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
+from engine_mount.reports.drive.signals import (
+    DriveSignals,
+    Truth,
+    load_drive,
+    samples_at_the_ends,
+    switching,
+    tracking_error,
+)
 from engine_mount.reports.sections.periodic import (
     cycle_work,
     distortion,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.drive.evaluation import error_text
+from engine_mount.reports.drive.signals import error_text
 from engine_mount.reports.sections.motion import peak_cell
 from engine_mount.reports.sections.run import HEAD_OF_SESSION
 from engine_mount.reports.sections.section import (

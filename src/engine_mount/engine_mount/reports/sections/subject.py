@@ -30,8 +30,14 @@ from engine_mount.reports.drawing.chart import (
     look_of,
 )
 from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
-from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
-from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
+from engine_mount.reports.drive.signals import (
+    DRIVE_COLUMNS,
+    acts_after,
+    levels_of,
+    load_drive,
+    tracking_error,
+    wanted_force,
+)
 from engine_mount.reports.sections.periodic import Sine, dominant_sine
 from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy import switched_viscous
