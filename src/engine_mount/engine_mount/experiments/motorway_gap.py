@@ -122,10 +122,9 @@ def figures_of(
             for name, each in truths.items()
         },
         'peak_m': {
-            name: float(np.max(np.abs(each.displacement[each.time >= exceeded])))
-            for name, each in truths.items()
+            name: np.max(np.abs(each.displacement[each.time >= exceeded])) for name, each in truths.items()
         },
-        'highest_current_a': float(truth.coil_current.max()),
+        'highest_current_a': truth.coil_current.max(),
     }
 
 

@@ -132,10 +132,10 @@ def figures_of(
         - 1.0,
         'highest_force_n': first,
         'final_force_n': final,
-        'breakaway_force_n': float(own.normal_force * breakaway),
-        'fit_error_late_m': float(off[late].max()),
-        'fit_error_during_ramp_m': float(off[during].max()),
-        'fit_error_between_m': float(off[held & ~during & ~late].max()),
+        'breakaway_force_n': own.normal_force * breakaway,
+        'fit_error_late_m': off[late].max(),
+        'fit_error_during_ramp_m': off[during].max(),
+        'fit_error_between_m': off[held & ~during & ~late].max(),
     }
 
 

@@ -120,7 +120,7 @@ def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
         for what, unit, values in moved:
             runs[name] |= {
                 f'{what}_rms_{unit}': rms(values),
-                f'{what}_peak_{unit}': float(np.max(np.abs(values))),
+                f'{what}_peak_{unit}': np.max(np.abs(values)),
                 f'{what}_band_rms_{unit}': rms_in_bands(values, BANDS),
                 f'{what}_band_rms_at_events_{unit}': rms_in_bands_within(values, events),
                 f'{what}_band_rms_else_{unit}': rms_in_bands_within(values, ~events),
@@ -129,14 +129,14 @@ def figures_of(drives: dict[str, DriveSignals], order: Order) -> Values:
         'source': Path(own.file).name,
         'column': own.column,
         'scale': own.scale,
-        'duration_s': float(truth.time[-1] - truth.time[0] + SAMPLE_TIME),
+        'duration_s': truth.time[-1] - truth.time[0] + SAMPLE_TIME,
         'acceleration_band_rms_m_s2': rms_in_bands(truth.chassis_acceleration, BANDS),
         'damper': own.damper,
         'switch_on_level_m': control.switch_on_level,
         'times_on': len(changes.on),
         'switched_on_s': list(changes.on),
-        'damping_active_share': float(np.mean(active)),
-        'events_share': float(np.mean(events)),
+        'damping_active_share': np.mean(active),
+        'events_share': np.mean(events),
         'events_margin_s': 1.0 / control.eigenfrequency,
         'runs': runs,
     }

@@ -110,9 +110,9 @@ class ForceLawFit:
         """Return the errors over all points: N, and of forces above 20 N relative to them."""
         return {
             'relative_rms': rms(self.relative),
-            'relative_worst': float(np.abs(self.relative).max()),
+            'relative_worst': np.abs(self.relative).max(),
             'rms': rms(self.error),
-            'largest': float(np.abs(self.error).max()),
+            'largest': np.abs(self.error).max(),
         }
 
 

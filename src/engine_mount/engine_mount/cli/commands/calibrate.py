@@ -24,8 +24,7 @@ from engine_mount.cli.rack import (
     Base,
     Name,
     Out,
-    gaps_of,
-    given_ripple,
+    file_values,
     progress,
     publish,
     rack_mapping,
@@ -106,12 +105,11 @@ def actuator(
     currents are refused. Then no file is written.
     """
     from engine_mount.identification import calibrate
-    from engine_mount.identification.rack import FileValues
 
     screen = new_screen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values = FileValues(gaps_of(gaps or [], places))
+    values = file_values(places, gaps or [])
     with progress() as bar:
         result = calibrate.actuator(places, columns=mapping, values=values, base=base or '', progress=bar)
     publish(result, json_file, figure, out, name)
@@ -161,7 +159,7 @@ def inductance(
     screen = new_screen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values = given_ripple(places, gaps or [], temperatures or [])
+    values = file_values(places, gaps or [], temperatures or [])
     with progress():
         result = calibrate.inductance(
             places, columns=mapping, values=values, rest_current=rest_current,

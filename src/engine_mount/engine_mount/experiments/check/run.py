@@ -193,7 +193,7 @@ def _motion(truth: Truth, part: slice, quiet: float) -> dict[str, float]:
     beyond = np.flatnonzero(np.abs(displacement) > quiet)
     shaken = rms_in_bands(acceleration - np.mean(acceleration), BANDS)
     return {
-        'peak': float(np.max(np.abs(displacement))),
+        'peak': np.max(np.abs(displacement)),
         'rms': rms(displacement),
         'first_extremum': first_extremum(displacement),
         'ringing': SAMPLE_TIME * float(beyond[-1]) if beyond.size else 0.0,
@@ -224,8 +224,8 @@ def control_figures(signals: DriveSignals, truth: Truth, parameters: Settings) -
     return {
         'friction_error_percent': 100.0 * error,
         'switched_on': float(len(switching(seen).on)),
-        'damping_share_percent': 100.0 * float(np.mean(seen.damping_active[excited])),
-        'pad_energy_j': SAMPLE_TIME * float(np.sum(np.abs(truth.friction_force * truth.velocity))),
-        'peak_current_a': float(np.max(np.abs(seen.current[excited]))),
-        'coil_power_w': resistance * float(np.mean(truth.coil_current**2)),
+        'damping_share_percent': 100.0 * np.mean(seen.damping_active[excited]),
+        'pad_energy_j': SAMPLE_TIME * np.sum(np.abs(truth.friction_force * truth.velocity)),
+        'peak_current_a': np.max(np.abs(seen.current[excited])),
+        'coil_power_w': resistance * np.mean(truth.coil_current**2),
     }
