@@ -36,14 +36,8 @@ def experiment_named(name: str) -> Experiment:
 
 
 def experiments_named(names: Sequence[str]) -> list[Experiment]:
-    """Return the experiments of these names; raises `ExperimentError` for an unknown one.
-
-    `all` stands for every one that needs nothing of the user's own.
-    """
-    named = [experiment_named(name) for name in names if name != ALL]
-    if ALL not in names:
-        return named
-    return [each for each in map(experiment_named, NAMES) if not each.needs or each in named]
+    """Return the experiments of these names, or of `all`; raises `ExperimentError` for an unknown one."""
+    return list(map(experiment_named, NAMES if ALL in names else names))
 
 
 def known_settings(experiments: Sequence[Experiment]) -> dict[str, Values]:
