@@ -74,21 +74,18 @@ def record(
 
 def _print_losses(folder: Path, screen: 'TerminalScreen') -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
-    from engine_mount.recordings.audit import audit
-    from engine_mount.recordings.losses import losses, sentences
+    from engine_mount import audit
     from engine_mount.recordings.recording import open_recording
 
-    recording = open_recording(folder)
-    audits = audit(recording)
-    found = losses(recording, audits)
-    for warning in recording.warnings:
+    found = audit(open_recording(folder))
+    for warning in found.warnings:
         screen.note(warning)
-    came = any(entry.present for name, entry in audits.items() if name != '/diagnostics')
+    came = any(entry.present for name, entry in found.topics.items() if name != '/diagnostics')
     if came:
-        screen.say(f'audit      {sentences(audits, found)[-1]}')
+        screen.say(f'audit      {found.sentences()[-1]}')
     else:
         screen.note(
             'nothing was recorded, save perhaps /diagnostics; does a graph run in this domain, namespace?'
         )
     screen.say(f'recording  {folder}')
-    return came and found.lossless
+    return came and found.losses.lossless

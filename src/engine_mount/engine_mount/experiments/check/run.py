@@ -13,8 +13,7 @@ from engine_mount.experiments.harness.closed_loop import truth_of_run
 from engine_mount.experiments.harness.experiment import Settings, Values
 from engine_mount.experiments.harness.measures import first_extremum, rms
 from engine_mount.fleet.runner import run_tasks
-from engine_mount.recordings.audit import audit
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.access import audit
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
 from engine_mount.reports.drive.signals import (
@@ -127,10 +126,11 @@ def run_trial(trial: Trial) -> Result:
 
 def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
     """Return figures and remarks of a recorded manoeuvre."""
-    parameters, audits = trial.parameters, audit(recording)
-    lost = losses(recording, audits)
+    parameters, audited = trial.parameters, audit(recording)
+    lost = audited.losses
     signals = load_drive(recording, run.excitation_start)
-    remarks = [*run.complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run.samples)]
+    at_ends = samples_at_the_ends(recording, audited.topics, run.samples)
+    remarks = [*run.complaints, *audited.warnings, *at_ends]
     stamps = recording['control_trace'].stamps
     late = (int(stamps.min()) - signals.zero) / 1e9 if len(stamps) else math.inf
     if late > 0.0:

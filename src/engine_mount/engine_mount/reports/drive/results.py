@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from engine_mount.recordings.audit import audit
+from engine_mount.recordings.access import audit
 from engine_mount.recordings.difference import known
 from engine_mount.recordings.events import Switching, switching_times
-from engine_mount.recordings.losses import Losses, as_table, losses, sentences
+from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen, Table
 from engine_mount.reports.drive.beside import BesideError, name_of, peaks_text
@@ -75,10 +75,10 @@ def _evaluate_mount(recording: Recording, run: Figures, screen: Screen, result: 
     with screen.line('evaluating the recording'):
         figures, found = summarise(subject, run), subject.losses
     mount = f'{recording.mount}: ' if recording.mount else ''
-    complaints = [*found.complaints(), *samples_at_the_ends(recording, subject.audits, run['samples'])]
+    complaints = [*found.complaints(), *samples_at_the_ends(recording, subject.audit.topics, run['samples'])]
     result.complaints += [f'{mount}{words}' for words in (*complaints, *late_control(figures))]
     screen.table(summary_table(figures, found, mount))
-    screen.table(as_table(subject.audits))
+    screen.table(subject.audit.table)
     recording.release()  # of several mounts one is in memory at a time
     return figures
 
@@ -211,11 +211,9 @@ def _longest_first(places: list[Path]) -> list[Recording]:
 
 def _audited(recording: Recording, screen: Screen) -> list[str]:
     """Say in one sentence what a recording holds; return what is not as it should be."""
-    audits = audit(recording)
-    found = losses(recording, audits)
-    name = recording.path.name
-    screen.say(f'{name}: {sentences(audits, found)[-1]}')
-    return [*recording.warnings, *(f'{name}: {words}' for words in found.complaints())]
+    found, name = audit(recording), recording.path.name
+    screen.say(f'{name}: {found.sentences()[-1]}')
+    return [*found.warnings, *(f'{name}: {words}' for words in found.losses.complaints())]
 
 
 def _draw(folder: RunFolder, recording: Recording, screen: Screen, result: DriveResult) -> None:

@@ -1,7 +1,9 @@
 """What a report begins with: the verdict, the figures that one wants to see first, and what is missing."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
@@ -21,7 +23,7 @@ from engine_mount.reports.sections.section import (
     Table,
     moment,
 )
-from engine_mount.reports.sections.subject import Subject, other_mounts, shared_sentences
+from engine_mount.reports.sections.subject import Signal, Subject, other_mounts, shared_sentences
 
 
 def overview(subjects: Sequence[Subject]) -> Section:
@@ -107,21 +109,32 @@ def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
     beside, moved = subject.beside, subject['displacement']
-    reason = beside if isinstance(beside, str) else '' if moved else 'no displacement was recorded'
-    peak = at = begin = math.nan
-    if not reason:
-        begin = (beside.begin - subject.zero) / 1e9
-        peak, at = moved.peak(begin)
-        reason = 'the recording ends before the excitation begins' if math.isnan(peak) else ''
-    if reason:
-        return UNKNOWN, [f'against other mounts unknown: {reason}']
-    others = {name: signal.peak(begin)[0] for name, signal in other_mounts([subject], 'displacement').items()}
-    changes = ', '.join(
-        f'{_change(peak, other)} {name} ({quantity_text(other, "m")})' for name, other in others.items()
-    )
-    text = f'{quantity_text(peak, "m")}, {changes}; acceleration of the chassis:'
-    judged = LOOK if 'worse' in changes else GOOD
-    return judged, [Link('peak displacement', 'traces', at), text, Link('by frequency', 'felt')]
+    unknown = 'against other mounts unknown:'
+    if isinstance(beside, str):
+        return UNKNOWN, [f'{unknown} {beside}']
+    if moved is None:
+        return UNKNOWN, [f'{unknown} no displacement was recorded']
+    begin = (beside.begin - subject.zero) / 1e9
+    peak, at = moved.peak(begin)
+    if math.isnan(peak):
+        return UNKNOWN, [f'{unknown} the recording ends before the excitation begins']
+
+    def against(quantity: str, unit: str, figure: Callable[[Signal], float]) -> str:
+        own, others = figure(subject[quantity]), other_mounts([subject], quantity)
+        changes = (
+            f'{_change(own, other)} {name} ({quantity_text(other, unit)})'
+            for name, other in ((name, figure(signal)) for name, signal in others.items())
+        )
+        return f'{quantity_text(own, unit)}, {", ".join(changes)}'
+
+    words = [against('displacement', 'm', lambda signal: signal.peak(begin)[0])]
+    text: list[Cell] = [Link('peak displacement', 'traces', at), words[0]]
+    if subject['acceleration'] is not None:
+        words.append(
+            against('acceleration', 'm/s²', lambda signal: np.nanstd(signal.values[signal.time >= begin]))
+        )
+        text += ['·', Link('acceleration of the chassis', 'felt'), f'rms {words[1]}']
+    return (LOOK if any('worse' in each for each in words) else GOOD), text
 
 
 def _change(value: float, reference: float) -> str:
