@@ -18,8 +18,6 @@ REAL_TIME_TESTS = $(shell grep -rl --include='test_*.py' 'mark.real_time' src te
 WORKERS ?= $(shell echo $$(($$(nproc) < 3 ? $$(nproc) + 1 : 4)))
 RACK := build/rack
 SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
-# A real drive, not part of this repository: docs/explanation/recorded_drive.md is written anew only where it is there.
-RECORDED_DRIVE ?= $(wildcard ../shared/data/motorway_i280)
 
 # Where it is set, as in many containers, every process would compile all its modules anew: half a second for each node,
 # a quarter of a minute for each process that passes tests.
@@ -59,10 +57,6 @@ faults: $(VENV)/.ready ## bring every fault into the real graph; writes docs/ref
 experiments: $(VENV)/.ready ## repeat the paper's experiments; writes docs/explanation/experiments.md and docs/explanation/figures
 	@$(BIN)/engine-mount experiment all --page docs/explanation/experiments.md
 	@rm -rf build/drive && $(BIN)/engine-mount drive --core --out build/drive && cp build/drive/drive.png docs/explanation/figures
-ifneq ($(RECORDED_DRIVE),)
-	@$(BIN)/engine-mount experiment recorded_drive --set recorded_drive.file=$(RECORDED_DRIVE) \
-		--set recorded_drive.column=accelerometer.2 --set recorded_drive.scale=-1 --page docs/explanation/recorded_drive.md
-endif
 
 identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes the specimen that is shipped
 	@$(BIN)/engine-mount calibrate rack --out $(RACK) --noise 0 --celsius 20 --celsius 80

@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 ROOTS = (
     'mount_driver.node', 'mount_init.node', 'mount_control.node', 'mount_sim.node',
     'engine_mount.drives.loop.recording', 'engine_mount.drives.replay',
 )  # fmt: skip
-JUDGES = {'engine_mount.drives.agreement', 'engine_mount.reports.drive.evaluation'}
+JUDGES = {'engine_mount.drives.agreement'}
 """Modules that judge answers when they are there; what they alone need makes no number of a run."""
 OF_LIBRARIES = {
     *('exp', 'exp2', 'expm1', 'log', 'log1p', 'log2', 'log10', 'sin', 'cos', 'tan', 'asin', 'acos', 'atan'),
@@ -61,28 +59,6 @@ def test_no_number_passes_what_depends_on_the_processor():
     found = {(module, what) for module in modules() for what in suspicious(source_of(module))}
     assert found - set(ALLOWED) == set()
     assert set(ALLOWED) <= found
-
-
-@pytest.mark.parametrize(
-    ('source', 'what'),
-    [
-        ('import math\ny = math.exp(x)', 'math.exp'),
-        ('import numpy as np\ny = np.linalg.solve(a, b)', 'np.linalg'),
-        ('import numpy as np\ny = np.mean(a)', 'np.mean'),
-        ('y = a @ b', '@'),
-        ('y = a ** 0.5', '**'),
-        ('y = 10.0 ** n', '**'),
-        ('y = a.std(ddof=1)', '.std'),
-        ('from scipy.signal import resample_poly', 'scipy'),
-        ('from math import sin', 'math.sin'),
-        ('y = 2.0 ** 0.5', '**'),
-        ('y = x**2', '**'),
-        ('y = 2.0**54 + math.sqrt(x)', None),
-        ('@compiled\ndef square(x):\n    return x**2', None),
-    ],
-)
-def test_what_is_looked_for_is_found(source, what):
-    assert list(suspicious(source)) == ([what] if what else [])
 
 
 def suspicious(source: str) -> Iterator[str]:

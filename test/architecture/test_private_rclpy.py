@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
 import rclpy
 from sources import REPOSITORY, SOURCES, modules_of
 
@@ -22,22 +21,6 @@ def test_private_names_of_rclpy_stand_in_one_file():
     assert set(private_uses(HOME.read_text())) >= {'handle', '_state_machine'}
     found = {(str(file.relative_to(REPOSITORY)), name) for file in FILES for name in in_file(file)}
     assert not found, f'names of rclpy that are not public belong into {HOME.name}: {sorted(found)}'
-
-
-@pytest.mark.parametrize(
-    ('source', 'name'),
-    [
-        ('take = subscription.handle.take_message', 'handle'),
-        ('names = node._parameters', '_parameters'),
-        ('class Mine(SafeLifecycleNode):\n    def f(self):\n        self._parameters = {}', '_parameters'),
-        ('class Mine(Node):\n    def _wake_executor(self): ...', '_wake_executor'),
-        ('node._LifecycleNodeMixin__change_state(1)', '_LifecycleNodeMixin__change_state'),
-        ('class Mine:\n    def f(self):\n        self._parameters = {}', None),
-        ('publisher.publish(raw)', None),
-    ],
-)
-def test_what_is_looked_for_is_found(source: str, name: str | None):
-    assert list(private_uses(source)) == ([name] if name else [])
 
 
 def in_file(file: Path) -> Iterator[str]:

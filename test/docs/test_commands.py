@@ -26,7 +26,7 @@ LANGUAGES = ('sh', 'console', 'python')
 LIMIT = 240.0  # s: only a hang takes so long
 STATUS = 'echo $?'
 COMMAND = re.compile(r'(?:^(?:\$ )?|`)(?:\.venv/bin/)?engine-mount ((?:[^`\n\\]|\\\n)*)', re.MULTILINE)
-WRITTEN = ('docs/explanation/recorded_drive.md',)  # by a command; it needs a recording that is not shipped
+WRITTEN = ('docs/explanation/recorded_drive.md',)  # it needs a recording that is not shipped
 RUN = [page for page in GUIDES if any(blocks(page, *LANGUAGES))]
 FIRST = ('README.md',)
 """Pages whose commands `make test` runs."""

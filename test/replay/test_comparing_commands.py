@@ -6,8 +6,6 @@ import json
 import pytest
 from command_line import command, refused
 from reference_differences import differences_from_reference
-from rosbags.convert.converter import convert
-from rosbags.typesys import Stores, get_typestore
 
 from mount_recorder.bag_writer import BagWriter
 
@@ -15,7 +13,6 @@ DRIVE = (
     '--core', '--scenario', 'bench', '--duration', '0.6', '--set', 'mount_sim.timeline.start=2.8',
     '--set', 'mount_control.policy=switched_viscous', '--no-report',
 )  # fmt: skip
-STORE = get_typestore(Stores.ROS2_JAZZY)
 EARLIER = ('--set', 'mount_control.switch_on_level=0.0006')
 
 
@@ -61,23 +58,6 @@ def test_what_cannot_be_compared_is_not_called_different(run, tmp_path):
         ((run(), run(), '--json', tmp_path / 'nope' / 'figures.json'), 'nope'),
     ):
         assert sentence in refused('compare', *words, codes=(2,))
-
-
-@pytest.mark.slow
-def test_of_two_mounts_in_one_recording_both_are_compared_by_their_names(run, tmp_path):
-    left, right = ('--namespace', 'mount_left'), ('--namespace', 'mount_right')
-    for name, changes in (('a', ()), ('b', EARLIER)):
-        places = [part / 'recording' for part in (run(*left), run(*right, *changes))]
-        convert(places, tmp_path / name, 'mcap', 9, None, 'file', STORE, None, (), (), (), ())
-    file = tmp_path / 'difference.json'
-    printed = command('compare', tmp_path / 'a', tmp_path / 'b', '--json', file, codes=(1,))
-    assert '- mount_right: switched on 8 ms earlier in B' in printed
-    assert 'mount_left: switched' not in printed
-    topics = json.loads(file.read_text())['topics']
-    currents = [topics[f'mount_{side}/current_setpoint']['signals'] for side in ('left', 'right')]
-    left, right = (signals['coil_current']['differing'] for signals in currents)
-    assert left == 0
-    assert right > 100
 
 
 def test_a_cut_is_equal_in_the_common_time(run, tmp_path):

@@ -9,8 +9,7 @@ from engine_mount.drives.drive import drive
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.drives.replay import replay
 from engine_mount.recordings.session import recorded_session, session_content, session_parameters
-from engine_mount.reports.drive.evaluation import tracking_error
-from engine_mount.reports.drive.signals import load_drive
+from engine_mount.reports.drive.signals import load_drive, tracking_error
 from engine_mount.reports.sections.subject import Subject
 from engine_mount.settings.chosen import policy_of, with_recorded_policy
 from mount_control.policy.registry import POLICIES

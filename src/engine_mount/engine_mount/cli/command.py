@@ -13,25 +13,23 @@ from engine_mount.cli.commands import (
     calibrate,
     check,
     compare,
-    cut,
     drive,
+    edit,
     experiment,
-    export_c,
-    export_signals,
+    export,
     faults,
     fleet,
     identify,
     import_files,
     ls,
     record,
-    recover,
     replay,
     report,
     road,
     view,
 )
 from engine_mount.cli.commands.options import with_repeated_options
-from engine_mount.cli.help import Command, Group, check_former_names, group
+from engine_mount.cli.help import Command, Group, group
 from engine_mount.cli.terminal import refuse, terminal
 from engine_mount.signals.sources.uris import SourceError, StoreAwayError
 from mount_ros.environment import prepare_environment
@@ -105,8 +103,8 @@ for _group, _panel, _functions in (
         ),
     ),
     (app, _MOUNT, (experiment.experiment,)),
-    (_EXPORT, None, (export_signals.signals, export_c.c)),
-    (_EDIT, None, (cut.cut, recover.recover)),
+    (_EXPORT, None, (export.signals, export.c)),
+    (_EDIT, None, (edit.cut, edit.recover)),
     (_DEV, None, (faults.faults, bench.bench, accept.accept, prepare)),
 ):
     for _function in _functions:
@@ -136,7 +134,6 @@ def main(arguments: list[str] | None = None) -> None:
     words = with_repeated_options(sys.argv[1:] if arguments is None else arguments)
     try:
         prepare_environment()
-        check_former_names(words)
         code = app(args=words, prog_name='engine-mount', standalone_mode=False) or 0
         if code == INTERRUPTED:
             raise KeyboardInterrupt  # which Typer has caught

@@ -1,7 +1,7 @@
 """What `--help` and Tab show: words of this project, names from the code, runs from folders."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -16,30 +16,6 @@ _WORDS = {
     'str': 'TEXT',
     'path': 'PATH',
 }
-FORMER = {
-    'accept': 'dev accept',
-    'bench': 'dev bench',
-    'cut': 'edit cut',
-    'faults': 'dev faults',
-    'prepare': 'dev prepare',
-    'recover': 'edit recover',
-    '--time-column': '--time',
-    'fleet query --csv': '--format csv',
-    'fleet query --json': '--format json',
-    'identify friction --channel': '--column',
-    'replay --mount': '--position',
-    'view --rate': '--playback-speed',
-}
-"""Former names of commands and options (of all commands, or of one), and those of today."""
-
-
-def check_former_names(words: Sequence[str]) -> None:
-    """Refuse a former name, with that of today: an option with another meaning is never taken silently."""
-    given = [word.partition('=')[0] for word in words]
-    for former, today in FORMER.items():
-        *command, name = former.split()
-        if given[: len(command)] == command and name in (given if name.startswith('-') else given[:1]):
-            raise typer.BadParameter(f'{name} is now {today}')
 
 
 class _Worded:
@@ -92,7 +68,7 @@ KINDS = {
     'on_full': 'mount_recorder.diagnosis:OnFull',
     'fault': 'mount_sim.electronics.faults:FAULTS',
     'case': 'engine_mount.faults.case:MATRIX',
-    'group': 'engine_mount.cli.bench.bench:GROUPS',
+    'group': 'engine_mount.cli.bench:GROUPS',
     'topic': 'mount_ros.topics:TOPICS',
     'experiment': 'engine_mount.experiments.registry:NAMES',
 }

@@ -1,14 +1,13 @@
 """What the commands of the rack share: files and their values, results on the screen and on disk."""
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from engine_mount.cli.commands.options import OUTPUT, option, target, write_figures
+from engine_mount.cli.commands.options import OUTPUT, new_screen, option, target, write_figures
 
 if TYPE_CHECKING:
     from engine_mount.signals.formats.content import Stated
@@ -23,7 +22,21 @@ def rack_mapping(columns: list[str], mapping: 'Mapping', stated: 'Stated') -> 'M
     return with_options(mapping.of(RACK), columns, known=RACK, stated=stated)
 
 
-def per_file(settings: list[str], files: list[Path], name: str) -> dict[Path, float]:
+def file_values(files: list[Path], gaps: list[str], temperatures: Sequence[str] = ()) -> Any:
+    """Return what the caller says of gaps (FILE=UM) and temperatures ([FILE=]DEGC) as `FileValues`."""
+    from engine_mount.identification.rack import FileValues
+
+    apart = _per_file(gaps, files, '--gap', (20.0, 5000.0), 'um', 'in mm')
+    single = [setting for setting in temperatures if '=' in setting]
+    common = [setting for setting in temperatures if '=' not in setting]
+    if len(common) > 1:
+        raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
+    told = '--coil-temperature', (-60.0, 250.0), 'degC', 'in kelvin'
+    celsius, others = _per_file(single, files, *told), [_within(text, text, *told) for text in common]
+    return FileValues({file: 1e-6 * gap for file, gap in apart.items()}, celsius, *others)
+
+
+def _per_file(settings: list[str], files: list[Path], name: str, *limits: Any) -> dict[Path, float]:
     """Return {file: value} of FILE=VALUE settings; files are meant by path or by name."""
     values = {}
     for setting in settings:
@@ -34,46 +47,21 @@ def per_file(settings: list[str], files: list[Path], name: str) -> dict[Path, fl
             raise typer.BadParameter(
                 f'{name} {setting}: {named!r} is {what} of those given; write FILE=VALUE'
             )
-        values[meant[0]] = _number(text, f'{name} {setting}')
+        values[meant[0]] = _within(text, setting, name, *limits)
     return values
 
 
-def gaps_of(settings: list[str], files: list[Path]) -> dict[Path, float]:
-    """Return {file: air gap in m} of `--gap FILE=UM`."""
-    gaps = per_file(settings, files, '--gap')
-    for file, gap in gaps.items():
-        if not 20.0 <= gap <= 5000.0:
-            guess = '; was it meant in mm?' if 0.02 <= gap <= 5.0 else ''
-            raise typer.BadParameter(
-                f'--gap {file.name}={gap:g}: an air gap must lie within 20 .. 5000 um{guess}'
-            )
-    return {file: 1e-6 * gap for file, gap in gaps.items()}
-
-
-def given_ripple(files: list[Path], gaps: list[str], temperatures: list[str]) -> Any:
-    """Return what the caller says of gaps (um) and temperatures (degC) as `FileValues`."""
-    from engine_mount.identification.rack import FileValues
-
-    single = [setting for setting in temperatures if '=' in setting]
-    common = [_number(text, f'--coil-temperature {text}') for text in temperatures if '=' not in text]
-    if len(common) > 1:
-        raise typer.BadParameter('--coil-temperature without FILE= holds for all files: give it once')
-    celsius = per_file(single, files, '--coil-temperature')
-    for value in (*celsius.values(), *common):
-        if not -60.0 <= value <= 250.0:
-            raise typer.BadParameter(
-                f'--coil-temperature {value:g}: must lie within -60 .. 250 degC; is it in kelvin?'
-            )
-    return FileValues(gaps_of(gaps, files), celsius, common[0] if common else None)
-
-
-def _number(text: str, where: str) -> float:
+def _within(text: str, setting: str, name: str, limits: tuple[float, float], unit: str, guess: str) -> float:
+    """Return the number that a setting of an option holds; refuse one beyond its limits."""
     try:
         value = float(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise typer.BadParameter(f'{where}: {text!r} is no number')
+        raise typer.BadParameter(f'{name} {setting}: {text!r} is no number') from None
+    low, high = limits
+    if not low <= value <= high:
+        raise typer.BadParameter(
+            f'{name} {setting}: must lie within {low:g} .. {high:g} {unit}; was it meant {guess}?'
+        )
     return value
 
 
@@ -86,19 +74,17 @@ EXIT_CODES = 'Exit code: 0 when all requested files are written, 2 with the reas
 
 def progress() -> AbstractContextManager[Callable[[float, str], None]]:
     """Return a bar of a fit that is gone when the work is done."""
-    from engine_mount.cli.screen import TerminalScreen
 
-    return TerminalScreen().bar('reading', transient=True)
+    return new_screen().bar('reading', transient=True)
 
 
 def publish(
     result: Any, json_file: Path | None, figure: Path | None, out: Path | None = None, name: str = ''
 ) -> None:
     """Show a result and write what is wanted of it; nothing where its specimen is refused."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification.specimen import PARTS, foreign_parts, save_specimen
 
-    screen = TerminalScreen()
+    screen = new_screen()
     specimen = result.specimen(name) if out else None
     result.report(screen)
     if figure:

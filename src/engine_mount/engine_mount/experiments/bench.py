@@ -109,12 +109,12 @@ def driven_loop(drive: DriveSignals, own: BenchParameters, damper: str) -> Loop:
         'thd': distortion(amplitudes),
         'loss_energy_j': loss,
         'loss_stiffness_n_per_m': loss / (math.pi * own.amplitude**2),
-        'peak_force_n': float(np.max(np.abs(force))),
+        'peak_force_n': np.max(np.abs(force)),
         # the largest change within a sample; none where there is no force
         'steepest_share': float(np.max(np.abs(np.diff(friction)))) / peak if peak > 1e-3 else None,
         'friction_harmonics_n': harmonics(time, friction, own.frequency, ORDERS).tolist(),
         'wanted_harmonics_n': harmonics(time, wanted, own.frequency, ORDERS).tolist(),
-        'damping_active_share': float(np.mean(seen.damping_active[within])),
+        'damping_active_share': np.mean(seen.damping_active[within]),
     }
     return Loop(x, force, figures)
 

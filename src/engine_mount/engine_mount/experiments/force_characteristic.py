@@ -71,18 +71,16 @@ def figures_of(
     return {
         'gaps_m': gaps.tolist(),
         'law_rms_error_n': rms(error),
-        'law_largest_error_n': float(np.abs(error).max()),
+        'law_largest_error_n': np.abs(error).max(),
         'law_relative_rms': rms(relative),
-        'law_relative_worst': float(np.abs(relative).max()),
+        'law_relative_worst': np.abs(relative).max(),
         'table_1_rms_error_n': rms(table_error),
-        'table_1_largest_error_n': float(np.abs(table_error).max()),
-        'exponent_at_low_current': float(np.polyfit(np.log(current[low]), np.log(force[low]), 1)[0]),
+        'table_1_largest_error_n': np.abs(table_error).max(),
+        'exponent_at_low_current': np.polyfit(np.log(current[low]), np.log(force[low]), 1)[0],
         'steepest_current_a': knee,
         'flux_density_there_t': float(core_flux_density(actuator, knee, gaps[middle])),
-        'bend_of_upper_part': float(np.abs(bend).max() / force[-1]),
-        'force_at_1_a_n': {
-            f'{gap * 1e6:.0f} um': float(each) for gap, each in zip(gaps, at_1_a, strict=True)
-        },
+        'bend_of_upper_part': np.abs(bend).max() / force[-1],
+        'force_at_1_a_n': {f'{gap * 1e6:.0f} um': each for gap, each in zip(gaps, at_1_a, strict=True)},
     }
 
 

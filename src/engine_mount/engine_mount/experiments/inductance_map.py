@@ -91,7 +91,7 @@ def read_ramp(recording: Recording, specimen: Specimen) -> Ramp:
     during = ripple.stamps <= result.stamps[-1]
     rates = (ripple.derivative(name)[during] for name in ('flux_density', 'coil_current'))
     inductance = measured_inductance(specimen.turns_area, *rates)
-    found = {name: float(result[name][-1]) for name in result.names}
+    found = {name: result[name][-1] for name in result.names}
     return Ramp(ripple['coil_current'][during], inductance, found)
 
 
@@ -113,15 +113,15 @@ def figures_of(held: RigMeasurements, ramp: Ramp, specimen: Specimen, own: Induc
         'gaps_m': held.gaps.tolist(),
         'inductance_at_rest_current_h': at_rest,
         'crossing_current_a': crossings,
-        'largest_gap_error_at_rest_m': float(np.abs(gap_error).max()),
-        'largest_gap_error_at_crossing_m': float(np.abs(crossing_error).max()),
+        'largest_gap_error_at_rest_m': np.abs(gap_error).max(),
+        'largest_gap_error_at_crossing_m': np.abs(crossing_error).max(),
         'unique_currents_a': _ranges(unique),
         'ambiguous_currents_a': _ranges(~unique),
         'ramp_inductance_at_rest_h': rest_inductance,
         'ramp_crossing_current_a': crossing,
         'ramp_gap_at_rest_m': float(rest_gap_from_inductance(curves, rest_inductance)),
         'ramp_gap_at_crossing_m': float(gap_from_crossing_current(curves, crossing)),
-        'true_gap_at_rest_current_m': float(true_gap),
+        'true_gap_at_rest_current_m': true_gap,
         'initialisation': ramp.result,
         'true_contact_gap_m': own.mechanics.contact_gap,
         'true_rest_gap_m': own.mechanics.rest_gap,

@@ -1,19 +1,11 @@
 """Fig. 15: over a gap in the motorway; displacement with both switching levels, and the current."""
 
 from collections import defaultdict
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from engine_mount.experiments.harness.closed_loop import drive_cases, paper_policy
-from engine_mount.experiments.harness.drawing import (
-    BLUE,
-    HYDRO_LINE,
-    OFF_LINE,
-    draw_level,
-    new_panels,
-    shade_damping,
-)
 from engine_mount.experiments.harness.experiment import (
     NOT_COMPARABLE,
     OURS,
@@ -29,14 +21,15 @@ from engine_mount.experiments.harness.experiment import (
     numbers_of,
 )
 from engine_mount.experiments.harness.measures import rms
-from engine_mount.reports.drive.evaluation import switching
-from engine_mount.reports.drive.signals import DriveSignals, FloatArray
+from engine_mount.reports.drawing.chart import SPAN_COLOUR, Chart, Curve, Panel, level_lines, look_of
+from engine_mount.reports.drive.signals import DriveSignals, FloatArray, switching
 from mount_control.policy import switched_viscous
 from mount_models.quantity import Quantity
 
 NAME = 'motorway_gap'
 FRICTION, HYDRO, OFF = 'friction', 'hydromount', 'friction, 0 A'
 _MOUNTS = {FRICTION: 'friction', HYDRO: 'hydro', OFF: 'friction_off'}
+_LOOKS = {FRICTION: look_of(FRICTION), HYDRO: look_of(HYDRO), OFF: look_of('no current')}
 WINDOW = (0.2, 1.2)  # s after the switch-on level was exceeded: damping has come on, the gap still rings
 _DELAY = (0.125, 0.200)  # s, chosen: one period, and up to 0.6 more for the band-pass and the rise
 _OFF_TOLERANCE = 0.020  # s, chosen
@@ -123,10 +116,9 @@ def figures_of(
             for name, each in truths.items()
         },
         'peak_m': {
-            name: float(np.max(np.abs(each.displacement[each.time >= exceeded])))
-            for name, each in truths.items()
+            name: np.max(np.abs(each.displacement[each.time >= exceeded])) for name, each in truths.items()
         },
-        'highest_current_a': float(truth.coil_current.max()),
+        'highest_current_a': truth.coil_current.max(),
     }
 
 
@@ -208,28 +200,24 @@ def _on_hydro(figures):
     return PARTLY if clear is Holds.NO and min(known) < 1.0 else clear, told
 
 
-def draw_gap(drives: dict[str, DriveSignals], depth: str, figures: Values) -> Any:
-    """Draw displacement with both switching levels above, the coil's current below, Fig. 15."""
-    figure, (upper, lower) = new_panels(
-        f'Over a gap of {depth} in the motorway (Fig. 15)', 2, height=6.5, sharex=True, height_ratios=(2, 1)
-    )
+def draw_gap(drives: dict[str, DriveSignals], depth: str, figures: Values) -> Chart:
+    """Return displacement with both switching levels above, the coil's current below, Fig. 15."""
     seen, truth = drives[FRICTION].seen, drives[FRICTION].truth
     middle = figures['exceeded_s'] or float(truth.time[-1]) / 2.0
-
-    for name, style in ((OFF, OFF_LINE), (HYDRO, HYDRO_LINE)):
-        other = drives[name].truth
-        upper.plot(other.time, 1e3 * other.displacement, linewidth=1.0, label=name, **style)
-    upper.plot(seen.time, 1e3 * seen.displacement, color=BLUE, linewidth=1.8, label=FRICTION)
-    draw_level(upper, figures['switch_on_level_m'], 'switch-on level', '--', 0.8)
-    draw_level(upper, figures['switch_off_level_m'], 'switch-off level', '-.', 0.8)
-    lower.plot(truth.time, truth.coil_current, color=BLUE)
-    for axes in (upper, lower):
-        shade_damping(axes, seen, slice(None), 0.15)
-    upper.set(ylabel='displacement (mm)', xlim=(middle - _BEFORE, middle + _AFTER))
-    lower.set(ylabel='coil current (A)', xlabel='time from the start of the drive (s)')
-    lower.set_ylim(0.0, max(0.1, 1.1 * float(np.max(truth.coil_current))))
-    upper.legend(loc='upper right', ncols=2, fontsize='small')
-    return figure
+    moved = [
+        Curve(name, each.truth.time, 1e3 * each.truth.displacement, *_LOOKS[name])
+        for name, each in reversed(drives.items())
+    ]
+    levels = {
+        f'{name} level': figures[f'{name.replace("-", "_")}_level_m'] for name in ('switch-on', 'switch-off')
+    }
+    panels = [
+        Panel('displacement (mm)', moved, level_lines(levels), share=1.5),
+        Panel('coil current (A)', [Curve('current', truth.time, truth.coil_current)], least=(0.0, 0.1)),
+    ]
+    shade = Curve('damping on', seen.time, seen.damping_active.astype(float), SPAN_COLOUR)
+    title, x = f'Over a gap of {depth} in the motorway (Fig. 15)', 'time from the start of the drive (s)'
+    return Chart(NAME, title, x, panels, shade, view=(middle - _BEFORE, middle + _AFTER))
 
 
 EXPERIMENT = Experiment(

@@ -33,19 +33,17 @@ def print_outcome(outcome: Outcome, screen: Screen) -> None:
 def write_page(outcomes: Sequence[Outcome], file: Path) -> None:
     """Write the page to `file` (Markdown), the pictures into the folder `figures` beside it.
 
-    The experiments' own pages go beside it too; of a single one that runs on what the user gave, its own
-    page becomes `file`.
+    The experiments' own pages go beside it too.
     """
     folder = file.parent / 'figures'
     folder.mkdir(parents=True, exist_ok=True)
-    only = len(outcomes) == 1 and outcomes[0].experiment.needs
     for outcome in outcomes:
         for picture in outcome.pictures:
             shutil.copyfile(picture, folder / picture.name)
-        for page in () if only else outcome.pages:
+        for page in outcome.pages:
             shutil.copyfile(page, file.parent / page.name)
     parts = [outcome.page() for outcome in outcomes]
-    file.write_text('\n'.join(parts if only else [_HEAD, _overview(outcomes), *parts]), encoding='utf-8')
+    file.write_text('\n'.join([_HEAD, _overview(outcomes), *parts]), encoding='utf-8')
 
 
 def _overview(outcomes: Sequence[Outcome]) -> str:

@@ -73,7 +73,7 @@ and cancels the lines of the engine (`mount_control/policy/continuous_viscous.py
 
     |F| = min(max(c g v_n sgn v - K x_l sgn v, 0), 2 c g |v|),  g -> A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2)
 
-v: velocity, v_n without the lines of the engine; x_l: the lines when the force acts; A, A_l, A_n: amplitudes of
+v: velocity, v_n without lines of the engine; x_l: the lines when the force acts; A, A_l, A_n: amplitudes of
 motion in the band, lines and noise. `mount_control.policy` selects the policy. All figures are
 simulated; vehicle and hydromount are chosen, not measured.
 

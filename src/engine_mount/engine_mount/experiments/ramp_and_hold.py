@@ -102,23 +102,19 @@ def figures_of(
     joint = final / relaxation.asymptote
 
     def of_relaxation(fitted: Relaxation, ramp_time: float) -> Values:
-        found = contact_of_response(
-            final / fitted.asymptote, p, fitted.kappa(ramp_time), fitted.time_constant
-        )
-        return {name: getattr(found, name) for name in _SYMBOLS}
+        ratios = final / fitted.asymptote, p, fitted.kappa(ramp_time), fitted.time_constant
+        return contact_of_response(*ratios)._asdict()
 
     # as printed c_xi is the force over the wanted displacement: with p in series the first formula is right
-    printed = printed_formulas(joint, final / own.way, p, first / final, lag)
-    c_r = printed.tangential_stiffness_with_p
     readings = {
         '': of_relaxation(relaxation, own.ramp_time),
         '_without_ramp_correction': of_relaxation(relaxation, 0.0),
         '_fitted_from_end_of_ramp': of_relaxation(
             fit_relaxation(time, rack.displacement, own.ramp_time), own.ramp_time
         ),
-        '_as_printed': dict(zip(_SYMBOLS, (printed.contact_stiffness, c_r, c_r * lag), strict=True)),
+        '_as_printed': printed_formulas(final / own.way, p, first / final, lag)._asdict(),
     }
-    true = {name: float(getattr(own.contact, name)) for name in _SYMBOLS}
+    true = {name: getattr(own.contact, name) for name in _SYMBOLS}
     breakaway = dynamic_coefficient(own.friction, 0.0, relaxation.asymptote, own.normal_force)
     off = np.abs(relaxation.at(time) - rack.displacement)
     late, during = time >= own.fit_from, held & (time < own.ramp_time)
@@ -136,10 +132,10 @@ def figures_of(
         - 1.0,
         'highest_force_n': first,
         'final_force_n': final,
-        'breakaway_force_n': float(own.normal_force * breakaway),
-        'fit_error_late_m': float(off[late].max()),
-        'fit_error_during_ramp_m': float(off[during].max()),
-        'fit_error_between_m': float(off[held & ~during & ~late].max()),
+        'breakaway_force_n': own.normal_force * breakaway,
+        'fit_error_late_m': off[late].max(),
+        'fit_error_during_ramp_m': off[during].max(),
+        'fit_error_between_m': off[held & ~during & ~late].max(),
     }
 
 

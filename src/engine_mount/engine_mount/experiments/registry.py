@@ -15,7 +15,7 @@ from engine_mount.experiments.harness.experiment import (
     Settings,
     Values,
 )
-from engine_mount.settings.run_folder import RunFolderError, new_place
+from engine_mount.settings.run_folder import checked_place, new_place
 from mount_bringup.settings import checked_settings, defaults_of_nodes
 from mount_models.quantity import flattened, nearest
 
@@ -36,14 +36,8 @@ def experiment_named(name: str) -> Experiment:
 
 
 def experiments_named(names: Sequence[str]) -> list[Experiment]:
-    """Return the experiments of these names; raises `ExperimentError` for an unknown one.
-
-    `all` stands for every one that needs nothing of the user's own.
-    """
-    named = [experiment_named(name) for name in names if name != ALL]
-    if ALL not in names:
-        return named
-    return [each for each in map(experiment_named, NAMES) if not each.needs or each in named]
+    """Return the experiments of these names, or of `all`; raises `ExperimentError` for an unknown one."""
+    return list(map(experiment_named, NAMES if ALL in names else names))
 
 
 def known_settings(experiments: Sequence[Experiment]) -> dict[str, Values]:
@@ -58,9 +52,7 @@ def orders(
     """Return each experiment with its order; raises a `ValueError` that says what is wrong with it."""
     checked = checked_settings(settings, known_settings(experiments), 'owner of parameters here')
     alone = len(experiments) == 1
-    place = out or new_place(experiments[0].name if alone else 'experiments')
-    if place.exists() and (not place.is_dir() or any(place.iterdir())):
-        raise RunFolderError(f'{place} exists and is not empty; choose another folder with --out')
+    place = checked_place(out or new_place(experiments[0].name if alone else 'experiments'))
     return [(each, each.order(place if alone else place / each.name, checked)) for each in experiments]
 
 

@@ -29,8 +29,7 @@ from engine_mount.experiments.harness.measures import (
     rms_in,
     sweep_parameters,
 )
-from engine_mount.reports.drive.evaluation import switching
-from engine_mount.reports.drive.signals import DriveSignals, FloatArray
+from engine_mount.reports.drive.signals import DriveSignals, FloatArray, switching
 from mount_control.policy.switched_viscous import DEFAULT_DAMPER
 from mount_models.quantity import Quantity
 

@@ -1,7 +1,7 @@
 """What the fits share: linear algebra on one thread, and how sure fitted numbers are."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +21,8 @@ def silent(share: float, what: str) -> None:
     """Show no progress."""
 
 
-@contextmanager
-def single_threaded() -> Iterator[None]:
-    """Limit BLAS to one thread meanwhile: on matrices as small as here others only wait for each other."""
-    with threadpool_limits(limits=1, user_api='blas'):
-        yield
+single_threaded = threadpool_limits.wrap(limits=1, user_api='blas')
+"""Limits BLAS to one thread in a function: on matrices as small as here others only wait for each other."""
 
 
 def covariance_of(fit: OptimizeResult) -> FloatArray:
@@ -42,6 +39,6 @@ def covariance_of(fit: OptimizeResult) -> FloatArray:
     return scatter * inverse / np.outer(scale, scale)
 
 
-def relative_rms(error: FloatArray, signal: FloatArray) -> float:
-    """Return the rms of `error` over that of `signal`."""
-    return float(np.sqrt(np.mean(error**2) / np.mean(signal**2)))
+def rms(values: Any) -> float:
+    """Return the rms about 0, NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float('nan')

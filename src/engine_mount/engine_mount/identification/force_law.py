@@ -10,12 +10,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
-from numpy.polynomial.polynomial import polyval, polyvander
+from numpy.polynomial.polynomial import polyfit, polyval, polyvander
 from scipy.linalg import block_diag
 from scipy.optimize import OptimizeResult, least_squares
 
@@ -23,6 +23,7 @@ from engine_mount.identification.fitting import (
     FloatArray,
     Progress,
     covariance_of,
+    rms,
     silent,
     single_threaded,
 )
@@ -35,8 +36,8 @@ from engine_mount.identification.force_points import (
     far_points,
     gap_groups,
 )
-from engine_mount.identification.reluctance import shortfall, unsaturated_parabola
 from engine_mount.identification.specimen import described_files, rounded, with_part
+from engine_mount.recordings.difference import known
 from engine_mount.recordings.screen import Screen, Table
 from mount_models.actuator import (
     TABLE_1,
@@ -60,7 +61,12 @@ _KNEES = (0.3, 0.45, 0.6, 0.8)  # chosen: current of the knee over the largest o
 _LEAN = 0.2  # chosen: the knee moves to higher currents with the gap
 _SHARPNESSES = (2.0, 4.0, 9.0, 18.0)  # chosen: a3 times the largest current
 _TRIED = 3
+_SURE = 0.1  # of the median force, chosen: there noise moves a root little
+_DEGREE = 12  # chosen: 1 / R^2 to 0.1 % where the largest R is six times the smallest
 _EDGES = np.cumsum([0, *ORDERS])
+
+Problem = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Points as the search sees them: gap mapped to -1 .. 1, A, N, tolerance N."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,7 @@ class ForceLawFit:
     def gaps(self) -> list[tuple[float, float]]:
         """Each measured gap (m) with its rms error (N): where it fits less well."""
         return [
-            (float(self.points.gap[group].mean()), _rms(self.error[group]))
+            (float(self.points.gap[group].mean()), rms(self.error[group]))
             for group in gap_groups(self.points.gap)
         ]
 
@@ -103,10 +109,10 @@ class ForceLawFit:
     def residuals(self) -> dict[str, float]:
         """Return the errors over all points: N, and of forces above 20 N relative to them."""
         return {
-            'relative_rms': _rms(self.relative),
-            'relative_worst': float(np.abs(self.relative).max()),
-            'rms': _rms(self.error),
-            'largest': float(np.abs(self.error).max()),
+            'relative_rms': rms(self.relative),
+            'relative_worst': np.abs(self.relative).max(),
+            'rms': rms(self.error),
+            'largest': np.abs(self.error).max(),
         }
 
 
@@ -124,7 +130,6 @@ class ActuatorCalibration:
         stds = np.split(
             np.sqrt(self.fit.covariance.diagonal().clip(0.0)), np.cumsum([len(part) for part in law[:4]])
         )
-        known = not math.isnan(residuals['relative_rms'])
         return {
             'parameters': {f'a{number}': list(part) for number, part in enumerate(law[:5], 1)},
             'parameter_std': {f'a{number}': part.tolist() for number, part in enumerate(stds, 1)},
@@ -132,17 +137,17 @@ class ActuatorCalibration:
             'valid_current_a': [0.0, law.current_high],
             'measured_current_a': [float(self.fit.points.current.min()), law.current_high],
             'points': self.fit.error.size,
-            'relative_rms': residuals['relative_rms'] if known else None,
-            'relative_worst': residuals['relative_worst'] if known else None,
+            'relative_rms': known(residuals['relative_rms']),
+            'relative_worst': known(residuals['relative_worst']),
             'rms_error_n': residuals['rms'],
             'largest_error_n': residuals['largest'],
-            'rms_by_gap': [{'gap_m': gap, 'rms_n': rms} for gap, rms in self.fit.gaps],
+            'rms_by_gap': [{'gap_m': gap, 'rms_n': off} for gap, off in self.fit.gaps],
         }
 
     def report(self, screen: Screen) -> None:
         """Show the errors of each gap, and where the law may be used."""
         law, start, residuals = self.fit.law, self.fit.measured_from, self.fit.residuals()
-        rows = [(f'{1e6 * gap:.1f}', f'{rms:.2f}') for gap, rms in self.fit.gaps]
+        rows = [(f'{1e6 * gap:.1f}', f'{off:.2f}') for gap, off in self.fit.gaps]
         title = 'force law, ' + ('18 parameters' if len(law.a1) > 1 else 'without saturation')
         screen.table(Table(title, 'rr', rows, ('air gap (um)', 'rms error (N)')))
         screen.say(
@@ -160,7 +165,7 @@ class ActuatorCalibration:
     def specimen(self, name: str = '') -> Specimen:
         """Return the base under `name` with the fitted law; raises `SpecimenError`."""
         fit, law = self.fit, self.fit.law
-        gaps, rms = zip(*fit.gaps, strict=True)
+        gaps, errors = zip(*fit.gaps, strict=True)
         valid = {'gap': [law.gap_low, law.gap_high], 'current': [0.0, law.current_high]}
         if fit.measured_from:
             valid['measured_current'] = [rounded(fit.measured_from), law.current_high]
@@ -170,7 +175,7 @@ class ActuatorCalibration:
             'residuals': {
                 **{each: rounded(value) for each, value in fit.residuals().items()},
                 'gaps': [float(f'{gap:.6g}') for gap in gaps],
-                'rms_by_gap': rounded(rms),
+                'rms_by_gap': rounded(errors),
             },
             'covariance': rounded(fit.covariance),
         }
@@ -185,11 +190,7 @@ class ActuatorCalibration:
         draw_force_law(self.fit, file)
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-@single_threaded()
+@single_threaded
 def fit_force_law(
     gap: npt.ArrayLike,
     current: npt.ArrayLike,
@@ -246,7 +247,7 @@ def fit_force_law(
         unmapping = block_diag(*(_unmapping(domain, order) for order in ORDERS))
         return ForceLawFit(law_of(unknowns), points, unmapping @ covariance @ unmapping.T)
 
-    candidates = _starts(_Problem(mapped, currents, forces, tolerance), domain)
+    candidates = _starts((mapped, currents, forces, tolerance), domain)
     ends = []
     for number, start in enumerate(candidates):
         progress(number / len(candidates), 'fitting')
@@ -254,15 +255,15 @@ def fit_force_law(
     best = min(ends, key=lambda end: end.cost)
     if not far_points(forces, np.abs(misfit(best.x))).size:
         best = search(best.x, _LONG_SEARCH, 'linear')  # with outliers it would hide them
-    parabola, covariance = unsaturated_parabola(mapped, currents, forces, tolerance)
+    parabola, covariance = _unsaturated_parabola(mapped, currents, forces, tolerance)
     unmapping = _unmapping(domain, parabola.size) / np.pi
     # a3 and a4 are chosen: beyond so far and sharp a knee a5 is true to six digits
     law = ForceLaw(
         (0.0,), (0.0,), (1e6 / highest,), (2.0 * highest,), tuple((unmapping @ parabola).tolist()), *box
     )
     simple = ForceLawFit(law, points, block_diag(np.zeros((4, 4)), unmapping @ covariance @ unmapping.T))
-    off = _rms(misfit(best.x))
-    fit = simple if _rms(simple.error / tolerance) <= _SIMPLER * off else fit_of(best.x)
+    off = rms(misfit(best.x))
+    fit = simple if rms(simple.error / tolerance) <= _SIMPLER * off else fit_of(best.x)
     check_outliers(points, forces + fit.error, tolerance)
     try:
         check_force_law(fit.law)
@@ -273,7 +274,7 @@ def fit_force_law(
         pull, found = checked_force(simple.law, current, gap), best.x
 
         def held(unknowns: FloatArray, hold: float) -> FloatArray:
-            lack = shortfall(checked_force(law_of(unknowns), current, gap), pull)
+            lack = _shortfall(checked_force(law_of(unknowns), current, gap), pull)
             return np.append(misfit(unknowns), hold * lack)
 
         for hold in (1e2, 1e4, 1e6):  # chosen
@@ -281,7 +282,7 @@ def fit_force_law(
                 held, found, args=(hold,), bounds=(low, high), x_scale='jac', ftol=1e-6, max_nfev=200
             ).x
         fit = fit_of(found)
-        if _rms(fit.error / tolerance) > 2.0 * off:  # chosen: more than noise explains
+        if rms(fit.error / tolerance) > 2.0 * off:  # chosen: more than noise explains
             raise
         check_force_law(fit.law)
     return fit
@@ -318,16 +319,7 @@ def _unmapping(domain: tuple[float, float], order: int) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-class _Problem(NamedTuple):
-    """Points as the search sees them: gap mapped to -1 .. 1, A, N, tolerance N."""
-
-    gap: FloatArray
-    current: FloatArray
-    force: FloatArray
-    tolerance: FloatArray
-
-
-def _starts(problem: _Problem, domain: tuple[float, float]) -> list[FloatArray]:
+def _starts(problem: Problem, domain: tuple[float, float]) -> list[FloatArray]:
     """Return coefficients of a1 .. a5 in the mapped gap to start from, the best first, at last Table 1."""
     trials = itertools.product(_SHARPNESSES, _KNEES)
     ends = sorted((_completed(problem, *trial) for trial in trials), key=lambda end: end[0])
@@ -338,7 +330,7 @@ def _starts(problem: _Problem, domain: tuple[float, float]) -> list[FloatArray]:
     return [*(start for _, start in ends[:_TRIED]), np.concatenate(table_1)]
 
 
-def _completed(problem: _Problem, sharpness: float, knee: float) -> tuple[float, FloatArray]:
+def _completed(problem: Problem, sharpness: float, knee: float) -> tuple[float, FloatArray]:
     """Return misfit and all coefficients for a3 and a4 that are given by shares of the largest current."""
     gap, current, force, tolerance = problem
     highest = current.max()
@@ -350,4 +342,33 @@ def _completed(problem: _Problem, sharpness: float, knee: float) -> tuple[float,
     columns = np.concatenate([line * powers, line * current * powers, square * powers]).T
     solution = np.linalg.lstsq(columns, force / tolerance, 1e-5)[0]  # chosen: alike columns determine nothing
     a1, a2, a5 = np.split(solution, 3)
-    return _rms(columns @ solution - force / tolerance), np.concatenate([a1, a2, a3, a4, a5])
+    return rms(columns @ solution - force / tolerance), np.concatenate([a1, a2, a3, a4, a5])
+
+
+def _unsaturated_parabola(
+    gap: FloatArray, current: FloatArray, force: FloatArray, tolerance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return F / i^2 = 1 / R^2 over the gap (-1 .. 1): coefficients, lowest power first, and covariance.
+
+    A magnet without saturation has F = (i / R)^2 with R a parabola over the gap.
+    """
+    strong = (force > _SURE * np.median(force)) & (current > 0.0)
+    current, force = current[strong], force[strong]
+    weights = force**1.5 / (current * tolerance[strong])  # misfits of the root count as those of the force
+    fitted, covariance = np.polyfit(gap[strong], current / np.sqrt(force), 2, w=weights, cov=True)
+    nodes = np.cos(np.linspace(0.0, np.pi, 8 * _DEGREE))
+    reluctance = np.polyval(fitted, nodes)
+    slopes = -2.0 * np.vander(nodes, 3) / reluctance[:, np.newaxis] ** 3
+    columns = np.column_stack([reluctance**-2, slopes])
+    parabola, *carried = polyfit(nodes, columns, _DEGREE, w=reluctance**2).T
+    return parabola, np.transpose(carried) @ covariance @ carried
+
+
+def _shortfall(force: FloatArray, unsaturated: FloatArray) -> FloatArray:
+    """Return how far rises with the current and falls with the gap miss a margin, 0 or less each.
+
+    The forces (N), (gaps, currents from 0 A on), are compared with those without saturation.
+    """
+    rises = np.diff(force) / unsaturated[:, 1:]
+    falls = -np.diff(force, axis=0)[:, 1:] / unsaturated[:-1, 1:]
+    return np.minimum(np.append(rises, falls) - 3e-5, 0.0)  # chosen, of the force without saturation

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfit, polyval, polyvander
 
-from engine_mount.identification.fitting import FloatArray, single_threaded
+from engine_mount.identification.fitting import FloatArray, rms, single_threaded
 from mount_models.coil.crossing import CrossingError, find_crossing
 from mount_models.coil.gap import GapCurves, ScaledPolynomial, check_gap_curves, evaluate, slope
 from mount_models.quantity import LawRefusedError
@@ -103,7 +103,7 @@ def _rest_inductance(z: FloatArray, values: FloatArray) -> tuple[float, float]:
     return float(solution[0]), math.sqrt(scatter * spread)
 
 
-@single_threaded()
+@single_threaded
 def calibrate_gap_curves(points: Sequence[GapPoint]) -> GapCalibration:
     """Return the curves through points at one temperature, both ways.
 
@@ -145,7 +145,7 @@ def _fit_curve(what: str, points: Sequence[GapPoint], name: str) -> CurveFit:
     trials = []
     for degree in range(2, min(_HIGHEST_DEGREE, gaps.size - 3) + 1):
         coefficients, left_out, unscaled = _weighted(z, values, weights, degree)
-        trials.append((np.sqrt(np.mean((left_out * weights) ** 2)), coefficients, unscaled))
+        trials.append((rms(left_out * weights), coefficients, unscaled))
     best = min(trial[0] for trial in trials)
     _, coefficients, unscaled = next(trial for trial in trials if trial[0] <= _NEARLY * best)
     polynomial = ScaledPolynomial(centre, scale, tuple(coefficients.tolist()), low, high)
@@ -157,9 +157,7 @@ def _fit_curve(what: str, points: Sequence[GapPoint], name: str) -> CurveFit:
     _check_slopes(what, polynomial, slopes, covariance)
     powers = polyvander(_GRID, coefficients.size - 1)
     gap_std = _deviations(powers, covariance) / np.maximum(np.abs(slopes), 1e-12)
-    return CurveFit(
-        polynomial, covariance, errors, float(np.sqrt(np.mean(errors**2))), float(np.max(gap_std))
-    )
+    return CurveFit(polynomial, covariance, errors, rms(errors), float(np.max(gap_std)))
 
 
 def _deviations(rows: FloatArray, covariance: FloatArray) -> FloatArray:

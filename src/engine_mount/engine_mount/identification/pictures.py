@@ -4,10 +4,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib
-
-matplotlib.use('Agg')
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_mount.recordings.audit import audit
+from engine_mount.recordings.access import audit
 from engine_mount.recordings.events import read_marks
-from engine_mount.recordings.losses import losses
 from engine_mount.recordings.recording import ReadingError, Recording, open_run
 from engine_mount.recordings.screen import Table
 from engine_mount.recordings.session import (
@@ -93,8 +92,8 @@ def summarise_recording(path: Path) -> Figures:
 def describe_recording(recording: Recording) -> Description:
     """Return what a recording is and holds; every message is looked at, for the losses."""
     session = told_session(recording)
-    audits = audit(recording)
-    found = losses(recording, audits)
+    audited = audit(recording)
+    found = audited.losses
     head, made_with = _head(recording, session), versions_told(session)
     changed = changed_parameters(session_parameters(session))
     gaps: dict[str, dict[str, float]] = {}  # {mount: {name: m}}
@@ -148,7 +147,7 @@ def describe_recording(recording: Recording) -> Description:
         for name, (value, default) in own.items()
     ]
     topics = [
-        (name, topic.type.replace('/msg/', '/'), str(topic.message_count), _text(audits[name].lost))
+        (name, topic.type.replace('/msg/', '/'), str(topic.message_count), _text(audited.topics[name].lost))
         for name, topic in recording.topics.items()
     ]
     tables = [

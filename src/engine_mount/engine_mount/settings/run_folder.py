@@ -31,11 +31,16 @@ def new_place(what: str) -> Path:
     return next(place for place in places if not place.exists())
 
 
+def checked_place(place: Path) -> Path:
+    """Return a place for a new folder; raises `RunFolderError` for one that holds anything."""
+    if place.exists() and (not place.is_dir() or any(place.iterdir())):
+        raise RunFolderError(f'{place} exists and is not empty; choose another folder with --out')
+    return place
+
+
 def make_run_folder(wanted: Path | None, scenario: str) -> RunFolder:
     """Create the folder asked for, or `bags/<time>_<scenario>`; one that holds anything is refused."""
-    wanted = wanted or new_place(scenario)
-    if wanted.exists() and (not wanted.is_dir() or any(wanted.iterdir())):
-        raise RunFolderError(f'{wanted} exists and is not empty; choose another folder with --out')
+    wanted = checked_place(wanted or new_place(scenario))
     folder = RunFolder(wanted)
     try:
         folder.logs.mkdir(parents=True)

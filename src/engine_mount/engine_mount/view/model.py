@@ -17,7 +17,7 @@ from engine_mount.recordings.series import Payloads, Series
 from engine_mount.reports.drawing.chart import COLOUR_OF, Chart, Curve, Panel, level_lines, look_of
 from engine_mount.reports.drawing.detail import browser_chart
 from engine_mount.reports.drive.beside import MOUNTS, THIS, name_of
-from engine_mount.reports.drive.evaluation import levels_of
+from engine_mount.reports.drive.signals import levels_of
 from engine_mount.settings.chosen import Parameters, policy_of
 from engine_mount.view.alternatives import Alternatives
 from engine_mount.view.feed import Feed, Message, Receive

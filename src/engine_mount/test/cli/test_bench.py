@@ -2,14 +2,12 @@
 
 import json
 
-import numpy as np
 import psutil
 import pytest
 from command_line import command
 
-from engine_mount.cli.bench.bench import BenchOrder, Comparison
+from engine_mount.cli.bench import BenchOrder, Comparison
 from engine_mount.cli.bench.graph import run_relay
-from engine_mount.cli.bench.offline import imports
 from engine_mount.cli.commands import bench
 
 
@@ -41,10 +39,3 @@ def test_the_chain_of_empty_nodes_answers_and_leaves_no_process(domain, tmp_path
 @pytest.mark.slow
 def test_one_sample_is_measured_beside_real_time():
     assert 'ratio' in command('dev', 'bench', '--only', 'calls')
-
-
-def test_an_import_is_measured_in_a_process_of_its_own():
-    held = np.ones(80_000_000)  # this memory is none of the import's
-    found = imports(BenchOrder(1, 1.0, 1000.0, 0, 0), lambda what: None, seconds=10.0)
-    assert set(found) == {'import_csv', 'import_csv_memory', 'import_mf4', 'import_mf4_memory'}
-    assert 100.0 < found['import_mf4_memory'].ours < 1e-6 * held.nbytes

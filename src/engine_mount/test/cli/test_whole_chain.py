@@ -14,8 +14,7 @@ from scipy.optimize import brentq
 
 from engine_mount.drives.loop.recording import record_core
 from engine_mount.recordings.recording import open_recording
-from engine_mount.reports.drive.evaluation import tracking_error
-from engine_mount.reports.drive.signals import load_drive
+from engine_mount.reports.drive.signals import load_drive, tracking_error
 from engine_mount.settings.chosen import policy_of
 from mount_models.actuator import checked_force
 from mount_models.coil.gap import evaluate

@@ -260,9 +260,3 @@ def test_the_suite_of_the_page_can_be_used_and_the_page_names_every_quantity():
     (block,) = re.findall(r'```yaml\n(.*?)```', text, re.DOTALL)
     assert [each.name for each in suite_of(plain_yaml(block))] == ['deep_gap']
     assert [name for name in MEASURES if f'`{name}`' not in text] == []
-
-
-def test_every_measure_has_its_unit_in_its_name():
-    ends = {'µm': '_um', 'µs': '_us', '%': '_percent'}
-    units = {name: each.unit for name, each in MEASURES.items() if each.unit}
-    assert all(name.endswith(ends.get(unit, f'_{unit.lower()}')) for name, unit in units.items())

@@ -104,14 +104,6 @@ def test_what_is_not_there_or_not_read_is_named(tmp_path):
     assert 'is a folder without a recording' in _refusal(tmp_path / 'folder')
 
 
-def test_a_log_without_its_database_or_with_another_is_refused(whole, tmp_path):
-    file, _ = whole['blf']
-    assert 'holds CAN frames; name the database that decodes them' in _refusal(file.path)
-    other = tmp_path / 'other.dbc'
-    other.write_text('nonsense')
-    assert 'other.dbc is no readable database of CAN messages' in _refusal(file.path, dbc=other)
-
-
 def test_times_and_values_of_different_length_are_refused(tmp_path):
     np.save(tmp_path / 'a_t.npy', TIMES[:-1])
     np.save(tmp_path / 'a_value.npy', TIMES)

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import psutil
 
-from engine_mount.cli.bench import relay
-from engine_mount.cli.bench.bench import BenchOrder, Comparison, Figures, Report
+from engine_mount.cli.bench import BenchOrder, Comparison, Figures, Report, relay
 from engine_mount.settings.options import with_sample_rate
 from mount_bringup.graph.domain import can_port, domain_lock
 from mount_bringup.graph.nodes import (

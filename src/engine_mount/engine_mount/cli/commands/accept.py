@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from engine_mount.cli.commands.options import option, recording_argument
+from engine_mount.cli.commands.options import new_screen, option, recording_argument
 from engine_mount.cli.fetching import local
 
 EPILOG = """Exit code: 0 when the reference is made, 2 when it was refused, with the reason.
@@ -26,13 +26,12 @@ def accept(
     folder: Annotated[Path, option('folder of the references')] = Path('bags/reference'),
 ) -> None:
     """Make a run the reference that `make test` replays; the reason is kept with it."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.recording import open_run
     from engine_mount.recordings.reference import ACCEPTED_NAME
     from engine_mount.recordings.reference import accept as accept_run
     from mount_recorder.versions import versions
 
-    screen = TerminalScreen()
+    screen = new_screen()
     accepted = accept_run(open_run(local(run, screen)), reference, reason, folder, versions())
     for change in accepted.changes or ('new reference',):
         screen.say(f'- {change}')

@@ -2,7 +2,7 @@
 
 import typer
 
-from engine_mount.cli.commands.options import JsonFile, RecordingPlace, write_figures
+from engine_mount.cli.commands.options import JsonFile, RecordingPlace, new_screen, write_figures
 from engine_mount.cli.fetching import local
 
 EPILOG = """Exit code: 0 when nothing is known to be lost, unanswered or wrong; 1 on loss, on damage, when
@@ -27,9 +27,8 @@ The JSON holds them, and below `topics` for each topic `expected`, `present`, `l
 def audit(recording: RecordingPlace, json_file: JsonFile = None) -> None:
     """Check a recording for losses, and its drive for faults; exit code 1 if there are any."""
     from engine_mount import audit as audit_recording
-    from engine_mount.cli.screen import TerminalScreen
 
-    screen = TerminalScreen()
+    screen = new_screen()
     place = local(recording, screen)
     with screen.console.status('reading'):
         found = audit_recording(place)

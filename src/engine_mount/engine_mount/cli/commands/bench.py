@@ -1,16 +1,22 @@
 """`engine-mount dev bench`: what matters for speed, beside its alternative."""
 
-from dataclasses import asdict
 from importlib import import_module
 from typing import Annotated
 
-from engine_mount.cli.bench.bench import GROUPS, BenchOrder, Comparison
-from engine_mount.cli.commands.options import Domain, JsonFile, Priority, names_in, option, write_figures
+from engine_mount.cli.bench import GROUPS, BenchOrder, Comparison
+from engine_mount.cli.commands.options import (
+    Domain,
+    JsonFile,
+    Priority,
+    names_in,
+    new_screen,
+    option,
+    write_figures,
+)
 from engine_mount.cli.help import named
 
-EPILOG = """Groups: `calls` (cost of one sample in core and in a replay), `imports` (time and memory of the
-import of an hour from CSV and MDF4), `graph` (latency of the graph in real time, beside a chain of empty
-nodes).
+EPILOG = """Groups: `calls` (cost of one sample in core and in a replay), `graph` (latency of the graph in
+real time, beside a chain of empty nodes).
 
 Exit code: 0 when everything was measured, 1 when the graph refused or ended, with the reason.
 
@@ -32,30 +38,28 @@ def bench(
     json_file: JsonFile = None,
 ) -> None:
     """Measure speed, each figure beside its alternative in the same run."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
     from mount_bringup.graph.domain import chosen_domain
 
     chosen = names_in(only, GROUPS, 'group of bench')
     order = BenchOrder(rounds, seconds, sample_rate, chosen_domain(domain), priority)
-    screen = TerminalScreen()
+    screen = new_screen()
     found: dict[str, Comparison] = {}
     with screen.console.status('measuring') as status:
         for name in chosen:
             status.update(f'measuring: {name}')
-            measure = getattr(import_module(f'engine_mount.cli.bench.{GROUPS[name]}'), name)
+            measure = getattr(import_module(f'engine_mount.cli.bench.{name}'), name)
             found |= measure(order, status.update)
     rows = [
-        (row.what, _text(row.ours, row.unit), row.beside, _text(row.other, row.unit), f'{row.ratio:.3g}')
+        (
+            *(row.what, _text(row.ours, row.unit), row.beside, _text(row.other, row.unit)),
+            '-' if row.ratio is None else f'{row.ratio:.3g}',
+        )
         for row in found.values()
     ]
     heads = ('what', 'ours', 'beside', 'other', 'ratio')
     screen.table(Table('medians, in turn; ratio: ours over the other', 'lrlrr', rows, heads))
-    write_figures({name: _figures(row) for name, row in found.items()}, json_file)
-
-
-def _figures(row: Comparison) -> dict[str, str | float | None]:
-    return asdict(row) | {'ratio': row.ratio if row.other else None}
+    write_figures({name: {**row._asdict(), 'ratio': row.ratio} for name, row in found.items()}, json_file)
 
 
 def _text(value: float, unit: str) -> str:

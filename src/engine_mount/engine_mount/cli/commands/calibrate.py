@@ -13,6 +13,7 @@ from engine_mount.cli.commands.options import (
     argument,
     flag,
     mapping_of,
+    new_screen,
     option,
     stated,
 )
@@ -23,8 +24,7 @@ from engine_mount.cli.rack import (
     Base,
     Name,
     Out,
-    gaps_of,
-    given_ripple,
+    file_values,
     progress,
     publish,
     rack_mapping,
@@ -104,14 +104,12 @@ def actuator(
     Forces that contradict this beyond their noise, outliers, a zero of the load cell, and too few gaps or
     currents are refused. Then no file is written.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
-    from engine_mount.identification.rack import FileValues
 
-    screen = TerminalScreen()
+    screen = new_screen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values = FileValues(gaps_of(gaps or [], places))
+    values = file_values(places, gaps or [])
     with progress() as bar:
         result = calibrate.actuator(places, columns=mapping, values=values, base=base or '', progress=bar)
     publish(result, json_file, figure, out, name)
@@ -156,13 +154,12 @@ def inductance(
     The temperature with most recordings is that of the curves. Recordings at a second temperature measure
     the compensation; recordings at only one temperature are refused.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
 
-    screen = TerminalScreen()
+    screen = new_screen()
     places = [local(file, screen) for file in files]
     mapping = rack_mapping(columns or [], mapping_of(map_file), stated(dbc, decimal, delimiter))
-    values = given_ripple(places, gaps or [], temperatures or [])
+    values = file_values(places, gaps or [], temperatures or [])
     with progress():
         result = calibrate.inductance(
             places, columns=mapping, values=values, rest_current=rest_current,
@@ -186,11 +183,10 @@ def rack(
     ] = None,
 ) -> None:
     """Write recordings of the simulated rack: force.csv, ripple at 16 fixed gaps, friction of the pads."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.identification import calibrate
 
     with progress() as bar:
         files = calibrate.rack(
             out, seed=seed, noise=noise, drawn=drawn, celsius=celsius or (20.0, 80.0), progress=bar
         )
-    TerminalScreen().say(f'{len(files)} recordings in {out}')
+    new_screen().say(f'{len(files)} recordings in {out}')

@@ -11,6 +11,7 @@ from engine_mount.cli.commands.options import (
     NewFolder,
     Settings,
     changes_of,
+    new_screen,
     option,
     write_figures,
 )
@@ -40,13 +41,12 @@ def check(
     out: NewFolder = None,
 ) -> None:
     """Drive the manoeuvre suite and print its limits, the worst first."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.check import report
     from engine_mount.experiments.check.run import run_trials, trials_of
     from engine_mount.experiments.check.suite import chosen_of, passed, shipped_suite, suite_in_file
     from engine_mount.settings.run_folder import make_run_folder, new_place
 
-    screen = TerminalScreen()
+    screen = new_screen()
     given = changes_of(settings)
     known = shipped_suite() if suite is None else suite_in_file(suite)
     chosen = chosen_of(known, [name for name in only.split(',') if name])

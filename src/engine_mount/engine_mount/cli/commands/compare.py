@@ -7,6 +7,7 @@ import typer
 from engine_mount.cli.commands.options import (
     JsonFile,
     flag,
+    new_screen,
     option,
     recording_argument,
     write_figures,
@@ -45,12 +46,11 @@ def compare(
     because A or B is no recording.
     """
     from engine_mount import compare as compare_recordings
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.difference import signal_table
     from engine_mount.recordings.matching import alignment_sentence
     from engine_mount.recordings.recording import open_run
 
-    screen = TerminalScreen()
+    screen = new_screen()
     recordings = open_run(local(a, screen)), open_run(local(b, screen))
     comparison = compare_recordings(*recordings, tolerances or [], common=common)
     screen.say(f'A {comparison.name_a}, B {comparison.name_b}')

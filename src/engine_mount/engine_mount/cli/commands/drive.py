@@ -27,6 +27,7 @@ from engine_mount.cli.commands.options import (
     TimeColumn,
     changes_of,
     flag,
+    new_screen,
     option,
     refuse_without,
     stated,
@@ -160,13 +161,12 @@ def drive(
     namespace: Namespace = '',
 ) -> None:
     """Drive the simulated car through the whole graph, record it and print the results."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.drive import drive as run_drive
     from engine_mount.drives.drive import report_early_end
     from engine_mount.reports.drive.results import evaluate_drive
     from engine_mount.settings.options import recorder_options
 
-    screen = TerminalScreen()
+    screen = new_screen()
     if 'list' in (fault or []):
         from engine_mount.recordings.screen import Table
         from mount_sim.electronics.faults import FAULTS

@@ -10,6 +10,7 @@ from engine_mount.cli.commands.options import (
     Listing,
     Page,
     argument,
+    new_screen,
     option,
     write_figures,
 )
@@ -53,11 +54,10 @@ def experiment(
 
     A statement that does not hold is a result, not an error: it is printed, and the exit code is 0.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.experiments.registry import experiments_named, known_settings, listed, orders
     from engine_mount.recordings.screen import Table
 
-    screen = TerminalScreen()
+    screen = new_screen()
     if show:
         rows = [(name, f'{title} ({reference})') for name, reference, title in listed()]
         screen.table(Table('', 'll', rows, ('name', 'what is shown (in the paper)')))

@@ -13,6 +13,7 @@ from engine_mount.cli.commands.options import (
     Page,
     Priority,
     names_in,
+    new_screen,
     option,
     write_figures,
 )
@@ -44,7 +45,6 @@ def faults(
     domain: Domain = None,
 ) -> None:
     """Inject every fault into the real graph and print the reaction of the graph."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.faults.case import MATRIX
     from engine_mount.faults.graph import Place
     from engine_mount.faults.page import write_page
@@ -53,7 +53,7 @@ def faults(
     from engine_mount.settings.run_folder import make_run_folder
     from mount_bringup.graph.domain import chosen_domain
 
-    screen, wanted = TerminalScreen(), names_in(only, MATRIX, 'fault')
+    screen, wanted = new_screen(), names_in(only, MATRIX, 'fault')
     chosen = [case for case in MATRIX.values() if case.name in wanted]
     if show:
         rows = [(case.name, f'{case.meaning}: {case.reaction.value}') for case in chosen]

@@ -18,6 +18,7 @@ from engine_mount.cli.commands.options import (
     changes_of,
     flag,
     names_in,
+    new_screen,
     option,
     write_figures,
 )
@@ -78,10 +79,9 @@ def index(
     """Write the content of each recording into a catalogue: a row for it, and one for each event."""
     from time import monotonic
 
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.catalogue import index
 
-    screen, began = TerminalScreen(), monotonic()
+    screen, began = new_screen(), monotonic()
     with _resumable(screen, 'indexing', transient=True) as progress:
         found = index(uris, out, progress, scheduler=scheduler, workers=workers)
     counts = {name: getattr(found, name) for name in ('read', 'unchanged', 'unreadable')}
@@ -109,14 +109,13 @@ def replay(
     json_file: JsonFile = None,
 ) -> None:
     """Replay each recording as recorded and with other parameters: a table with one row for each mount."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.replay import parsed_changes
     from engine_mount.fleet.replay import replay_fleet
 
     changes = parsed_changes(changes_of(settings))
     if not changes:
         raise typer.BadParameter('say what is to be other than recorded: --set NAME=VALUE')
-    screen = TerminalScreen()
+    screen = new_screen()
     with _resumable(screen, 'replaying') as progress:
         done = replay_fleet(places, changes, out, closed_loop, progress, scheduler=scheduler, workers=workers)
     figures = done.figures
@@ -224,7 +223,6 @@ def query(
     time_limit: Annotated[float, option('a query that takes longer is refused', 'S', least=0.1)] = 60.0,
 ) -> None:
     """Query a catalogue or a result in SQL."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import query
 
     names_in(form, ('table', 'csv', 'json'), 'format')
@@ -232,7 +230,7 @@ def query(
     if form in ('csv', 'json'):
         typer.echo(_csv(answer) if form == 'csv' else _json(answer), nl=False)
     else:
-        _print_rows(answer, TerminalScreen())
+        _print_rows(answer, new_screen())
 
 
 @app.command(cls=Command, epilog=_WORST_EPILOG)
@@ -243,10 +241,9 @@ def worst(
     json_file: JsonFile = None,
 ) -> None:
     """List the recordings with the largest values of a column, with the commands that open them."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.questions import worst
 
-    screen, rows = TerminalScreen(), []
+    screen, rows = new_screen(), []
     for row, uri, commands in worst(folder, by, count):
         recording, mount, value = row['recording'], row['mount'] or '', row[by]
         rows.append({'recording': recording, 'mount': mount, 'uri': uri, by: value, 'commands': commands})
@@ -268,10 +265,9 @@ def report(
 
     The recordings with pictures are read once more. The page needs no network.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.page import write_page
 
-    screen = TerminalScreen()
+    screen = new_screen()
     with screen.bar('replaying the worst', transient=True) as show:
         file, looks = write_page(result, out, by, count, lambda share, name: show(share, detail=name))
     for look in looks:
@@ -290,10 +286,9 @@ def example(
     workers: Workers = 0,
 ) -> None:
     """Make recordings of short simulated drives, a few of them damaged, as examples of a fleet."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.fleet.example import make_example
 
-    screen, failed = TerminalScreen(), 0
+    screen, failed = new_screen(), 0
     with screen.bar('driving') as show:
         for count, done in enumerate(make_example(out, recordings, seconds, workers), 1):
             show(count / recordings, detail=f'{count} of {recordings}')

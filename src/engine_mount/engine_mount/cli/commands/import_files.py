@@ -12,6 +12,7 @@ from engine_mount.cli.commands.options import (
     MapFile,
     Rate,
     TimeColumn,
+    new_screen,
     option,
     recording_argument,
     stated,
@@ -58,10 +59,9 @@ def import_file(
     A gap of more than 0.125 s splits the recording.
     """
     from engine_mount import import_file as run_import
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping
 
-    screen = TerminalScreen()
+    screen = new_screen()
     place = local(file, screen)
     with screen.bar('reading', transient=True) as show:
         imported = run_import(

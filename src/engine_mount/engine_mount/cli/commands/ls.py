@@ -9,6 +9,7 @@ from engine_mount.cli.commands.options import (
     JsonFile,
     RecordingPlace,
     argument,
+    new_screen,
     stated,
     write_figures,
 )
@@ -50,7 +51,6 @@ def ls(
     json_file: JsonFile = None,
 ) -> None:
     """List recordings with date, length, scenario, losses and faults."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.listing import list_recordings
     from engine_mount.signals.sources.uris import is_local, local_path
 
@@ -58,7 +58,7 @@ def ls(
         raise ValueError(
             'ls reads folders of this machine; engine-mount info URI fetches one recording of a store'
         )
-    screen, places = TerminalScreen(), [local_path(folder) for folder in folders or ['bags']]
+    screen, places = new_screen(), [local_path(folder) for folder in folders or ['bags']]
     missing = [str(place) for place in places if not place.exists()]
     if missing:
         raise ValueError(f'{", ".join(missing)}: no such folder; engine-mount drive makes bags')
@@ -87,12 +87,11 @@ def info(
 
     Of a foreign file, its columns.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.recording import open_run
     from engine_mount.reports.listing import describe_measured, describe_recording
     from engine_mount.signals.formats.reading import is_foreign, read
 
-    screen = TerminalScreen()
+    screen = new_screen()
     place = local(recording, screen)
     with screen.console.status('reading'):
         if is_foreign(place):

@@ -1,4 +1,4 @@
-"""Options that several sub-commands have."""
+"""What several sub-commands share: options, the screen."""
 
 from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as Figures
@@ -11,6 +11,7 @@ from engine_mount.cli.help import Completer, named, recordings, setting
 from mount_models.quantity import nearest
 
 if TYPE_CHECKING:
+    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.formats.content import Stated
     from engine_mount.signals.mapping import Mapping
 
@@ -95,6 +96,13 @@ def target(file: Path | None) -> Path | None:
     if file is not None and (file.is_dir() or not file.absolute().parent.is_dir()):
         raise typer.BadParameter(f'{file} must be a file in an existing folder; make {file.parent} first')
     return file
+
+
+def new_screen() -> 'TerminalScreen':
+    """Return the screen of a command; loaded once it knows what is wanted."""
+    from engine_mount.cli.screen import TerminalScreen
+
+    return TerminalScreen()
 
 
 def write_figures(figures: Figures[str, Any], file: Path | None) -> None:

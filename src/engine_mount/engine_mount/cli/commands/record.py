@@ -11,6 +11,7 @@ from engine_mount.cli.commands.options import (
     NewFolder,
     Split,
     argument,
+    new_screen,
     option,
 )
 from engine_mount.cli.help import named
@@ -51,7 +52,6 @@ def record(
     namespace: Namespace = '',
 ) -> None:
     """Record topics until Ctrl-C; exit code 1 if anything was lost."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.record import record as run_record
     from engine_mount.settings.options import checked_recorder, recorder_options
     from engine_mount.settings.run_folder import new_place
@@ -60,7 +60,7 @@ def record(
     if duration is not None and not duration > 0.0:
         raise typer.BadParameter(f'--duration ({duration:g} s) must be above 0')
     options = {'on_full': on_full, **recorder_options(split)}
-    screen, folder = TerminalScreen(), out or new_place('record')
+    screen, folder = new_screen(), out or new_place('record')
     outcome = run_record(
         folder, checked_recorder(options), screen, topics=topics or (),
         duration=duration, domain=chosen_domain(domain), namespace=namespace,
@@ -74,21 +74,18 @@ def record(
 
 def _print_losses(folder: Path, screen: 'TerminalScreen') -> bool:
     """Print what is there of a recording; return whether anything is, and nothing known to be lost."""
-    from engine_mount.recordings.audit import audit
-    from engine_mount.recordings.losses import losses, sentences
+    from engine_mount import audit
     from engine_mount.recordings.recording import open_recording
 
-    recording = open_recording(folder)
-    audits = audit(recording)
-    found = losses(recording, audits)
-    for warning in recording.warnings:
+    found = audit(open_recording(folder))
+    for warning in found.warnings:
         screen.note(warning)
-    came = any(entry.present for name, entry in audits.items() if name != '/diagnostics')
+    came = any(entry.present for name, entry in found.topics.items() if name != '/diagnostics')
     if came:
-        screen.say(f'audit      {sentences(audits, found)[-1]}')
+        screen.say(f'audit      {found.sentences()[-1]}')
     else:
         screen.note(
             'nothing was recorded, save perhaps /diagnostics; does a graph run in this domain, namespace?'
         )
     screen.say(f'recording  {folder}')
-    return came and found.lossless
+    return came and found.losses.lossless

@@ -11,6 +11,7 @@ from engine_mount.cli.commands.options import (
     RecordingPlace,
     Settings,
     changes_of,
+    new_screen,
     option,
     write_figures,
 )
@@ -41,13 +42,12 @@ def replay(
 
     Answers are compared to the last bit; parameters and tables can differ from the recorded ones.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.drives.inputs.input import DEFAULT_TABLE
     from engine_mount.drives.replay import replay as run_replay
     from engine_mount.recordings.screen import Table
     from engine_mount.settings.run_folder import new_place
 
-    screen, changes = TerminalScreen(), changes_of(settings)
+    screen, changes = new_screen(), changes_of(settings)
     place = local(recording, screen)
     if table not in ('', DEFAULT_TABLE):
         table = str(local(table, screen))

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from engine_mount.cli.commands.options import RecordingPlaces, option
+from engine_mount.cli.commands.options import RecordingPlaces, new_screen, option
 from engine_mount.cli.fetching import beside, is_fetched, local, named
 from engine_mount.cli.help import recordings as offered
 
@@ -37,11 +37,10 @@ def report(
 
     Several recordings share the charts. The page names the missing parts of a recording.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.reports.report import default_page, default_pictures
     from engine_mount.reports.report import report as make_report
 
-    screen = TerminalScreen()
+    screen = new_screen()
     places = [local(recording, screen) for recording in recordings]
     compared = None if other is None else local(other, screen)
     first = places[0]

@@ -14,6 +14,7 @@ from engine_mount.cli.commands.options import (
     SpeedText,
     TimeColumn,
     argument,
+    new_screen,
     option,
 )
 from engine_mount.cli.help import Command, group
@@ -53,16 +54,15 @@ def show(
     With `--speed` also its frequencies at that speed.
     """
     from engine_mount import road
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.recordings.screen import Table
 
-    screen = TerminalScreen()
+    screen = new_screen()
     found = road(file, lateral=lateral, column=column, distance=distance, speed=speed)
     screen.table(Table(found.profile.name, 'll', found.rows()))
     for sentence in found.profile.notes:
         screen.note(sentence)
     if figure is not None:
-        from engine_mount.reports.road_picture import draw_road
+        from engine_mount.reports.drawing.picture import draw_road
 
         draw_road(found.profile, found.unevenness, figure)
         screen.say(f'figure     {figure}')
@@ -83,7 +83,6 @@ def invert(
     So other policies and mounts can repeat a recorded drive, with feedback. The command and the file list
     the limits of one acceleration.
     """
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.signals.mapping import Mapping, with_options
     from engine_mount.signals.roads.driving import speed_of
     from engine_mount.signals.roads.inversion import UNKNOWN, inverted
@@ -91,7 +90,7 @@ def invert(
 
     if not column:
         raise typer.BadParameter('name the acceleration: --column NAME:UNIT, as in --column az:m/s^2')
-    screen = TerminalScreen()
+    screen = new_screen()
     mapping = with_options(Mapping(), [column], time, rate, scale, 'acceleration')
     driven = speed_of(speed)
     signal = select(file, mapping).signals['acceleration']

@@ -10,6 +10,7 @@ from engine_mount.cli.commands.options import (
     JsonFile,
     Namespace,
     flag,
+    new_screen,
     option,
     recording_argument,
     seconds,
@@ -63,11 +64,10 @@ def view(
     namespace: Namespace = '',
 ) -> None:
     """Show the running graph, or a recording, as a page in the browser and in Foxglove."""
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.view.view import open_feed, serve_view
     from mount_bringup.graph.domain import chosen_domain
 
-    screen = TerminalScreen()
+    screen = new_screen()
     place = None if recording is None else local(recording, screen)
     number, start = chosen_domain(domain), seconds(begin)
     with open_feed(place, rate=playback_speed, begin=start, domain=number, namespace=namespace) as feed:
@@ -85,13 +85,12 @@ def status(
 
     from rich.live import Live
 
-    from engine_mount.cli.screen import TerminalScreen
     from engine_mount.view.feed import FeedError
     from engine_mount.view.view import open_feed, running_model, status_screen, wait_for_state
     from mount_bringup.graph.domain import chosen_domain
     from mount_bringup.graph.shutdown import ending_signals
 
-    console = TerminalScreen().console
+    console = new_screen().console
     ending = threading.Event()
     with (
         ending_signals(ending.set),

@@ -13,12 +13,17 @@ from engine_mount.experiments.harness.closed_loop import truth_of_run
 from engine_mount.experiments.harness.experiment import Settings, Values
 from engine_mount.experiments.harness.measures import first_extremum, rms
 from engine_mount.fleet.runner import run_tasks
-from engine_mount.recordings.audit import audit
-from engine_mount.recordings.losses import losses
+from engine_mount.recordings.access import audit
 from engine_mount.recordings.recording import Recording, open_recording
 from engine_mount.recordings.screen import Screen
-from engine_mount.reports.drive.evaluation import samples_at_the_ends, switching, tracking_error
-from engine_mount.reports.drive.signals import DriveSignals, Truth, load_drive
+from engine_mount.reports.drive.signals import (
+    DriveSignals,
+    Truth,
+    load_drive,
+    samples_at_the_ends,
+    switching,
+    tracking_error,
+)
 from engine_mount.reports.sections.periodic import (
     cycle_work,
     distortion,
@@ -121,10 +126,11 @@ def run_trial(trial: Trial) -> Result:
 
 def result_of(trial: Trial, recording: Recording, run: Drive) -> Result:
     """Return figures and remarks of a recorded manoeuvre."""
-    parameters, audits = trial.parameters, audit(recording)
-    lost = losses(recording, audits)
+    parameters, audited = trial.parameters, audit(recording)
+    lost = audited.losses
     signals = load_drive(recording, run.excitation_start)
-    remarks = [*run.complaints, *recording.warnings, *samples_at_the_ends(recording, audits, run.samples)]
+    at_ends = samples_at_the_ends(recording, audited.topics, run.samples)
+    remarks = [*run.complaints, *audited.warnings, *at_ends]
     stamps = recording['control_trace'].stamps
     late = (int(stamps.min()) - signals.zero) / 1e9 if len(stamps) else math.inf
     if late > 0.0:
@@ -187,7 +193,7 @@ def _motion(truth: Truth, part: slice, quiet: float) -> dict[str, float]:
     beyond = np.flatnonzero(np.abs(displacement) > quiet)
     shaken = rms_in_bands(acceleration - np.mean(acceleration), BANDS)
     return {
-        'peak': float(np.max(np.abs(displacement))),
+        'peak': np.max(np.abs(displacement)),
         'rms': rms(displacement),
         'first_extremum': first_extremum(displacement),
         'ringing': SAMPLE_TIME * float(beyond[-1]) if beyond.size else 0.0,
@@ -218,8 +224,8 @@ def control_figures(signals: DriveSignals, truth: Truth, parameters: Settings) -
     return {
         'friction_error_percent': 100.0 * error,
         'switched_on': float(len(switching(seen).on)),
-        'damping_share_percent': 100.0 * float(np.mean(seen.damping_active[excited])),
-        'pad_energy_j': SAMPLE_TIME * float(np.sum(np.abs(truth.friction_force * truth.velocity))),
-        'peak_current_a': float(np.max(np.abs(seen.current[excited]))),
-        'coil_power_w': resistance * float(np.mean(truth.coil_current**2)),
+        'damping_share_percent': 100.0 * np.mean(seen.damping_active[excited]),
+        'pad_energy_j': SAMPLE_TIME * np.sum(np.abs(truth.friction_force * truth.velocity)),
+        'peak_current_a': np.max(np.abs(seen.current[excited])),
+        'coil_power_w': resistance * np.mean(truth.coil_current**2),
     }

@@ -4,10 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import matplotlib
-
-matplotlib.use('Agg')
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
@@ -18,8 +14,9 @@ from engine_mount.reports.drawing.chart import (
     LEVEL_COLOUR,
     SPAN_COLOUR,
     UNDAMPED_COLOUR,
+    Chart,
 )
-from engine_mount.reports.drive.signals import Seen
+from engine_mount.reports.drawing.picture import draw_chart
 
 BLUE, RED, GREY = COLOURS[0], LEVEL_COLOUR, SPAN_COLOUR
 """Of the friction mount and other lines; of levels and what stands out; of shades."""
@@ -59,34 +56,15 @@ def legend_below(figure: Any, axes: Any, columns: int, **more: Any) -> None:
     figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=columns, **more)
 
 
-def shade_damping(axes: Any, seen: Seen, within: Any, alpha: float) -> None:
-    """Shade the samples `within` at which damping is on."""
-    axes.fill_between(
-        seen.time[within],
-        0.0,
-        1.0,
-        where=seen.damping_active[within],
-        color=GREY,
-        alpha=alpha,
-        transform=axes.get_xaxis_transform(),
-        label='damping on',
-        step='post',
-        linewidth=0.0,
-    )
-
-
-def draw_level(axes: Any, level: float, label: str, dash: str, width: float) -> None:
-    """Draw a level of the displacement (m) on both sides, in mm."""
-    for name, value in ((label, level), (None, -level)):
-        axes.axhline(1e3 * value, color=RED, linestyle=dash, linewidth=width, label=name)
-
-
 def finish(figure: Any, file: Path) -> Path:
-    """Put a grid behind all axes without an image, write `figure` to `file` (PNG) and return it."""
+    """Write `figure`, a chart or with a grid behind all axes without an image, to `file` (PNG); return it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if isinstance(figure, Chart):
+        draw_chart(figure, file)
+        return file
     for axes in figure.axes:
         if not axes.images:
             axes.grid(alpha=0.25)
-    file.parent.mkdir(parents=True, exist_ok=True)
     # nothing of date or program in it: the same figures give the same bytes
     figure.savefig(file, dpi=_DPI, metadata={'Software': None})
     return file

@@ -29,7 +29,6 @@ NAMES = {
     'sweep': ('Front wheels from 1 to 50 Hz', 'Fig. 14'),
     'motorway_gap': ('Over a gap in the motorway', 'Fig. 15'),
     'policy': ('Control policies side by side', 'Figs. 13 to 15; Secs. 1, 5 to 7'),
-    'recorded_drive': ('A recorded drive', 'Sec. 7'),
 }
 """{name of the experiment and its file: (title, section or figure of the paper)}."""
 
@@ -131,8 +130,7 @@ class Experiment:
 
     `summary` is one paragraph on how it repeats what `NAMES` says. `closed_loop`: it drives through
     controller and plant, so parameters of the nodes can be set too. `policies` are those that drive; where
-    ours is one and `Findings` say nothing of it, the procedure runs again with it. `needs`: the parameter
-    that only the user can give; such an experiment is not among `all`.
+    ours is one and `Findings` say nothing of it, the procedure runs again with it.
     """
 
     name: str
@@ -141,7 +139,6 @@ class Experiment:
     procedure: Callable[[Order], Findings]
     closed_loop: bool = False
     policies: Sequence[str] = ()
-    needs: str = ''
 
     @property
     def title(self) -> str:
@@ -212,13 +209,8 @@ class Outcome(NamedTuple):
         return heads[: len(rows[0])], rows
 
     def page(self) -> str:
-        """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`.
-
-        One that runs on what the user gave is no part of a page about the paper: its own page instead.
-        """
+        """Return Markdown about it: what the paper says beside what was found; pictures in `figures/`."""
         known = self.experiment
-        if known.needs:
-            return self.pages[0].read_text(encoding='utf-8')
         pictures = ''.join(f'![{known.title}](figures/{each.name})\n\n' for each in self.pictures)
         pages = ''.join(f'\nThe whole page: [{each.name}]({each.name})\n' for each in self.pages)
         return f"""## {known.name}
@@ -250,11 +242,6 @@ def holds_if(answers: Collection[bool]) -> Holds:
     if not answers:
         return NOT_COMPARABLE
     return Holds.YES if all(answers) else PARTLY if any(answers) else Holds.NO
-
-
-def holds_if_lower(ratios: Sequence[float]) -> Holds:
-    """Return whether it holds that all values are lower than those that they are ratios to (1)."""
-    return holds_if([ratio < 1.0 - EVEN for ratio in ratios])
 
 
 def numbers_of(order: Order, name: str, low: float, high: float) -> list[float]:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from engine_mount.experiments.harness.experiment import Values
+from engine_mount.identification.fitting import rms
 from engine_mount.reports.drive.signals import FloatArray, Truth
 from engine_mount.reports.sections.periodic import Band
 from mount_models.sampling import SAMPLE_TIME
@@ -56,11 +57,6 @@ def peak_and_rms(truth: Truth, *_: Any) -> Values:
         'peak_m': peak_in(frequency, truth.displacement, BELOW_ISOLATION),
         'rms': [rms_in(frequency, truth.chassis_acceleration, band) for band in ISOLATION_BANDS],
     }
-
-
-def rms(values: Any) -> float:
-    """Return the rms about 0, NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float('nan')
 
 
 def highest_per_band(

@@ -19,6 +19,7 @@ from engine_mount.identification.fitting import (
     FloatArray,
     IdentificationError,
     covariance_of,
+    rms,
     single_threaded,
 )
 from engine_mount.identification.friction.sawtooth import StrokeLine
@@ -52,7 +53,7 @@ class CoefficientFit(NamedTuple):
     covariances: dict[tuple[str, ...], FloatArray]
 
 
-@single_threaded()
+@single_threaded
 def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
     """Return the coefficients for the lines of step 2.
 
@@ -89,10 +90,9 @@ def fit_coefficients(lines: Sequence[StrokeLine]) -> CoefficientFit:
         highest_normal_force=float(loads.max()),
     )
     a_rms, b_rms = (
-        float(np.sqrt(np.mean(np.square([form(fitted, each.velocity, each.normal_force) for each in lines]
-                                        - np.array([getattr(each, name) for each in lines])))))
+        rms([form(fitted, each.velocity, each.normal_force) - getattr(each, name) for each in lines])
         for name, form in (('a', offset_coefficient), ('b', slope_coefficient))
-    )  # fmt: skip
+    )
     return CoefficientFit(fitted, a_rms, 1e-3 * b_rms, {names: found[1] for names, found in fits.items()})
 
 

@@ -97,7 +97,7 @@ def predicted_force(law: FrictionLaw, values: FloatArray, recording: FrictionRec
     return law.simulate(values, smoothed_displacement(recording), recording.dt, recording.normal_force)
 
 
-@single_threaded()
+@single_threaded
 def _fit_law(
     law: FrictionLaw, training: Sequence[FrictionRecording], progress: Progress, seed: int
 ) -> FloatArray:

@@ -26,7 +26,7 @@ from engine_mount.identification.fitting import (
     FloatArray,
     IdentificationError,
     covariance_of,
-    relative_rms,
+    rms,
     single_threaded,
 )
 from engine_mount.identification.friction.recording import FrictionRecording
@@ -67,19 +67,6 @@ class RampResponse(NamedTuple):
         fading = (lag / self.ramp_time) * (behind - np.exp(-since / lag))
         x = self.asymptote * (rise - (1.0 - self.kappa) * fading)
         return x, self.machine_stiffness * (self.desired * rise - x), self.desired * rise
-
-
-class PrintedFormulas(NamedTuple):
-    """What Eqs (10), (11) give as they are printed, N/m and N s/m, under both readings of c_xi.
-
-    The print leaves open whether c_xi contains the spring p: for c_Re it must (k is then F(0+) / F(inf)), for
-    c_R it must not. d_R = c_R T neglects p beside c_R.
-    """
-
-    contact_stiffness: float
-    tangential_stiffness_with_p: float
-    tangential_stiffness_without_p: float
-    tangential_damping: float
 
 
 @dataclass(frozen=True)
@@ -135,23 +122,15 @@ def contact_of_response(
     return FrictionContact(c_r, d_r, c_re)
 
 
-def printed_formulas(
-    joint_stiffness: float,
-    stiffness_with_p: float,
-    machine_stiffness: float,
-    first_over_last: float,
-    time_constant: float,
-) -> PrintedFormulas:
-    """Return Eq (11) word for word, k being the first force over the last.
+def printed_formulas(c_xi: float, p: float, k: float, time_constant: float) -> FrictionContact:
+    """Return the contact by Eq (11) word for word, `k` being the first force over the last; N/m, T in s.
 
-    `joint_stiffness` is c_xi without the spring p, `stiffness_with_p` (the last force over the desired
-    displacement) contains it; N/m, T in s.
+    The print leaves open whether `c_xi` contains the spring `p`: for c_Re it must (force over the desired
+    displacement), for c_R it must not. d_R = c_R T neglects p beside c_R.
     """
-    k, p = first_over_last, machine_stiffness
-    c_re = k * stiffness_with_p * p / (p - k * stiffness_with_p)
-    without_p = joint_stiffness * c_re / (c_re - joint_stiffness)
-    with_p = stiffness_with_p * c_re / (c_re - stiffness_with_p)
-    return PrintedFormulas(c_re, with_p, without_p, without_p * time_constant)
+    c_re = k * c_xi * p / (p - k * c_xi)
+    c_r = c_xi * c_re / (c_re - c_xi)
+    return FrictionContact(c_r, c_r * time_constant, c_re)
 
 
 def fit_relaxation(time: FloatArray, displacement: FloatArray, fit_from: float) -> Relaxation:
@@ -167,7 +146,7 @@ def fit_relaxation(time: FloatArray, displacement: FloatArray, fit_from: float) 
     return Relaxation(float(found[0]) * scale, float(found[1]) * scale, float(found[2]))
 
 
-@single_threaded()
+@single_threaded
 def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     """Return the contact's springs and damper; raises `IdentificationError` where the ramp shows none."""
     name, time = recording.name, recording.time
@@ -201,7 +180,7 @@ def fit_ramp_hold(recording: FrictionRecording) -> RampHoldFit:
     response = RampResponse(*found)
     model = response.at(time)
     model_x, model_force = model[0] + zero_x, model[1] + zero_force
-    misfits = relative_rms(model_x - x, x), relative_rms(model_force - force, force)
+    misfits = rms(model_x - x) / rms(x), rms(model_force - force) / rms(force)
     _check_response(name, response, misfits, time[-1])
     contact = response.contact()
     covariance = _contact_covariance(response, (covariance_of(fit) * np.outer(scale, scale))[:7, :7])

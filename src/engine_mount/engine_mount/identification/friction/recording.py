@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from engine_mount.identification.fitting import FloatArray, IdentificationError
+from engine_mount.identification.fitting import FloatArray, IdentificationError, rms
 
 FEWEST_SAMPLES = 50
 LONGEST_GAP_STEPS = 5.0
@@ -53,7 +53,7 @@ class FrictionRecording:
     @property
     def force_rms(self) -> float:
         """Root of the mean square of the force, N: what errors are related to."""
-        return float(np.sqrt(np.mean(self.force**2)))
+        return rms(self.force)
 
 
 def checked_recording(
@@ -109,7 +109,7 @@ def smoothed_displacement(recording: FrictionRecording) -> FloatArray:
     """
     raw = recording.displacement
     noise = np.median(np.abs(np.diff(raw, 4))) / (0.6745 * math.sqrt(70.0))
-    typical_step = np.sqrt(np.mean(np.diff(raw) ** 2))
+    typical_step = rms(np.diff(raw))
     if noise == 0.0 or typical_step == 0.0:
         return raw
     # slope of a line through w noisy samples: sigma sqrt(12 / w^3) per sample

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import savgol_filter
 
-from engine_mount.identification.fitting import FloatArray, IdentificationError, relative_rms
+from engine_mount.identification.fitting import FloatArray, IdentificationError, rms
 from engine_mount.identification.friction.coefficients import CoefficientFit
 from engine_mount.identification.friction.ladder import Rung
 from engine_mount.identification.friction.laws import pad_force
@@ -55,9 +55,7 @@ def validate(
     sliding = slip_regions(recording, contact).macro
     parts = slice(None), sliding if sliding.any() else slice(None)
     errors = (
-        relative_rms((force - measured)[part], measured[part])
-        for part in parts
-        for force in (full, simplified)
+        rms((force - measured)[part]) / rms(measured[part]) for part in parts for force in (full, simplified)
     )
     return ModelValidation(recording, full, simplified, *errors)
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
-from engine_mount.identification.fitting import FloatArray, IdentificationError
+from engine_mount.identification.fitting import FloatArray, IdentificationError, rms
 from engine_mount.identification.friction.recording import FrictionRecording, smoothed_displacement
 from mount_models.arithmetic.compiled import compiled
 from mount_models.friction.contact import FrictionContact
@@ -58,7 +58,7 @@ class StrokeLine:
     @property
     def residual(self) -> float:
         """Rms of what the line leaves of mu."""
-        return float(np.sqrt(np.mean((self.mu - self.a - self.b * self.u) ** 2)))
+        return rms(self.mu - self.a - self.b * self.u)
 
     @property
     def fall(self) -> float:

@@ -127,7 +127,7 @@ def subtract_zero(recording: FrictionRecording, zero_from: str = '') -> tuple[Fr
     )
 
 
-@single_threaded()
+@single_threaded
 def first_look(recording: FrictionRecording) -> FirstLook:
     """Return the zero of the force and the shares of the way of a recording that moves to and fro."""
     loop = _Loop(thinned(recording, LOOK_SAMPLES))

@@ -1,19 +1,35 @@
-"""Charts as PNG or SVG."""
+"""Charts, and a measured road, as PNG or SVG."""
 
 from pathlib import Path
 from typing import Any
-
-import matplotlib
-
-matplotlib.use('Agg')
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
-from engine_mount.reports.drawing.chart import POINTS, SHADING, Array, Chart, Curve, Limits, Panel
+from engine_mount.reports.drawing.chart import (
+    COLOURS,
+    LEVEL_COLOUR,
+    POINTS,
+    SHADING,
+    SPAN_COLOUR,
+    Array,
+    Chart,
+    Curve,
+    Limits,
+    Panel,
+)
 from engine_mount.reports.drawing.detail import ranges
+from engine_mount.signals.roads.iso8608 import (
+    CLASSES,
+    FIRST_LIMIT,
+    LONGEST_WAVE,
+    RoadProfile,
+    Unevenness,
+    without_long_waves,
+)
+from mount_sim.excitation.road import REFERENCE_FREQUENCY
 
 _POINTS = 4000  # of a curve, chosen: 2 to a pixel of both kinds, lowest and highest
 _LINE = 1.6  # points, chosen
@@ -106,3 +122,29 @@ def _shown(curve: Curve, limits: Limits | None) -> tuple[Array, Array]:
     step = 2.0 * (x[-1] - x[0]) / _POINTS
     pairs = ranges(x, y, step)
     return np.repeat(x[0] + step * (np.arange(len(pairs)) + 0.5), 2), pairs.ravel()
+
+
+def draw_road(profile: RoadProfile, found: Unevenness, file: Path) -> None:
+    """Write the picture to `file` (PNG): heights without long waves, and density with the fitted line."""
+    picture = Figure(figsize=(10.0, 6.5), layout='constrained')
+    above, below = picture.subplots(2, 1, height_ratios=(2, 3))
+    heights = 1e3 * without_long_waves(profile.height, profile.spacing)
+    above.plot(profile.distance, heights, color=COLOURS[0], linewidth=0.7)
+    above.set(xlabel='distance (m)', ylabel=f'height (mm), waves up to {LONGEST_WAVE:g} m')
+    ends = np.array([found.frequency[0], found.frequency[-1]])
+    for number, letter in enumerate(CLASSES[:-1]):
+        limits = FIRST_LIMIT * 4.0**number * (ends / REFERENCE_FREQUENCY) ** -2.0
+        below.loglog(ends, limits, color=SPAN_COLOUR, linewidth=0.6)
+        place = (ends[0], 0.5 * limits[0])
+        below.annotate(letter, place, color=SPAN_COLOUR, fontsize=8, ha='right', va='center')
+    below.loglog(found.frequency, found.density, color=COLOURS[0], label='measured, smoothed')
+    fitted = np.array([found.lowest, found.highest])
+    line = found.roughness * (fitted / REFERENCE_FREQUENCY) ** -found.waviness
+    label = f'class {found.letter}, waviness {found.waviness:.2f}'
+    below.loglog(fitted, line, '--', color=LEVEL_COLOUR, label=label)
+    below.set(xlabel='spatial frequency (cycles/m)', ylabel='density of the height (m³)')
+    below.legend(loc='lower left', fontsize='small')
+    for axes in (above, below):
+        axes.grid(alpha=0.25)
+    picture.suptitle(f'{profile.name}: road of {profile.length:.0f} m')
+    picture.savefig(file, dpi=100)

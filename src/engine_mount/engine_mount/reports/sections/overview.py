@@ -7,7 +7,7 @@ import numpy as np
 
 from engine_mount.recordings.difference import quantity_text
 from engine_mount.recordings.session import session_values
-from engine_mount.reports.drive.evaluation import error_text
+from engine_mount.reports.drive.signals import error_text
 from engine_mount.reports.sections.motion import peak_cell
 from engine_mount.reports.sections.run import HEAD_OF_SESSION
 from engine_mount.reports.sections.section import (
@@ -108,8 +108,8 @@ def _losses(subject: Subject) -> tuple[str, Sequence[Cell]]:
 
 
 def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
-    unknown = 'against other mounts unknown:'
     beside, moved = subject.beside, subject['displacement']
+    unknown = 'against other mounts unknown:'
     if isinstance(beside, str):
         return UNKNOWN, [f'{unknown} {beside}']
     if moved is None:
@@ -119,24 +119,21 @@ def _isolation(subject: Subject) -> tuple[str, Sequence[Cell]]:
     if math.isnan(peak):
         return UNKNOWN, [f'{unknown} the recording ends before the excitation begins']
 
-    def rms(signal: Signal) -> float:
-        known = signal.values[(signal.time >= begin) & np.isfinite(signal.values)]
-        return float(np.std(known)) if len(known) else math.nan
-
-    def against(own: Signal, quantity: str, unit: str, figure: Callable[[Signal], float]) -> str:
-        others = {name: figure(signal) for name, signal in other_mounts([subject], quantity).items()}
+    def against(quantity: str, unit: str, figure: Callable[[Signal], float]) -> str:
+        own, others = figure(subject[quantity]), other_mounts([subject], quantity)
         changes = (
-            f'{_change(figure(own), other)} {name} ({quantity_text(other, unit)})'
-            for name, other in others.items()
+            f'{_change(own, other)} {name} ({quantity_text(other, unit)})'
+            for name, other in ((name, figure(signal)) for name, signal in others.items())
         )
-        return f'{quantity_text(figure(own), unit)}, {", ".join(changes)}'
+        return f'{quantity_text(own, unit)}, {", ".join(changes)}'
 
-    of_peak = against(moved, 'displacement', 'm', lambda signal: signal.peak(begin)[0])
-    words = [of_peak, f'· rms {against(moved, "displacement", "m", rms)}']
-    text: list[Cell] = [Link('peak displacement', 'traces', at), *words]
-    if (shaken := subject['acceleration']) is not None:
-        words.append(f'rms {against(shaken, "acceleration", "m/s²", rms)}')
-        text += ['·', Link('acceleration of the chassis', 'spectra'), words[-1]]
+    words = [against('displacement', 'm', lambda signal: signal.peak(begin)[0])]
+    text: list[Cell] = [Link('peak displacement', 'traces', at), words[0]]
+    if subject['acceleration'] is not None:
+        words.append(
+            against('acceleration', 'm/s²', lambda signal: np.nanstd(signal.values[signal.time >= begin]))
+        )
+        text += ['·', Link('acceleration of the chassis', 'felt'), f'rms {words[1]}']
     return (LOOK if any('worse' in each for each in words) else GOOD), text
 
 

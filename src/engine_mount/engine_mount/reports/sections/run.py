@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine_mount.recordings.difference import signal_table
-from engine_mount.recordings.losses import as_table
-from engine_mount.recordings.losses import sentences as audit_sentences
+from engine_mount.recordings.losses import sentences
 from engine_mount.recordings.matching import alignment_sentence
 from engine_mount.recordings.session import session_values
 from engine_mount.reports.drawing.chart import COLOUR_OF, DASHED, Array, Chart, Curve, Panel
@@ -122,11 +121,11 @@ def losses(subjects: Sequence[Subject]) -> Section:
     """Return what is missing of each topic, and the faults."""
     words, tables = [], []
     for subject in subjects:
-        words += [f'{subject.prefix}{each}' for each in audit_sentences(subject.audits, subject.losses)]
+        words += [f'{subject.prefix}{each}' for each in sentences(subject.audit.topics, subject.losses)]
         if subject.losses.faults:
             faults = [(moment(fault.time), fault.node, fault.sentence) for fault in subject.losses.faults]
             tables.append(Table(('time', 'node', 'fault'), faults, f'{subject.prefix}faults'))
-        found = as_table(subject.audits)
+        found = subject.audit.table
         tables.append(Table(found.heads, found.rows, subject.prefix.removesuffix(': '), found.marked))
     return Section('losses', 'Losses and faults', words, None, tables)
 

@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine_mount.recordings.access import Audit, audit
 from engine_mount.recordings.answers import peak_current
-from engine_mount.recordings.audit import TopicAudit, audit, control_spans
+from engine_mount.recordings.audit import control_spans
 from engine_mount.recordings.compare import Comparison
 from engine_mount.recordings.events import recorded_marks, switching_times
-from engine_mount.recordings.losses import Losses, losses
+from engine_mount.recordings.losses import Losses
 from engine_mount.recordings.recording import ReadingError, Recording
 from engine_mount.recordings.series import SeriesError
 from engine_mount.recordings.session import (
@@ -30,8 +31,14 @@ from engine_mount.reports.drawing.chart import (
     look_of,
 )
 from engine_mount.reports.drive.beside import Beside, BesideError, mounts_beside, name_of
-from engine_mount.reports.drive.evaluation import acts_after, levels_of, tracking_error, wanted_force
-from engine_mount.reports.drive.signals import DRIVE_COLUMNS, load_drive
+from engine_mount.reports.drive.signals import (
+    DRIVE_COLUMNS,
+    acts_after,
+    levels_of,
+    load_drive,
+    tracking_error,
+    wanted_force,
+)
 from engine_mount.reports.sections.periodic import Sine, dominant_sine
 from engine_mount.settings.chosen import Parameters, control_parameters, policy_of, with_recorded_policy
 from mount_control.policy import switched_viscous
@@ -212,14 +219,14 @@ class Subject:
             return Run(f'the parameters of the session cannot be used: {error}')
 
     @functools.cached_property
-    def audits(self) -> dict[str, TopicAudit]:
-        """The audit of each topic."""
+    def audit(self) -> Audit:
+        """What was lost, unanswered or wrong: of each topic, and in all."""
         return audit(self.recording)
 
     @functools.cached_property
     def losses(self) -> Losses:
-        """What was lost, unanswered or wrong."""
-        return losses(self.recording, self.audits)
+        """What was lost, unanswered or wrong in all."""
+        return self.audit.losses
 
     @functools.cached_property
     def damping(self) -> list[tuple[float, float]] | None:
@@ -294,7 +301,7 @@ class Subject:
         numbers = {
             'duration_s': math.nan if moved is None else float(np.ptp(moved.time)),
             'peak_displacement_m': math.nan if moved is None else moved.peak()[0],
-            'peak_current_a': peak_current(self.recording, control_spans(self.audits)),
+            'peak_current_a': peak_current(self.recording, control_spans(self.audit.topics)),
             'tracking_error_rms': self.tracking.error if isinstance(self.tracking, Tracking) else math.nan,
         }
         figures = {name: None if math.isnan(value) else value for name, value in numbers.items()}
