@@ -16,6 +16,7 @@ current. The gradient comes from the adjoint of the steps. J has several minima,
 better. The force is then made by currents in the simulation with all its laws, and that counts.
 """
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ _BANDS = (BELOW_ISOLATION, ACOUSTIC)
 _ORDER = 4  # of the band-passes, chosen
 _FIRST = 3000.0  # N s/m, chosen: the force of this ideal damper is improved
 _ITERATIONS = 150, 40, 40  # chosen; few at a time, so that the linear car stays near the simulation
+_EVERY, _HORIZON, _FEW = 5, 150, 8  # samples, samples, iterations, chosen
 _CURRENTS = np.linspace(HIGHEST_CURRENT, 0.1, 1000)  # A, chosen: while they fall the pads stay closed
 
 
@@ -158,36 +160,40 @@ class Window:
         self.beside = np.zeros((self.samples, 2))
         """What displacement and acceleration of the simulation have more than those here, at the samples."""
 
-    def cost(self, levels: FloatArray) -> tuple[float, FloatArray]:
-        """Return J and its gradient (1/N)."""
-        ride(self.matrix, self.law, levels, self.rows, self.pads)
-        total, wanted = 0.0, np.zeros((self.samples, 2))
-        for what, states in enumerate((self.states + self.beside).T):
+    def cost(self, levels: FloatArray, first: int = 0) -> tuple[float, FloatArray]:
+        """Return the part of J up to the end of `levels`, which begin at sample `first`; and its gradient."""
+        last = first + len(levels)
+        part = slice(first * _STEPS, last * _STEPS + 1)
+        ride(self.matrix, self.law, levels, self.rows[part], self.pads[part])
+        total, wanted = 0.0, np.zeros((last, 2))
+        for what, states in enumerate((self.states + self.beside)[:last].T):
             share = self.shares[what] / self.samples
             inside = passed(states, _BANDS[what])
             total += share * float(inside @ inside)
             wanted[:, what] = 2.0 * share * passed(inside[::-1], _BANDS[what])[::-1]
-        return total, gradient(self.transposed, self.law, levels, self.rows, self.pads, wanted)
+        wanted = wanted[first:]
+        return total, gradient(self.transposed, self.law, levels, self.rows[part], self.pads[part], wanted)
 
     @property
     def states(self) -> FloatArray:
         """Displacement (m) and acceleration (m/s^2) at the samples, (samples, 2)."""
         return self.rows[:-1:_STEPS, [_DISPLACEMENT, _ACCELERATION]]
 
-    def improved(self, levels: FloatArray, iterations: int) -> FloatArray:
-        """Return levels with a lower J, found from these."""
+    def improved(self, levels: FloatArray, iterations: int, first: int = 0, held: int = 0) -> FloatArray:
+        """Return levels from sample `first` on with a lower J, found from these, of which some are `held`."""
         from scipy.optimize import minimize
 
         def scaled(shares: FloatArray) -> tuple[float, FloatArray]:
-            total, found = self.cost(LARGEST_FORCE * shares)
+            total, found = self.cost(LARGEST_FORCE * shares, first)
             return total, LARGEST_FORCE * found
 
+        start = levels / LARGEST_FORCE
         found = minimize(
             scaled,
-            levels / LARGEST_FORCE,
+            start,
             jac=True,
             method='L-BFGS-B',
-            bounds=[(0.0, 1.0)] * self.samples,
+            bounds=[*((share, share) for share in start[:held]), *[(0.0, 1.0)] * len(start[held:])],
             options={'maxiter': iterations, 'maxcor': 20, 'ftol': 1e-6},
         )
         return LARGEST_FORCE * found.x
@@ -221,11 +227,19 @@ def _reached(sim: SimParameters, time: float) -> float:
     return -float(np.expm1(-2.0 * np.pi * sim.electronics.current_bandwidth * time))
 
 
-def passed(values: FloatArray, band: Band) -> FloatArray:
-    """Return what passes a Butterworth filter of a band (Hz)."""
-    from scipy.signal import butter, sosfilt  # loads long
+@functools.cache
+def _filter(band: Band) -> Any:
+    """Return the Butterworth filter of a band (Hz), as second-order sections."""
+    from scipy.signal import butter  # loads long
 
-    return np.asarray(sosfilt(butter(_ORDER, band, 'bandpass', fs=SAMPLE_RATE, output='sos'), values))
+    return butter(_ORDER, band, 'bandpass', fs=SAMPLE_RATE, output='sos')
+
+
+def passed(values: FloatArray, band: Band) -> FloatArray:
+    """Return what passes the filter of a band (Hz)."""
+    from scipy.signal import sosfilt
+
+    return np.asarray(sosfilt(_filter(band), values))
 
 
 def mean_squares(displacement: FloatArray, acceleration: FloatArray) -> Values:
@@ -264,3 +278,20 @@ def best(weight: float, truth: Truth, sim: SimParameters) -> Values:
         found.append(figures | {'model': model})
         window.beside = np.stack([played['displacement'], played['chassis_acceleration']], 1) - window.states
     return min(found, key=lambda each: each['cost'])
+
+
+def foreseen(samples: int, delay: int, truth: Truth, sim: SimParameters) -> Values:
+    """Return J of the linear car where the road is known for so many `samples` ahead, then stays flat.
+
+    State and engine are known. The force is sought anew every few samples, and acts `delay` samples later.
+    """
+    window = Window(sim, 0.5, of_run(truth))
+    road, levels = window.rows[:, _ROAD].copy(), np.zeros(window.samples)
+    for first in range(0, window.samples, _EVERY):
+        known = (first + samples) * _STEPS
+        window.rows[known:, _ROAD] = road[known : known + 1]
+        part = slice(first, first + _HORIZON)
+        levels[part] = window.improved(levels[part], _FEW, first, delay)
+        window.rows[:, _ROAD] = road
+        window.cost(levels[first : first + _EVERY], first)
+    return {'cost': window.cost(levels)[0]}

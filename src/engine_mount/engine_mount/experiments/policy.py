@@ -8,7 +8,7 @@ import numpy as np
 
 from engine_mount.experiments.bound import MEASURES
 from engine_mount.experiments.harness.closed_loop import run_cases
-from engine_mount.experiments.harness.drawing import GREY, HYDRO_LINE, OFF_LINE, legend_below, new_panels
+from engine_mount.experiments.harness.drawing import BLUE, HYDRO_LINE, OFF_LINE, legend_below, new_panels
 from engine_mount.experiments.harness.experiment import (
     EVEN,
     PAPER,
@@ -31,6 +31,7 @@ from engine_mount.experiments.policy_cases import (
     CONTINUOUS,
     DISTURBANCES,
     ENGINE_ROADS,
+    FORESIGHT,
     FRONT,
     GAP_TIME,
     HYDRO,
@@ -54,6 +55,7 @@ from engine_mount.experiments.policy_cases import (
 from engine_mount.experiments.policy_page import page_of
 from engine_mount.reports.drawing.chart import COLOUR_OF
 from engine_mount.reports.drive.felt import ACCELERATIONS
+from engine_mount.reports.drive.signals import FloatArray
 from mount_models.sampling import SAMPLE_TIME
 
 NAME = 'policy'
@@ -305,6 +307,10 @@ def bound_of(found: Found, name: str) -> Values:
     return {
         'mounts': {who: ratios(found['bound', who, name]) for who in COMPARED},
         'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
+        'foresight': {
+            'all known': found['bound', OFF, name, 0.5]['model'],
+            **{told: found['bound', OFF, name, *foresight]['cost'] for told, foresight in FORESIGHT.items()},
+        },
         'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
 
@@ -420,27 +426,27 @@ def draw_gap(found: Found, depth: float, seed: int) -> Any:
 
 def draw_bound(windows: Values) -> Any:
     """Draw acceleration over displacement in each window: mounts, ideal dampers, the best forces."""
-    figure, panels = new_panels(
-        'The best force of the pads', -(-len(windows) // 2), 2, 4.0 * len(windows) / 2
-    )
+    rows = -(-len(windows) // 2)
+    figure, panels = new_panels('The best force of the pads: rms over no current', rows, 2, 4.0 * rows)
+
+    def places(points: Values) -> FloatArray:
+        return np.sqrt([[point[measure] for measure in MEASURES] for point in points.values()])
+
     for panel, (name, each) in zip(panels.flat, windows.items(), strict=False):
-        lines = {'best force, wear in W': (each['best'], 'k'), 'ideal dampers, N s/m': (each['ideal'], GREY)}
-        for label, (points, colour) in lines.items():
-            places = np.sqrt([[point[measure] for measure in MEASURES] for point in points.values()])
-            panel.plot(*places.T, 'o-', color=colour, markersize=4, label=label)
-            for key, point, place in zip(points, points.values(), places, strict=True):
-                panel.annotate(
-                    f'{point["wear_w"]:.2f}' if 'wear_w' in point else key, place, fontsize='small'
-                )
-        for who, point in each['mounts'].items():
-            panel.plot(
-                *np.sqrt([point[measure] for measure in MEASURES]), 's', color=_LINES[who]['color'], label=who
-            )
+        for label, points, colour in (
+            ('best force, wear in W', each['best'], 'black'),
+            ('ideal dampers, N s/m', each['ideal'], BLUE),
+        ):
+            panel.plot(*places(points).T, 'o-', color=colour, markersize=4, label=label)
+            for place, (damping, point) in zip(places(points), points.items(), strict=True):
+                text = f'{point["wear_w"]:.2f}' if 'wear_w' in point else damping
+                panel.annotate(text, place, (3, 3), textcoords='offset points', fontsize='small')
+        for who, place in zip(each['mounts'], places(each['mounts']), strict=True):
+            panel.plot(*place, 's', color=_LINES[who]['color'], label=who)
         panel.set_title(name, fontsize='medium')
-        panel.set(xscale='log', yscale='log')
+        panel.set(xlim=(0.0, None), ylim=(0.0, None))
+        panel.set(xlabel='displacement, 3 to 14 Hz', ylabel='acceleration, 20 to 200 Hz')
     legend_below(figure, panels.flat[0], 3)
-    figure.supxlabel('displacement, 3 to 14 Hz, rms over no current')
-    figure.supylabel('chassis acceleration, 20 to 200 Hz, rms over no current')
     return figure
 
 

@@ -39,7 +39,7 @@ _CASES = plain_yaml(importlib.resources.files(__package__).joinpath('policy_case
 DISTURBANCES, ABLATIONS = _CASES['disturbances'], _CASES['ablations']
 UNSTABLE = {name: DISTURBANCES[name] for name in _CASES['stability']}
 HYDROMOUNTS = {
-    f'R_d = {resistance:.0e} Pa s/m^3, asymmetry {asymmetry:g}': {
+    f'{resistance:.0e} Pa s/m^3, {asymmetry:g}': {
         'mount': 'hydro',
         'hydromount.decoupler_resistance': resistance,
         'hydromount.compliance_asymmetry': asymmetry,
@@ -65,7 +65,6 @@ HIGH_BANDS = ((20.0, 60.0), (60.0, 100.0), (100.0, 200.0), (200.0, 500.0), (500.
 """Hz: the first four are in a record at 1 kHz."""
 SAMPLED, STEPPED, STRAIGHT = 'sampled at 1 kHz', 'each step of the plant', 'current in straight lines'
 FORCE = 'mount force'
-QUIET = 'no noise of the sensor'
 _HELD = 0.8  # A, chosen: presses the pads on without a pause
 ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 """Roughness (m^3) of the random roads: class A of ISO 8608, and a good motorway."""
@@ -83,6 +82,13 @@ AMPLITUDES, FREQUENCIES = (0.002, 0.01, 0.03, 0.06), (6.0, 8.0, 11.0)
 """m, Hz, chosen: depths of a gap in a flat road, engines on their mounts: nothing may move a while later."""
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 BOUND_WEIGHTS = (0.2, 0.5, 0.8)  # chosen: of the displacement in J
+FORESIGHT = {
+    'known 100 ms ahead': (100, 0),
+    '20 ms ahead': (20, 0),
+    'not ahead': (0, 0),
+    'and 2 ms later': (0, 2),
+}
+"""{name: samples that the road is known ahead, samples until a force acts}, chosen."""
 _BOUND_SECONDS = 3.0  # s, chosen: all that the optimum is sought for is known ahead
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
 _PERIODS = 8  # evaluated on the rack
@@ -164,6 +170,8 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
             add(('bound', who, name), sim, bound.of_ideal if who == OFF else bound.of_run)
         for weight in BOUND_WEIGHTS:
             add(('bound', OFF, name, weight), sim, partial(bound.best, weight))
+        for foresight in FORESIGHT.values():
+            add(('bound', OFF, name, *foresight), sim, partial(bound.foreseen, *foresight))
     if not own.thorough:
         return cases
     for who in HYDROMOUNTS:
@@ -178,7 +186,7 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
     for depth, frequency, (name, changes) in product(AMPLITUDES, FREQUENCIES, UNSTABLE.items()):
         add(
             ('rest', CONTINUOUS, name, frequency, depth),
-            _gap(depth, 0.0, 1) | _engine('mass', frequency) | changes,
+            _gap(depth, 0.0, 1) | _engine('mass', frequency) | changes | {'timeline.duration': 8.0},
             of_rest,
         )
     for plant, level in product(axes.plants, axes.engine_levels):
