@@ -50,7 +50,7 @@ def open_run(path: Path) -> 'Recording':
     return open_recording(recording_place(path))
 
 
-def open_mount(path: Path, mount: str = '', option: str = '--mount') -> 'Recording':
+def open_mount(path: Path, mount: str = '', option: str = '--position') -> 'Recording':
     """Open the recording at `path` for one mount, the only one or `mount`; raises `ReadingError`.
 
     `option` is that of a command by which it is chosen.
