@@ -1,7 +1,6 @@
 """A recording made of another: messages, schemas and channels as they were, and what its recorder lost."""
 
 import contextlib
-import heapq
 import os
 import shutil
 from collections.abc import Mapping, Sequence
@@ -102,10 +101,10 @@ class BagCopy:
         """Add messages by their log times."""
         channels = [self.channel_of(part.topic) for part in parts]
         heads = [part.heads[['log_time', 'publish_time', 'sequence']].tolist() for part in parts]
-        streams = [
-            [(head[0], number, place) for place, head in enumerate(rows)] for number, rows in enumerate(heads)
-        ]
-        for _, number, place in heapq.merge(*streams):
+        order = sorted(
+            (head[0], number, place) for number, rows in enumerate(heads) for place, head in enumerate(rows)
+        )
+        for _, number, place in order:
             self.write(channels[number], parts[number].payloads[place], *heads[number][place])
 
     def complete(

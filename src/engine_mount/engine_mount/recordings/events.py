@@ -77,9 +77,8 @@ def find_event(recording: Recording, wanted: str) -> RecordedEvent:
     In a kind `-` is as good as `_`. Raises `EventError` with the events that there are.
     """
     events = recorded_events(recording)
-    names = [(str(number), event.kind.replace('_', '-')) for number, event in enumerate(events, 1)]
-    for event, known in zip(events, names, strict=True):
-        if wanted.replace('_', '-') in known:
+    for number, event in enumerate(events, 1):
+        if wanted.replace('_', '-') in (str(number), event.kind.replace('_', '-')):
             return event
     raise EventError(f'{recording.path} has no event {wanted!r}; {_listed(recording, events)}')
 
@@ -113,10 +112,10 @@ def _listed(recording: Recording, events: list[RecordedEvent]) -> str:
     if not events:
         return 'it has none, and damping was never switched; cut by --from and --to'
     axis = recording.time_axis
-    all_of_them = [
+    texts = [
         f'{number} {event.kind} at {event_time(event, axis):.3f} s' for number, event in enumerate(events, 1)
     ]
-    return f'it has {few(all_of_them, most=_LISTED)}'
+    return f'it has {few(texts, most=_LISTED)}'
 
 
 # Switching.

@@ -62,14 +62,12 @@ def evenly_spaced(signal: Signal, longest_gap: float, lowest_rate: float) -> Eve
         raise SignalError(
             f'{name}: time does not rise: all samples are at {signal.times[0]:g} s; say their --rate'
         )
-    again = (np.diff(signal.times) == 0.0) & (np.diff(signal.values) == 0.0)
-    once = np.concatenate([[True], ~again]) if again.any() else slice(None)
+    once = np.append(True, (np.diff(signal.times) != 0.0) | (np.diff(signal.values) != 0.0))
     times, values = signal.times[once], signal.values[once]
     check_count(name, times.size)
     numbers = np.arange(times.size) - 0.5 * (times.size - 1)
     period = mean(numbers * times) / mean(numbers * numbers)
     first = mean(times) + numbers[0] * period
-    del numbers  # it can be an hour
     late = float(np.abs(times - (first + period * np.arange(times.size))).max()) / period
     notes = list(signal.notes)
     if late > JITTER:

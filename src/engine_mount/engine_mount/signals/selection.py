@@ -86,7 +86,7 @@ def select(
         own = replace(column, values=column.values[is_known])
         unit, scale, more = unit_of_column(where, own, wanted, choice, mapping.option)
         values = unit.to_si(own.values)
-        values *= scale  # in place: it can be an hour
+        values *= scale
         offset = mean(values) if choice.offset == MEAN else float(choice.offset or 0.0)
         if offset:
             values -= offset

@@ -20,7 +20,7 @@ from mount_models.arithmetic.sums import mean
 from mount_sim.plant.vehicle import Vehicle
 
 _PAUSE = 4.0  # s, chosen: four periods of the body
-_DIGITS = 7  # of distance and height in m
+_FORMAT = '%.7f'  # of distance and height in m
 
 UNKNOWN = (
     f'waves below {BAND[0]:g} Hz and above {BAND[1]:g} Hz are not in it',
@@ -52,9 +52,8 @@ class InvertedRoad(NamedTuple):
         lines = [f'# road behind {source}, by inverting the vehicle model; effective: behind the tyre']
         lines += [f'# {sentence}' for sentence in (*self.notes, *UNKNOWN)]
         lines.append(f'distance [m],{EFFECTIVE} [m]')
-        rows = zip(self.distance, self.height, strict=True)
-        lines += [f'{place:.{_DIGITS}f},{height:.{_DIGITS}f}' for place, height in rows]
-        file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        rows = np.column_stack([self.distance, self.height])
+        np.savetxt(file, rows, _FORMAT, ',', header='\n'.join(lines), comments='', encoding='utf-8')
         return file
 
 
