@@ -1,11 +1,6 @@
 /* What tests need beside the functions of the header. */
 #include "engine_mount_controller.h"
 
-int64_t size_of_controller(void)
-{
-    return (int64_t)sizeof(engine_mount_controller_t);
-}
-
 engine_mount_state_memory_t *state_of(engine_mount_controller_t *controller)
 {
     return &controller->state;

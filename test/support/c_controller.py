@@ -48,7 +48,8 @@ class CController:
         self._c.engine_mount_controller_sequence_hash.restype = ctypes.c_uint64
         self._c.engine_mount_controller_self_test.restype = ctypes.c_bool
         self._c.state_of.restype = ctypes.c_void_p
-        self._memory = np.zeros(self._c.size_of_controller() // 8, np.int64)
+        size = ctypes.c_int64.in_dll(self._c, 'engine_mount_controller_size').value
+        self._memory = np.zeros(size // 8, np.int64)
         self._laws: list = []  # C keeps only where they are
         self._c.engine_mount_controller_start(self._at, self._law(values))
 

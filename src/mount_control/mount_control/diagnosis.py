@@ -8,6 +8,7 @@ from typing import Any
 from mount_control.control_loop import ControlLoop, SampleCounts
 from mount_control.controller import FAULT_SENTENCE
 from mount_control.plausibility import HOLD
+from mount_control.shadow import LATEST, Shadow
 from mount_ros.nodes.diagnostics import WINDOW, Finding, Level, Verdict, verdict_on
 
 _LARGEST_BRIDGED = 0.001  # share of samples, chosen
@@ -27,14 +28,17 @@ def verdict(
     silence: float,
     longest_silence: float,
     figures: Mapping[str, Any],
+    shadow: Shadow | None = None,
+    unseen: int = 0,
 ) -> Verdict:
-    """Return level and sentence, worst first, and `figures` with those of the loop.
+    """Return level and sentence, worst first, and `figures` with those of loop and `shadow`.
 
-    `lately` and the messages of `engine_speed` that were `doubted` were counted within the window, or since
-    the activation; `silence` is the time (s) since the last
-    displacement sample.
+    `lately`, messages of `engine_speed` that were `doubted` and `unseen` setpoints of the electronics were
+    counted within the window, or since the activation; `silence` is the time (s) since the last displacement
+    sample.
     """
     doubt, speed = loop.plausibility.sentence, loop.engine_speed
+    difference = shadow.first_difference if shadow else ''
     errors = (
         (loop.foreign, f'0 A: {loop.foreign}, then activate mount_init and mount_control again'),
         (loop.refusal, f'0 A: {loop.refusal}'),
@@ -46,6 +50,7 @@ def verdict(
         ),
         ('spoiled' if loop.faults else '', FAULT_SENTENCE),
         (doubt if loop.plausibility.held else '', f'0 A until {HOLD:g} s after the last doubt: {doubt}'),
+        ('shadow' if difference else '', difference),
     )
     warnings = (
         (
@@ -73,6 +78,11 @@ def verdict(
             'engine speed doubted' if doubted else '',
             f'{_NO_SPEED} in {doubted} messages ({_LIMIT}); the last: {speed.doubt}',
         ),
+        (
+            'unseen' if unseen else '',
+            f'{unseen} setpoints of the electronics were missing or {1e-6 * LATEST:g} ms late ({_LIMIT}); '
+            "look at mount_driver's counts of lost frames; has their law a table?",
+        ),
     )
     findings = [
         Finding(level, cause, sentence)
@@ -87,6 +97,7 @@ def verdict(
         'current_a': f'{loop.current:.4f}',
         'last_stamp': loop.last,
         'needs_initialisation': bool(loop.refusal),
+        **(shadow.figures if shadow else {}),
         **figures,
     }
     return verdict_on(findings, 'damping on' if loop.damping_active else 'damping off', figures)

@@ -12,6 +12,7 @@ from mount_control.activation import Activation, AirGap, check_rate
 from mount_control.control_loop import OFF, ControlLoop, SampleCounts
 from mount_control.controller import load_compiled_law
 from mount_control.diagnosis import counted_since, verdict
+from mount_control.force_maker import ForceTableError
 from mount_control.policy.contract import trace_fields
 from mount_control.settings import (
     FRICTION,
@@ -20,12 +21,13 @@ from mount_control.settings import (
     parameter_sets,
     run_time_parameters,
 )
+from mount_control.shadow import Shadow
 from mount_models.arithmetic.compiled import log_compilation
 from mount_models.specimen import chosen_specimen
 from mount_ros import topics
 from mount_ros.messages.cdr import string_message
 from mount_ros.messages.event import change_text, dated
-from mount_ros.messages.force_table import from_bytes
+from mount_ros.messages.force_table import from_bytes, law_table_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import SlidingWindow, Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
@@ -40,6 +42,8 @@ _MEASURED_BEFORE = (
         'break since before the present table was made, so that it holds'
     ),
 )
+_LOADING = 5.0  # s, chosen: at 1 kHz electronics load the longest table, 1000 points, in 1 s
+_LOOK_PERIOD = 0.01  # s
 
 
 class MountControl(SafeLifecycleNode):
@@ -58,6 +62,8 @@ class MountControl(SafeLifecycleNode):
         self._foreign = False  # whether another node publishes what this one subscribes to
         self._waiting = b''  # the newest displacement message that came while nothing was answered
         self._last_setpoint = (0, OFF)  # stamp ns, A
+        self._shadow: Shadow | None = None
+        self._electronics_loaded = False  # whether the electronics hold the present table
         self._order = threading.Lock()  # no answer is made while an activation begins or ends
 
     def configure(self) -> None:
@@ -81,7 +87,12 @@ class MountControl(SafeLifecycleNode):
         self._send_trace = path.sender(topics.CONTROL_TRACE)
         self._send_event = path.sender(topics.EVENT)
         path.subscribe(topics.DISPLACEMENT, self._on_displacement, directly=True)
-        path.subscribe(topics.ENGINE_SPEED, self._on_engine_speed, on_conflict=self._on_speed_conflict)
+        if self._settings.parameters.shadow:
+            self._send_law_table = path.sender(topics.ELECTRONICS_TABLE)
+            self._electronics = ScalarsLayout(topics.ELECTRONICS_SETPOINT)
+            path.subscribe(topics.ELECTRONICS_SETPOINT, self._on_electronics_setpoint)
+        else:  # electronics do not know the speed of the engine, so their law goes without
+            path.subscribe(topics.ENGINE_SPEED, self._on_engine_speed, on_conflict=self._on_speed_conflict)
         path.subscribe(topics.AIR_GAP, self._on_air_gap)
         path.subscribe(topics.CURRENT_FORCE_TABLE, self._on_table)
         path.start()
@@ -91,14 +102,16 @@ class MountControl(SafeLifecycleNode):
         table, air_gap = self._activation.wait(self.loop, self.ending)
         check_rate(self.loop, self._settings.parameters.sample_rate)
         currents = self._settings.table(table.current, table.normal_force, air_gap.offset_current)
-        self._counted, self._doubted = (
-            SlidingWindow(SampleCounts()),
-            SlidingWindow(self.loop.engine_speed.doubted),
-        )
+        if self._settings.parameters.shadow:
+            points = zip(table.current.tolist(), table.normal_force.tolist(), strict=True)
+            self._load_electronics([(air_gap.offset_current, 0.0), *points])
+        self._counted, self._missing = SlidingWindow(SampleCounts()), SlidingWindow(0)
+        self._doubted = SlidingWindow(self.loop.engine_speed.doubted)
         self._received = time.monotonic()
         with self._order:
             waiting, self._waiting = self._waiting, b''
             self.loop.begin(self._settings, currents, air_gap.stamp)
+            self._shadow = Shadow(self.loop.counts) if self._settings.parameters.shadow else None
         self.data_path.publisher_watch.report()
         if self.lockstep and waiting:
             self._on_displacement(waiting)  # the electronics wait for an answer to what came before
@@ -110,6 +123,9 @@ class MountControl(SafeLifecycleNode):
             if current != OFF:
                 self._last_setpoint = stamp, OFF
                 self._send_setpoint(self._setpoint.pack(stamp, (OFF,)))
+            self._shadow = None
+        if self._settings.parameters.shadow:
+            self._send_law_table(law_table_message([]))
 
     def cleanup(self) -> None:
         self.loop, self._activation, self._waiting = ControlLoop(), Activation(), b''
@@ -141,6 +157,8 @@ class MountControl(SafeLifecycleNode):
             'fatal': bool(loop.foreign) and self.lockstep,  # then a supervisor ends the graph
         }
         doubted = loop.engine_speed.doubted
+        shadow = self._shadow
+        missing = shadow.missing if shadow else 0
         return verdict(
             loop,
             counted_since(self._counted.earlier(now, counts), counts),
@@ -148,6 +166,8 @@ class MountControl(SafeLifecycleNode):
             0.0 if self.lockstep else now - self._received,
             self._settings.parameters.longest_bridge,
             figures,
+            shadow,
+            missing - self._missing.earlier(now, missing),
         )
 
     def _on_displacement(self, raw: bytes) -> None:
@@ -162,6 +182,8 @@ class MountControl(SafeLifecycleNode):
                 self._waiting = raw
             if loop.trace is not None:
                 self._send_trace(self._trace.pack_record(stamp, loop.trace.tobytes()))
+                if self._shadow is not None:
+                    self._shadow.take(stamp, loop.current, own=True)
             while loop.changes_made:
                 self._send_change(stamp, loop.changes_made.popleft())
         self._received = time.monotonic()
@@ -173,6 +195,25 @@ class MountControl(SafeLifecycleNode):
 
     def _on_speed_conflict(self, confirmed: str, suspected: str) -> None:
         self.loop.engine_speed.conflict = confirmed or suspected
+
+    def _load_electronics(self, points: list[tuple[float, float]]) -> None:
+        """Return when the electronics hold the table of `points` (A, N); else raise `ForceTableError`."""
+        self._electronics_loaded = False
+        self._send_law_table(law_table_message(points))
+        limit = time.monotonic() + _LOADING
+        while not self._electronics_loaded:
+            if time.monotonic() > limit or self.ending.wait(_LOOK_PERIOD):
+                raise ForceTableError(
+                    f'the electronics have not loaded the table of their law within {_LOADING:g} s: set '
+                    'mount_driver.shadow as mount_control.shadow; do they send MountOwnSetpoint?'
+                )
+
+    def _on_electronics_setpoint(self, raw: bytes) -> None:
+        stamp, (current, loaded), _ = self._electronics.unpack(raw)
+        with self._order:
+            self._electronics_loaded = loaded == 1.0
+            if self._shadow is not None and current == current:
+                self._shadow.take(stamp, current, own=False)
 
     def _send_change(self, stamp: int, text: str) -> None:
         self._send_event(string_message(dated(stamp, text)))

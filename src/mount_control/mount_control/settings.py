@@ -52,6 +52,10 @@ class ControlParameters(NamedTuple):
     highest_current: Annotated[
         float, Quantity('A', 'limit of the setpoint', 0.0, HIGHEST_CURRENT, 'paper, section 3')
     ] = HIGHEST_CURRENT
+    shadow: Annotated[
+        bool,
+        Quantity('truth', 'compare the setpoints of electronics that compute the law themselves'),
+    ] = False
 
 
 class ControlSettings(NamedTuple):

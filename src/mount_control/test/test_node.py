@@ -30,7 +30,7 @@ from mount_ros import topics
 from mount_ros.data_path import DataPath
 from mount_ros.messages.cdr import deserialise, message_class
 from mount_ros.messages.event import Mark, ParametersChanged, read_change, read_mark
-from mount_ros.messages.force_table import table_message
+from mount_ros.messages.force_table import law_table_points, table_message
 from mount_ros.messages.scalars import ScalarsLayout
 from mount_ros.nodes.diagnostics import Level
 from mount_ros.qos import publisher_qos
@@ -69,7 +69,19 @@ class Surroundings:
         self.path.subscribe(
             topics.EVENT, lambda raw: self.events.append(deserialize_message(raw, String).data)
         )
+        self._electronics = self.path.publisher(topics.ELECTRONICS_SETPOINT)
+        self.law_tables = []
+        self.path.subscribe(topics.ELECTRONICS_TABLE, self._load_law_table)
         self.path.start()
+
+    def _load_law_table(self, raw):
+        self.law_tables.append(law_table_points(raw))
+        self.send_electronics(0, math.nan, loaded=bool(self.law_tables[-1]))
+
+    def send_electronics(self, milliseconds, current, loaded=True):
+        """Send a setpoint of the electronics' own law."""
+        layout = ScalarsLayout(topics.ELECTRONICS_SETPOINT)
+        self._electronics.publish(layout.pack(ACTIVATION + milliseconds * MS, (current, loaded)))
 
     def send(self, milliseconds, displacement=0.0):
         """Send a displacement sample, by its time in ms after the activation of the table."""
@@ -504,3 +516,70 @@ def test_what_cannot_be_set_is_refused_with_the_reason_and_changes_nothing(
     (told,) = _set(control, **{name: value})
     assert reason in told
     assert control.get_parameter(name).value == before
+
+
+@pytest.fixture
+def shadow(make_control, around):
+    """A controller beside electronics of a law of their own, which have loaded its table."""
+    control = make_control(shadow=True)
+    assert control.trigger_configure() == SUCCESS
+    wait_until(lambda: not (around.path.unmatched() or control.data_path.unmatched()), 'matched')
+    around.initialise()
+    assert control.trigger_activate() == SUCCESS
+    currents, forces, offset = TABLE_ROWS
+    assert around.law_tables == [[(offset, 0.0), *zip(currents, forces, strict=True)]]
+    return control
+
+
+@pytest.mark.parametrize('electronics_first', [True, False])
+def test_one_bit_of_difference_to_the_electronics_is_an_error_that_stays(shadow, around, electronics_first):
+    displacement = sine(8.0, 1e-3, 0.4)
+    settings = control_settings(PAPER, default_specimen())
+    core = Controller(ControlLaw(settings, settings.table(*TABLE_ROWS)))
+    core.restart(displacement[0])
+    currents = core.run(displacement)['current'].tolist()
+    currents[350] = math.nextafter(currents[350], 3.0)
+    for number, current in enumerate(currents, 1):
+        if electronics_first:
+            around.send_electronics(number, current)
+        around.send(number, displacement[number - 1])
+        _answers(around, number)
+        if not electronics_first:
+            around.send_electronics(number, current)
+        wait_until(lambda count=number: shadow._shadow.compared == count, 'the comparison')
+        assert shadow.judge().level is (Level.OK if number <= 350 else Level.ERROR)
+    own = math.nextafter(currents[350], 0.0)
+    assert (
+        f'electronics ({currents[350]!r} A) differs from that of mount_control ({own!r} A)' in shadow.sentence
+    )
+    assert 'for the sample of 5.351 s' in shadow.sentence
+    assert shadow.judge().figures['shadow_different'] == 1
+
+
+def test_missing_setpoints_of_the_electronics_are_reported(shadow, around):
+    for ms in range(1, 31):
+        around.send(ms)
+        _answers(around, ms)
+        if ms < 6:
+            around.send_electronics(ms, 0.0)
+    wait_until(lambda: shadow._shadow.compared == 5, 'comparison')
+    verdict = shadow.judge()
+    assert verdict.level is Level.WARN
+    assert verdict.sentence.startswith('4 setpoints of the electronics were missing or 20 ms late')
+    assert verdict.figures['shadow_missing'] == 4
+
+
+def test_without_a_table_in_the_electronics_there_is_no_activation(make_control, around, monkeypatch):
+    monkeypatch.setattr('mount_control.node._LOADING', 0.1)
+    monkeypatch.setattr(around, 'send_electronics', lambda *arguments, **options: None)
+    control = make_control(shadow=True)
+    assert control.trigger_configure() == SUCCESS
+    wait_until(lambda: not (around.path.unmatched() or control.data_path.unmatched()), 'matched')
+    around.initialise()
+    assert control.trigger_activate() == FAILURE
+    assert control.sentence.startswith('the electronics have not loaded the table of their law within 0.1 s')
+
+
+def test_an_end_takes_the_table_from_the_electronics(shadow, around):
+    assert shadow.trigger_deactivate() == SUCCESS
+    wait_until(lambda: around.law_tables[-1] == [], 'an empty table')

@@ -6,7 +6,7 @@ No ROS here: samples leave by a callback, setpoints come in by `send_setpoint` f
 import atexit
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from mount_driver.can_library import can
 from mount_driver.clock import Clock
 from mount_driver.link import Counts, Fault, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import MountCodec, Setpoint
+from mount_driver.protocol import AliveCounter, MountCodec, Setpoint, table_crc
 from mount_driver.watches.guard import Guard
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw
@@ -32,8 +32,9 @@ class Exchange:
     Callbacks run in the receiving thread: `on_sample(stamped)` for every new sample as soon as it is decoded,
     because the setpoint waits for it; then the watches judge it, in any case before a setpoint that answers
     it leaves; then `on_judged(stamped)`. `on_temperature(stamp_ns, celsius)` is called for a status with a
-    coil temperature, with the last sample's stamp. A callback that hangs does not
-    hold up the watch of the hold.
+    coil temperature, with the last sample's stamp; `on_own_setpoint(stamp_ns, current, loaded)` for one of
+    the electronics' own law: whether they have loaded its table. A callback that hangs does not hold up the
+    watch of the hold.
     `clock` gives the stamps and the time by which ages are judged; `steady() -> ns` is the steady clock.
     `heat` is the coil's temperature from before, which an activation does not cool; `law` is the ripple's.
     """
@@ -47,6 +48,7 @@ class Exchange:
         *,
         on_judged: Callable[[Stamped], None] = lambda stamped: None,
         on_temperature: Callable[[int, float], None] = lambda stamp, celsius: None,
+        on_own_setpoint: Callable[[int, float, bool], None] = lambda stamp, current, loaded: None,
         steady: Callable[[], int] = time.monotonic_ns,
         heat: HeatWatch | None = None,
         law: RippleLaw | None = None,
@@ -65,6 +67,9 @@ class Exchange:
         self._on_sample = on_sample
         self._on_judged = on_judged
         self._on_temperature = on_temperature
+        self._on_own_setpoint = on_own_setpoint
+        self._table: Sequence[tuple[float, float]] = ()
+        self._table_crc, self._point_alive = 0, AliveCounter()
         self._temperature_stamp: int | None = None  # of the last temperature that was handed on
         self._clock, self._lockstep = clock, clock.lockstep
         self._steady = steady
@@ -87,8 +92,8 @@ class Exchange:
     def start(self, *, threaded: bool = True) -> None:
         """Open the bus and begin to receive, in threads or by `poll`; raises `CanLinkError`."""
         p, codec = self._parameters, self._codec
-        messages = codec.measurement, codec.status, codec.setpoint
-        receive = [message.frame_id for message in messages]
+        messages = codec.measurement, codec.status, codec.setpoint, codec.own_setpoint
+        receive = [message.frame_id for message in messages[: 4 if p.shadow else 3]]
         self._bus = open_bus(p.interface, p.channel, receive=receive, port=p.port)
         self._accepting = True
         atexit.register(self.stop)  # an exception that ends the process must not leave the coil on
@@ -143,6 +148,12 @@ class Exchange:
             graver = link.needs_initialisation and not fault.needs_initialisation
             if not link.fault or graver or link.nameless:
                 self._send(link.switch_off(fault))
+
+    def give_table(self, points: Sequence[tuple[float, float]]) -> None:
+        """Let the electronics load the points (A, N) of the table of their law; none: forget it."""
+        with self._sending:
+            self._table, self._table_crc = points, table_crc(points)
+            self._send_point(0)
 
     def poll(self) -> bool:
         """Handle the next frame if one is there and return whether; used without a thread."""
@@ -233,6 +244,8 @@ class Exchange:
             self._take_status(message)
         elif message.arbitration_id == self._codec.setpoint.frame_id:
             self._take_foreign_setpoint(message)
+        elif message.arbitration_id == self._codec.own_setpoint.frame_id:
+            self._take_own_setpoint(message)
 
     def _take_status(self, message: can.Message) -> None:
         status, latest = self.link.take_status(message.data), self.link.latest
@@ -253,6 +266,17 @@ class Exchange:
         with self._sending:
             self._send(self.link.off())
 
+    def _take_own_setpoint(self, message: can.Message) -> None:
+        taken = self.link.take_own(message.data)
+        self.switch_off(self.guard.judge_own_setpoint(self._now()))
+        if taken is not None:
+            (stamp, own), count = taken, len(self._table)
+            with self._sending:
+                same = own.table_crc == self._table_crc
+                if not same or own.next_point < count:
+                    self._send_point(own.next_point if same else 0)
+            self._on_own_setpoint(stamp, own.current, same and 0 < count <= own.next_point)
+
     def _now(self) -> int:
         return self._clock.now(self._steady())
 
@@ -267,11 +291,26 @@ class Exchange:
             self._alive = (self._alive + 1) & 0xFF
             bus.send(self._frame)
         except Exception as error:
-            # The adapters of python-can raise whatever they like; no frame behind this one may suffer.
-            self.link.counts.unsent += 1
-            self.unsent_reason = _named(error)
-            return False
+            return self._note_unsent(error)
         return True
+
+    def _send_point(self, number: int) -> None:
+        """Send a point of the table for the electronics' law; call it with the lock held."""
+        if self._bus is None or not self._accepting:
+            return
+        layout, count = self._codec.table_point, len(self._table)
+        point = self._table[number] if count else (0.0, 0.0)
+        data = layout.pack((0, self._point_alive.next(), number, count, self._table_crc, *point))
+        try:
+            self._bus.send(Frame(layout.frame_id, data))
+        except Exception as error:
+            self._note_unsent(error)
+
+    def _note_unsent(self, error: Exception) -> bool:
+        # The adapters of python-can raise whatever they like; no frame behind this one may suffer.
+        self.link.counts.unsent += 1
+        self.unsent_reason = _named(error)
+        return False
 
     def _leave_off(self) -> None:
         """Send 0 A and nothing more; raises `CanLinkError` where the bus did not take it."""

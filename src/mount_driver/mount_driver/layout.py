@@ -95,6 +95,7 @@ def _reversed_bit_format(length: int, signals: Sequence[Signal]) -> str:
     fields, position = '', 0
     for signal in signals:
         gap = f'p{signal.start - position}' if signal.start > position else ''
-        fields = f'{"s" if signal.is_signed else "u"}{signal.length}{gap}{fields}'
+        kind = 'f' if signal.is_float else 's' if signal.is_signed else 'u'
+        fields = f'{kind}{signal.length}{gap}{fields}'
         position = signal.start + signal.length
     return f'p{8 * length - position}{fields}' if 8 * length > position else fields

@@ -13,7 +13,15 @@ from enum import Enum
 from typing import NamedTuple
 
 from mount_driver.clock import Clock
-from mount_driver.protocol import E2EReceiver, Measurement, MountCodec, Outcome, Setpoint, Status
+from mount_driver.protocol import (
+    E2EReceiver,
+    Measurement,
+    MountCodec,
+    Outcome,
+    OwnSetpoint,
+    Setpoint,
+    Status,
+)
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway
@@ -112,6 +120,7 @@ class Link:
     ):
         self.clock = clock
         self.samples, self.statuses = E2EReceiver(codec.measurement), E2EReceiver(codec.status)
+        self.own_setpoints = E2EReceiver(codec.own_setpoint)
         self.counts = Counts()
         self.resent = False
         """Whether the last measurement frame was the sample that came before it, once more."""
@@ -188,6 +197,15 @@ class Link:
             self.status = status
             self.counts.setpoint_errors += status.e2e_error
         return status
+
+    def take_own(self, data: bytes | bytearray) -> tuple[int, OwnSetpoint] | None:
+        """Return stamp (ns) of the sample and the electronics' own setpoint of a sound frame, else None."""
+        own = self.own_setpoints.receive(data)
+        if own is None:
+            self._count_unused(self.own_setpoints.outcome)
+            return None
+        counter, samples = own.answered_counter, reversed(self._samples.items())
+        return next(((stamp, own) for stamp, (known, _) in samples if known == counter), None)
 
     # To the electronics.
 

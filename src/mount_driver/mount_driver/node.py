@@ -16,13 +16,22 @@ from mount_models.coil.copper import check_heating
 from mount_models.sampling import sample_time_ns
 from mount_models.specimen_choice import SpecimenChoice
 from mount_ros.messages.cdr import temperature
+from mount_ros.messages.force_table import law_table_points
 from mount_ros.messages.scalars import MessageError, OneNumberLayout, ScalarsLayout
 from mount_ros.nodes.diagnostics import Verdict
 from mount_ros.nodes.lifecycle import SafeLifecycleNode
 from mount_ros.nodes.parameters import SpecimenValues, declare, read
 from mount_ros.nodes.process import run_node
 from mount_ros.nodes.real_time import RealTimeThreads
-from mount_ros.topics import COIL_RIPPLE, COIL_TEMPERATURE, CURRENT_SETPOINT, DISPLACEMENT, ENGINE_SPEED
+from mount_ros.topics import (
+    COIL_RIPPLE,
+    COIL_TEMPERATURE,
+    CURRENT_SETPOINT,
+    DISPLACEMENT,
+    ELECTRONICS_SETPOINT,
+    ELECTRONICS_TABLE,
+    ENGINE_SPEED,
+)
 
 _BREAK = 1.1  # s, chosen: after such a hole in the stamps mount_control refuses the table of before
 
@@ -46,6 +55,7 @@ class MountDriver(SafeLifecycleNode):
         self._temperature_layout = OneNumberLayout(temperature)
         self._speed_layout = ScalarsLayout(ENGINE_SPEED)
         self._setpoint_layout = ScalarsLayout(CURRENT_SETPOINT)
+        self._own_layout = ScalarsLayout(ELECTRONICS_SETPOINT)
 
     def configure(self) -> None:
         self._take_specimen()
@@ -62,6 +72,11 @@ class MountDriver(SafeLifecycleNode):
         if self._speed_signal:  # else another node may publish it
             self._publish_speed = path.sender(ENGINE_SPEED)
         path.subscribe(CURRENT_SETPOINT, self._on_setpoint, directly=True)
+        self._law_table: list[tuple[float, float]] = []
+        self._law_table_loaded = False
+        if self._settings.shadow:
+            self._publish_own_setpoint = path.sender(ELECTRONICS_SETPOINT)
+            path.subscribe(ELECTRONICS_TABLE, self._on_law_table)
         path.start()
         self._path = path
 
@@ -79,9 +94,11 @@ class MountDriver(SafeLifecycleNode):
             self._on_sample,
             on_judged=self._on_judged,
             on_temperature=self._on_temperature,
+            on_own_setpoint=self._on_own_setpoint,
             heat=self._heat,
             law=self._law,
         )
+        exchange.give_table(self._law_table)
         started = time.monotonic_ns()
         # In lock-step on a bus within this process, frames only come while the data thread is free.
         attended = self.lockstep and self._settings.interface == 'virtual'
@@ -171,6 +188,16 @@ class MountDriver(SafeLifecycleNode):
 
     def _on_engine_speed(self, stamp: int, velocity: float) -> None:
         self._publish_speed(self._speed_layout.pack(stamp, (nan,), (velocity,)))
+
+    def _on_own_setpoint(self, stamp: int, current: float, loaded: bool) -> None:
+        if current == current or loaded != self._law_table_loaded:
+            self._law_table_loaded = loaded
+            self._publish_own_setpoint(self._own_layout.pack(stamp, (current, loaded)))
+
+    def _on_law_table(self, raw: bytes) -> None:
+        self._law_table = law_table_points(raw)
+        if self._exchange is not None:
+            self._exchange.give_table(self._law_table)
 
     def _on_setpoint(self, raw: bytes) -> None:
         exchange = self._exchange

@@ -24,6 +24,9 @@ class DriverParameters(NamedTuple):
     )
     port: Annotated[int, Quantity('1', 'UDP port of udp_multicast', 1024, 65535)] = MULTICAST_PORT
     sample_rate: SampleRate = SAMPLE_RATE
+    shadow: Annotated[
+        bool, Quantity('truth', 'serve electronics that compute the law themselves, see mount_control.shadow')
+    ] = False
     coil: CoilWatchParameters = CoilWatchParameters()
     status: StatusLimits = StatusLimits()
     ripple: RippleWatchParameters = RippleWatchParameters()

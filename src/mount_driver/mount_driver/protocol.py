@@ -1,9 +1,12 @@
-"""The three messages of `mount.dbc` in SI units, protected end to end; both ends of the bus run this code.
+"""The messages of `mount.dbc` in SI units, protected end to end; both ends of the bus run this code.
 
 All numbers of the wire (positions, scales, limits, data ids) come from the DBC. Protection is AUTOSAR E2E
 profile 5: a 16 bit CRC over all other bytes and the data id, and an 8 bit alive counter.
 """
 
+import struct
+import zlib
+from collections.abc import Sequence
 from enum import IntEnum
 from math import isnan, nan
 from pathlib import Path
@@ -73,6 +76,37 @@ class Status(NamedTuple):
     e2e_error: bool = False
 
 
+class OwnSetpoint(NamedTuple):
+    """The setpoint of electronics that compute the law themselves (MountOwnSetpoint, electronics to host)."""
+
+    answered_counter: int
+    """`sample_counter` of the sample that it answers."""
+    next_point: int
+    """Which point of the table the electronics wait for; the number of points when they hold them all."""
+    table_crc: int
+    """`table_crc` of the table that the electronics hold or load, 0 without one."""
+    current: float
+    """A, to the bit; NaN while the law does not run."""
+
+
+class TablePoint(NamedTuple):
+    """One point of the table for the law in the electronics (MountLawTable, host to electronics)."""
+
+    point: int
+    points: int
+    """Number of all points; 0: there is no table."""
+    table_crc: int
+    current: float
+    """A; that of point 0 is the offset current."""
+    normal_force: float
+    """N; 0 in point 0."""
+
+
+def table_crc(points: Sequence[tuple[float, float]]) -> int:
+    """Return the CRC-32 over all points (A, N) as they are sent, 0 without any."""
+    return zlib.crc32(b''.join(struct.pack('<2d', *point) for point in points))
+
+
 class MountCodec:
     """Encodes and decodes the messages of `mount.dbc`; no state but its tables, so one serves all threads.
 
@@ -82,10 +116,12 @@ class MountCodec:
     def __init__(self, database_file: Path = DATABASE_FILE):
         database = Database()
         database.add_dbc_file(database_file)
-        measurement, setpoint, status = messages = database.messages
+        measurement, setpoint, status, own_setpoint, table_point = messages = database.messages
         self.measurement = MessageLayout(measurement, self._measurement_of)
         self.setpoint = MessageLayout(setpoint, self._setpoint_of)
         self.status = MessageLayout(status, self._status_of)
+        self.own_setpoint = MessageLayout(own_setpoint, lambda raw: OwnSetpoint(*raw[2:]))
+        self.table_point = MessageLayout(table_point, lambda raw: TablePoint(*raw[2:]))
         scalings = {signal.name: Scaling(signal) for message in messages for signal in message.signals}
         self.displacement, self.coil_current = scalings['Displacement'], scalings['CoilCurrent']
         self.current_rate, self.flux_rate = scalings['CurrentRate'], scalings['FluxRate']

@@ -1,6 +1,7 @@
 """Frames in, samples out; setpoints in, frames out; and 0 A on every way out, whatever the bus raises."""
 
 import itertools
+import math
 import subprocess
 import sys
 import textwrap
@@ -12,12 +13,13 @@ from far_end import CODEC, FarEnd, sample
 from ros_testing import LIMIT, wait_until
 
 from mount_driver import exchange as exchange_module
+from mount_driver.bus import open_bus
 from mount_driver.can_library import can
 from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import Setpoint
+from mount_driver.protocol import AliveCounter, Setpoint, TablePoint, table_crc
 
 OFF = Setpoint(0.0, 0xFFFF, False)
 RAISED = [can.CanOperationError('no buffer'), OSError('gone'), ValueError('what?'), KeyboardInterrupt()]
@@ -113,6 +115,63 @@ def test_electronics_of_another_rate_take_the_coil_to_0_a_until_the_next_activat
     *setpoints, off = far.setpoints()
     assert off._replace(answered_counter=0) == Setpoint(0.0, 0, False)
     assert len(setpoints) == exchange.link.counts.setpoints < 20
+
+
+@pytest.fixture
+def lawful(make):
+    """An exchange with electronics of a law of their own, what it hands on, and a function that sends theirs.
+
+    The function returns the points of the table that come in answer.
+    """
+    exchange, far = make(lockstep=True, threaded=False, shadow=True)
+    taken, alive, layout = [], AliveCounter(), CODEC.table_point
+    exchange._on_own_setpoint = lambda *own: taken.append(own)
+    bus = open_bus('virtual', exchange._parameters.channel)
+    polled(exchange, far, sample(7))
+
+    def points():
+        frames = [
+            each for each in iter(lambda: bus.recv(0.0), None) if each.arbitration_id == layout.frame_id
+        ]
+        return [layout.decode(frame.data)[1] for frame in frames]
+
+    def send(next_point=0, crc=0, current=math.nan, counter=7, number=None):
+        number = alive.next() if number is None else number
+        data = CODEC.own_setpoint.pack((0, number, counter, next_point, crc, current))
+        far.send_raw(CODEC.own_setpoint.frame_id, data)
+        exchange.poll()
+        return points()
+
+    yield exchange, taken, send, points
+    bus.shutdown()
+
+
+def test_electronics_get_the_point_of_the_table_that_they_wait_for(lawful):
+    exchange, taken, send, points = lawful
+    table = [(0.5, 0.0), (0.4, 0.0), (0.9, 30.0)]
+    crc = table_crc(table)
+    assert send() == []
+    exchange.give_table(table)
+    assert points() == [TablePoint(0, 3, crc, 0.5, 0.0)]
+    for _ in range(2):  # a point that was lost
+        assert send(1, crc) == [TablePoint(1, 3, crc, 0.4, 0.0)]
+    assert send(2, crc + 1) == [TablePoint(0, 3, crc, 0.5, 0.0)]  # of another table
+    assert send(3, crc, 0.1, counter=8) == []  # answers no sample that is known
+    assert not any(loaded for _, _, loaded in taken)
+    assert send(3, crc, 0.1) == []
+    assert taken[-1] == (7 * MS, 0.1, True)
+    exchange.give_table([])
+    assert points() == [TablePoint(0, 0, 0, 0.0, 0.0)]
+
+
+def test_a_second_sender_of_own_setpoints_takes_the_coil_to_0_a(lawful):
+    exchange, _, send, _ = lawful
+    for _ in range(4):
+        send(current=0.1)
+    assert not exchange.link.fault
+    for current in (0.2, 0.3, 0.4):
+        send(current=current, number=3)
+    assert 'MountOwnSetpoint' in exchange.link.fault
 
 
 @pytest.mark.parametrize(

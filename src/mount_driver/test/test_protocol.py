@@ -14,7 +14,7 @@ from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SETPOINT_TIMEOUT
 
 CODEC = MountCodec()
 DATABASE = cantools.database.load_file(DATABASE_FILE)
-MEASUREMENT, SETPOINT, STATUS = DATABASE.messages
+MEASUREMENT, SETPOINT, STATUS, *_ = DATABASE.messages
 SAMPLE = Measurement(1234, 4_000_000_000, 0.0012345, 0.5002, -1234.567, 99.1234, True, False, True)
 
 counters = st.integers(0, 0xFFFF)
@@ -72,12 +72,14 @@ def test_a_measurement_reads_as_cantools_reads_it(measurement, counter):
 def test_frames_are_those_of_cantools_to_the_bit(message, data):
     raw = {
         signal.name: data.draw(
-            st.integers(round(signal.minimum / signal.scale), round(signal.maximum / signal.scale))
+            st.floats(signal.minimum, signal.maximum)
+            if signal.is_float
+            else st.integers(round(signal.minimum / signal.scale), round(signal.maximum / signal.scale))
         )
         for signal in message.signals
     }
     frame = bytearray(message.encode(raw, scaling=False))
-    layouts = CODEC.measurement, CODEC.setpoint, CODEC.status
+    layouts = CODEC.measurement, CODEC.setpoint, CODEC.status, CODEC.own_setpoint, CODEC.table_point
     layout = next(each for each in layouts if each.name == message.name)
     e2e_p05_protect(frame, layout.data_id, increment_counter=False)
     numbers = tuple(raw[name] for name in layout.names)

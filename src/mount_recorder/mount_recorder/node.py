@@ -34,6 +34,7 @@ from mount_ros.topics import (
     CURRENT_SETPOINT,
     DIAGNOSTICS,
     EVENT,
+    SHADOW_TOPICS,
     TOPICS,
     Delivery,
     Topic,
@@ -72,6 +73,7 @@ class MountRecorder(SafeLifecycleNode):
     def configure(self) -> None:
         self._settings = parameters = read(self, RecorderParameters())
         topics = [_registered(name) for name in self.get_parameter('topics').value]
+        topics += SHADOW_TOPICS if parameters.shadow else ()
         mounts = [name.strip() for name in self.get_parameter('mounts').value.split(',')]
         uri = self.get_parameter('uri').value
         if not uri:

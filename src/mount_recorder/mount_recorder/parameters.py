@@ -15,6 +15,9 @@ class RecorderParameters(NamedTuple):
     """How often samples come, how a recording is divided, and when it ends."""
 
     sample_rate: SampleRate = SAMPLE_RATE
+    shadow: Annotated[
+        bool, Quantity('truth', 'record the topics of electronics that compute the law themselves, too')
+    ] = False
     on_full: Annotated[
         str, Quantity('word', 'what a full disk means for the run: stop (an error) or continue')
     ] = 'stop'

@@ -168,6 +168,26 @@ CONTROL_TRACE = Topic(
     ),
 )
 
+ELECTRONICS_TABLE = Topic(
+    'electronics_table',
+    'std_msgs/msg/Float64MultiArray',
+    Delivery.LATCHED,
+    0.0,
+    'for the law in the electronics: current (A), normal force (N) of each point; first the offset current '
+    'and 0 N, then the table; empty while mount_control is not active',
+    writers=('mount_control',),
+)
+
+ELECTRONICS_SETPOINT = Topic(
+    'electronics_setpoint',
+    JOINT_STATE,
+    Delivery.STREAM,
+    0.0,
+    'setpoint by the law in the electronics; its stamp is that of the displacement sample that it answers',
+    (Scalar('coil_current', 'A'), Scalar('table_loaded', '1')),
+    writers=('mount_driver',),
+)
+
 DIAGNOSTICS = Topic(
     '/diagnostics',
     'diagnostic_msgs/msg/DiagnosticArray',
@@ -254,6 +274,9 @@ TOPICS: tuple[Topic, ...] = (
 )
 """What the graph publishes and its recorder takes."""
 
+SHADOW_TOPICS: tuple[Topic, ...] = (ELECTRONICS_TABLE, ELECTRONICS_SETPOINT)
+"""The same where the electronics compute the law themselves (parameter `shadow`)."""
+
 RACK_TOPICS: tuple[Topic, ...] = (SIM_CLAMP_FORCE,)
 """What no node publishes: only recordings of experiments on a simulated rack have it."""
 
@@ -266,7 +289,7 @@ def control_trace(names: Iterable[str]) -> Topic:
 
 def topic(name: str) -> Topic:
     """Return the topic of the graph of this relative name, or raise `KeyError` with the known names."""
-    for candidate in TOPICS:
-        if candidate.name == name:
-            return candidate
-    raise KeyError(f'{name!r} is no topic of the graph; {nearest(name, [t.name for t in TOPICS])}')
+    known = {candidate.name: candidate for candidate in TOPICS + SHADOW_TOPICS}
+    if name in known:
+        return known[name]
+    raise KeyError(f'{name!r} is no topic of the graph; {nearest(name, known)}')

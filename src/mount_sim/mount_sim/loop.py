@@ -17,6 +17,7 @@ from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import status_every
 from mount_sim.electronics.vehicle_bus import sent_every
 from mount_sim.plant.simulated_car import BeyondRange, SimulatedMount
+from mount_sim.quantisation import quantised_displacement, quantised_setpoint_current
 
 _REMEMBERED = 1024  # samples whose sending time is kept
 _NS = 1000  # ns per us
@@ -125,6 +126,16 @@ class ElectronicsLoop:
                 self._counted, microseconds, reading, enabled=mount.driver_on, unheard=not mount.enabled
             )
         ]
+        if (law := self._can_end.law) is not None:
+            (current, late), own = taken, []
+            if received is not None and current is not None and received.setpoint.enable:
+                own += law.take_answer(self._counted - 1 - late)
+                current = min(current, quantised_setpoint_current(law.current))  # NaN lowers nothing
+            elif current is not None or not mount.enabled:
+                law.stop()
+            displacement = quantised_displacement(reading.displacement)
+            own.append(law.take_sample(self._counted, microseconds * _NS, displacement))
+            taken, frames = (current, late), [*frames, *map(self._can_end.own_frame, own)]
         if number % self._status_every == 0:
             frames.append(self._can_end.status_frame(mount.faults.through('status', self._status())))
         if self._speed is not None and number % self._speed_every == 0:

@@ -28,6 +28,7 @@ from mount_ros.private_rclpy import given_at_start
 from mount_sim.diagnosis import Counted, counted, verdict
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.faults import injected_faults
+from mount_sim.electronics.own_law import OwnLaw
 from mount_sim.electronics.vehicle_bus import speed_frame
 from mount_sim.excitation.building import build_excitation
 from mount_sim.loop import CarLoop, ElectronicsLoop, NoAnswerError
@@ -37,6 +38,7 @@ from mount_sim.plant.simulated_car import DivergedError, SimulatedCar
 
 INJECT = 'inject'
 """The parameter whose faults the service `~/inject_fault` begins."""
+_OF_ELECTRONICS = ('channel', 'port', 'controller_library')
 
 
 class MountSim(SafeLifecycleNode):
@@ -67,7 +69,7 @@ class MountSim(SafeLifecycleNode):
                 'virtual, or drive with engine-mount drive --lockstep'
             )
         self._settings = read(self, SimParameters())
-        other = {name: self.get_parameter(name).value for name in ('channel', 'port', *self._own)}
+        other = {name: self.get_parameter(name).value for name in (*_OF_ELECTRONICS, *self._own)}
         self._values = flattened(self._settings) | other
         self._names = mount_names(self._settings.mounts) or (ALONE,)
         with log_compilation(self.get_logger().info):
@@ -86,7 +88,8 @@ class MountSim(SafeLifecycleNode):
         self._loops = {}
         for name, mount in self._mounts.items():
             own = values_of_mount(self._values, name)
-            can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate)
+            law = OwnLaw(own['controller_library'], rate) if own['controller_library'] else None
+            can_end = CanEnd(open_bus(interface, own['channel'], port=own['port']), rate, law)
             self._can_ends.append(can_end)
             speed = speed_frame(idle.frequency) if (idle := self._settings.idle).speed_sent else None
             self._loops[name] = ElectronicsLoop(mount, can_end, partial(self._publish, name), speed)

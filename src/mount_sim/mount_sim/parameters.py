@@ -82,6 +82,10 @@ class NodeParameters(NamedTuple):
         float,
         Quantity('s', 'lock-step: longest wait for the answer to a sample; the first may take any time', 0.0),
     ] = 10.0
+    controller_library: Annotated[
+        str,
+        Quantity('path', 'shared library of the law in C, computed by the electronics too; empty: none'),
+    ] = ''
     inject: Annotated[
         str,
         Quantity('faults', 'faults that ~/inject_fault begins, as in coil_open; several with commas between'),

@@ -26,7 +26,7 @@ from mount_recorder.node import NAME, MountRecorder
 from mount_recorder.parameters import RecorderParameters
 from mount_ros.environment import loopback_refusal
 from mount_ros.nodes.process import ros_context, transition
-from mount_ros.topics import EVENT, TOPICS, topic
+from mount_ros.topics import EVENT, SHADOW_TOPICS, TOPICS, topic
 
 _MARKS = b'm '
 
@@ -137,9 +137,9 @@ def record(
 
 def chosen_topics(names: Sequence[str]) -> list[str]:
     """Return the registered names, all if none are given, with `event`, which holds the marks."""
+    full = {entry.name.strip('/'): entry.name for entry in TOPICS + SHADOW_TOPICS}
     if not names:
-        return [entry.name for entry in TOPICS]
-    full = {entry.name.strip('/'): entry.name for entry in TOPICS}
+        return list(full.values())
     wanted = [full.get(name.strip('/'), name) for name in names]
     for name in wanted:
         try:

@@ -23,7 +23,7 @@ from mount_recorder.versions import versions
 
 NAME = 'engine_mount_controller'
 SELF_TEST_SAMPLES = 2000  # chosen: gaps, a change of the law and displacements out of range are among them
-_WITHOUT_EFFECT = {'displacement_velocity', 'displacement_noise', 'displacement_stuck'}  # of `plausibility`
+_WITHOUT_EFFECT = {'displacement_velocity', 'displacement_noise', 'displacement_stuck', 'shadow'}
 _TABLE_PLACES = int(HIGHEST_NORMAL_FORCE / FORCE_STEP)
 _TEST_FORCES = (0.0, 20.0, 60.0, 120.0, 250.0)  # N, chosen
 _TEST_SHARES = (0.1, 0.3, 0.5, 0.8, 1.0)  # chosen, of the highest current

@@ -15,7 +15,7 @@ from rosbags.rosbag2.metadata import parse_qos
 from engine_mount.recordings.mcap_records import StoredTopic
 from mount_models.plain_yaml import YamlError, plain_yaml
 from mount_recorder.metadata import ROOT, Offers
-from mount_ros.topics import RACK_TOPICS, TOPICS, Topic
+from mount_ros.topics import RACK_TOPICS, SHADOW_TOPICS, TOPICS, Topic
 
 T = TypeVar('T')
 
@@ -31,7 +31,7 @@ def registered_topic(name: str, type_name: str) -> Topic | None:
 
     A topic of another type than `type_name` is a foreign one, whatever its name.
     """
-    known = TOPICS + RACK_TOPICS
+    known = TOPICS + SHADOW_TOPICS + RACK_TOPICS
     fitting = [topic for topic in known if f'/{name}'.endswith('/' + topic.name.lstrip('/'))]
     found = max(fitting, key=lambda topic: len(topic.name), default=None)
     return found if found is not None and found.type == type_name else None

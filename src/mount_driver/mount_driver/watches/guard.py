@@ -49,6 +49,7 @@ class Guard:
         self._health = StatusWatch(parameters.status)
         self._samples = SenderWatch(codec.measurement.name, _ALONE)
         self._statuses = SenderWatch(codec.status.name, _ALONE)
+        self._own_setpoints = SenderWatch(codec.own_setpoint.name, _ALONE)
         self._sent_last = 0.0  # A
         self._heating_since: int | None = None  # stamp from which the squares of the current are summed
         self._squares, self._summed = 0.0, 0
@@ -98,6 +99,11 @@ class Guard:
         link = self._link
         strangers = link.samples.strangers + link.contradictions
         sentence = self._samples.judge(strangers, self._clock.now(received))
+        return Fault(sentence) if sentence else None
+
+    def judge_own_setpoint(self, now: int) -> Fault | None:
+        """Return what follows from a frame with a setpoint of the electronics' own law."""
+        sentence = self._own_setpoints.judge(self._link.own_setpoints.strangers, now)
         return Fault(sentence) if sentence else None
 
     def judge_status(self, status: Status | None, now: int) -> Fault | None:

@@ -5,6 +5,7 @@ Row-major, shape (2, N). Dimension 0: label `rows: current (A), normal_force (N)
 """
 
 import re
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from mount_models.sampling import HIGHEST_CURRENT
 from mount_ros.messages.cdr import CdrWriter, deserialise
 from mount_ros.messages.scalars import MessageError
-from mount_ros.topics import CURRENT_FORCE_TABLE
+from mount_ros.topics import CURRENT_FORCE_TABLE, ELECTRONICS_TABLE
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -60,6 +61,18 @@ def from_message(message: Any) -> ForceTable:
 def from_bytes(raw: bytes) -> ForceTable:
     """Like `from_message`, from the serialised message that a data path hands over."""
     return from_message(deserialise(raw, CURRENT_FORCE_TABLE.type))
+
+
+def law_table_message(points: Sequence[tuple[float, float]]) -> bytes:
+    """Return the serialised `electronics_table` of points (A, N)."""
+    numbers = [number for point in points for number in point]
+    return CdrWriter().numbers('I', 0, 0).sequence('d', numbers).raw
+
+
+def law_table_points(raw: bytes) -> list[tuple[float, float]]:
+    """Return the points (A, N) of a serialised `electronics_table`; a `ValueError` for an odd count."""
+    numbers = deserialise(raw, ELECTRONICS_TABLE.type).data
+    return list(zip(numbers[::2], numbers[1::2], strict=True))
 
 
 def _check(rows: FloatArray) -> None:

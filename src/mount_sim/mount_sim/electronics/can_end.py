@@ -9,10 +9,19 @@ from typing import NamedTuple
 
 from mount_driver.bus import Frame, Reception, may_have_frames
 from mount_driver.can_library import can
-from mount_driver.protocol import AliveCounter, E2EReceiver, Measurement, MountCodec, Setpoint, Status
+from mount_driver.protocol import (
+    AliveCounter,
+    E2EReceiver,
+    Measurement,
+    MountCodec,
+    OwnSetpoint,
+    Setpoint,
+    Status,
+)
 from mount_driver.watches.message_watches import SenderWatch
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Reading
+from mount_sim.electronics.own_law import OwnLaw
 
 _COUNTER_MASK = 0xFFFF
 _MICROSECOND_MASK = 0xFFFFFFFF
@@ -38,9 +47,10 @@ class ReceivedSetpoint(NamedTuple):
 
 
 class CanEnd:
-    """Electronics' side of `mount.dbc` on an open bus."""
+    """Electronics' side of `mount.dbc` on an open bus; a `law` of their own gets its table from there."""
 
-    def __init__(self, bus: can.BusABC, sample_rate: float = SAMPLE_RATE):
+    def __init__(self, bus: can.BusABC, sample_rate: float = SAMPLE_RATE, law: OwnLaw | None = None):
+        self.law = law
         self._sample_time = sample_time_ns(sample_rate)
         self._bus = bus
         self._reception = Reception()
@@ -51,6 +61,9 @@ class CanEnd:
         """Count frames from 0, those that come too, as electronics do that were without power."""
         self._measurement_alive = AliveCounter()
         self._status_alive = AliveCounter()
+        self._own_alive, self._points = AliveCounter(), E2EReceiver(self._codec.table_point)
+        if self.law is not None:
+            self.law.forget()
         self._receiver: E2EReceiver[Setpoint] = E2EReceiver(self._codec.setpoint)
         self._hosts = SenderWatch(self._codec.setpoint.name, 'one host only may send it')
         self._now = 0  # ns, by the samples
@@ -94,6 +107,11 @@ class CanEnd:
         data = self._codec.encode_status(status, self._status_alive.next())
         return Frame(self._codec.status.frame_id, data)
 
+    def own_frame(self, setpoint: OwnSetpoint) -> can.Message:
+        """Return the frame of a setpoint of the electronics' own law."""
+        layout = self._codec.own_setpoint
+        return Frame(layout.frame_id, layout.pack((0, self._own_alive.next(), *setpoint)))
+
     def send_frame(self, frame: can.Message) -> None:
         """Send a frame as it is."""
         self._bus.send(frame)
@@ -129,6 +147,10 @@ class CanEnd:
         self._bus.shutdown()
 
     def _setpoint_in(self, frame: can.Message) -> ReceivedSetpoint | None:
+        if frame.arbitration_id == self._codec.table_point.frame_id and self.law is not None:
+            point = self._points.receive(frame.data)
+            if point is not None:
+                self.send_frame(self.own_frame(self.law.take_point(point)))
         if frame.arbitration_id != self._codec.setpoint.frame_id:
             return None
         setpoint = self._receiver.receive(frame.data)
