@@ -24,7 +24,7 @@ def drive(command, tmp_path):
             options += [f'--set={node}.shadow=true' for node in nodes]
             options += [f'--set=mount_sim.controller_library={library}']
         result = command.drive(*options)
-        assert result.code == 0, result.output
+        assert result.code == bool(values), result.output
         return engine_mount.open(result.folder / 'recording')
 
     return driven
@@ -48,7 +48,7 @@ def test_the_law_in_the_electronics_drives_as_mount_control_does_to_the_bit(driv
 
 
 def test_a_coefficient_of_the_law_in_the_electronics_that_differs_is_reported(drive):
-    recording = drive({'continuous_viscous.damping_coefficient': 2500.0000000000005})
+    recording = drive({'continuous_viscous.damping_coefficient': 3200.0000000000005})
     own, host = recording['electronics_setpoint'], recording['control_trace']
     running = np.isfinite(own['coil_current'])
     different = np.flatnonzero(own['coil_current'][running] != host['current'])

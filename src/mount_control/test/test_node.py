@@ -69,10 +69,13 @@ class Surroundings:
         self.path.subscribe(
             topics.EVENT, lambda raw: self.events.append(deserialize_message(raw, String).data)
         )
-        self._electronics = self.path.publisher(topics.ELECTRONICS_SETPOINT)
-        self.law_tables = []
-        self.path.subscribe(topics.ELECTRONICS_TABLE, self._load_law_table)
         self.path.start()
+
+    def add_law(self):
+        """Play the part of electronics with a law of their own, too."""
+        self.law_tables = []
+        self._electronics = self.path.publisher(topics.ELECTRONICS_SETPOINT)
+        self.path.subscribe(topics.ELECTRONICS_TABLE, self._load_law_table)
 
     def _load_law_table(self, raw):
         self.law_tables.append(law_table_points(raw))
@@ -519,13 +522,10 @@ def test_what_cannot_be_set_is_refused_with_the_reason_and_changes_nothing(
 
 
 @pytest.fixture
-def shadow(make_control, around):
+def shadow(active, around):
     """A controller beside electronics of a law of their own, which have loaded its table."""
-    control = make_control(shadow=True)
-    assert control.trigger_configure() == SUCCESS
-    wait_until(lambda: not (around.path.unmatched() or control.data_path.unmatched()), 'matched')
-    around.initialise()
-    assert control.trigger_activate() == SUCCESS
+    around.add_law()
+    control = active(shadow=True)
     currents, forces, offset = TABLE_ROWS
     assert around.law_tables == [[(offset, 0.0), *zip(currents, forces, strict=True)]]
     return control
@@ -569,12 +569,11 @@ def test_missing_setpoints_of_the_electronics_are_reported(shadow, around):
     assert verdict.figures['shadow_missing'] == 4
 
 
-def test_without_a_table_in_the_electronics_there_is_no_activation(make_control, around, monkeypatch):
+def test_without_a_table_in_the_electronics_there_is_no_activation(configured, around, monkeypatch):
     monkeypatch.setattr('mount_control.node._LOADING', 0.1)
     monkeypatch.setattr(around, 'send_electronics', lambda *arguments, **options: None)
-    control = make_control(shadow=True)
-    assert control.trigger_configure() == SUCCESS
-    wait_until(lambda: not (around.path.unmatched() or control.data_path.unmatched()), 'matched')
+    around.add_law()
+    control = configured(shadow=True)
     around.initialise()
     assert control.trigger_activate() == FAILURE
     assert control.sentence.startswith('the electronics have not loaded the table of their law within 0.1 s')

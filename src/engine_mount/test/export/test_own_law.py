@@ -67,7 +67,7 @@ def test_the_law_begins_afresh_with_the_first_sample_that_the_host_answers(law, 
         currents, _ = core.run(stamps, sway[first : first + 150])
         assert [frame.current for frame in frames] == currents.tolist()
         assert [frame.answered_counter for frame in frames] == list(range(first, first + 150))
-        assert currents.max() > 1.0
+        assert currents.max() > 0.9
 
 
 @pytest.mark.parametrize('text', ['no_library.so', __file__])
