@@ -16,6 +16,7 @@ from mount_ros.topics import (
     DIAGNOSTICS,
     RACK_TOPICS,
     SESSION,
+    SHADOW_TOPICS,
     TOPICS,
     Delivery,
 )
@@ -30,7 +31,14 @@ MAY_CREATE_ENDS = {  # files that may open a publisher or a subscription themsel
 }
 
 
-@pytest.mark.parametrize(('heading', 'registry'), [('Topics', TOPICS), ('Topics of the rack', RACK_TOPICS)])
+@pytest.mark.parametrize(
+    ('heading', 'registry'),
+    [
+        ('Topics', TOPICS),
+        ('Topics of the law in the electronics', SHADOW_TOPICS),
+        ('Topics of the rack', RACK_TOPICS),
+    ],
+)
 def test_interface_lists_every_topic_and_no_other(heading, registry):
     listed = {row['topic']: row for row in table(heading)}
     assert set(listed) == {topic.name for topic in registry}
@@ -61,7 +69,7 @@ def test_interface_tells_the_depth_of_each_delivery():
 
 
 def test_interface_names_publishers_and_subscribers_as_the_nodes_have_them():
-    for row in table('Topics'):
+    for row in table('Topics') + table('Topics of the law in the electronics'):
         name = row['topic']
         if name in (DIAGNOSTICS.name, SESSION.name):
             continue  # of every node; of the supervisor
