@@ -65,8 +65,9 @@ class OwnLaw:
     def take_answer(self, number: int) -> Iterator[OwnSetpoint]:
         """Start with sample `number`, which the host has answered, where the law rests; yield its frames."""
         if self._loaded and not self._running:
-            self._running = self._start()
-            yield from (self._answer(*sample) for sample in self._past if sample[0] >= number)
+            self._running, newest = self._start(), self._past[-1][0]
+            # Older numbers may be greater: those from before a restart of the counters.
+            yield from (self._answer(*sample) for sample in self._past if number <= sample[0] <= newest)
 
     def take_sample(self, number: int, stamp: int, displacement: float) -> OwnSetpoint:
         """Take a sample as the bus carries it (ns, m; NaN: not valid); return its frame."""
