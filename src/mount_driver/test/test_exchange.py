@@ -126,7 +126,7 @@ def lawful(make):
     exchange, far = make(lockstep=True, threaded=False, shadow=True)
     taken, alive, layout = [], AliveCounter(), CODEC.table_point
     exchange._on_own_setpoint = lambda *own: taken.append(own)
-    bus = open_bus('virtual', exchange._parameters.channel)
+    bus = open_bus('virtual', far.bus.channel_id)
     polled(exchange, far, sample(7))
 
     def points():

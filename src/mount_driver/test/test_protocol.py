@@ -156,8 +156,10 @@ def test_the_dbc_is_can_fd_complete_and_says_what_every_signal_means():
         ('MountMeasurement', 0x210, 24, 1),
         ('MountSetpoint', 0x211, 8, 1),
         ('MountStatus', 0x212, 8, 100),
+        ('MountOwnSetpoint', 0x213, 20, 1),
+        ('MountLawTable', 0x214, 32, 1),
     ]
-    assert len({message.dbc.attributes['E2EDataId'].value for message in DATABASE.messages}) == 3
+    assert len({message.dbc.attributes['E2EDataId'].value for message in DATABASE.messages}) == 5
     for message in DATABASE.messages:
         assert message.is_fd
         assert message.comment
