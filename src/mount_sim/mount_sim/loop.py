@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from mount_driver.protocol import Status
+from mount_driver.can_messages import Status
 from mount_ros.timing import LatencyHistogram
 from mount_sim.electronics.can_end import CanEnd, ReceivedSetpoint
 from mount_sim.electronics.electronics import status_every

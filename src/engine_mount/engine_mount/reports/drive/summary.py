@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from engine_mount.reports.drive.evaluation import error_text, tracking_error
 from engine_mount.reports.drive.felt import ACCELERATIONS, BANDS, felt_beside, value_text
 from engine_mount.reports.drive.signals import DriveSignals, excitation_stamp
 from engine_mount.settings.chosen import Parameters, policy_of
-from mount_bringup.graph.recovery import Restart
 from mount_sim.plant.mounts import seat_of, without_friction
+
+if TYPE_CHECKING:
+    from mount_bringup.graph.recovery import Restart  # ROS, which a drive in core does without
 
 Figures = dict[str, Any]
 
@@ -144,7 +146,7 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
 
-def _restart(restart: Restart, zero: int) -> Figures:
+def _restart(restart: 'Restart', zero: int) -> Figures:
     return {
         'time_s': (restart.time - zero) / 1e9,
         'nodes': [node.name for node in restart.nodes],
