@@ -44,8 +44,9 @@ test: $(VENV)/.ready-dev ## pass the tests that take 5 minutes on two cores
 test-all: test ## pass these and all others, which take 10 minutes more
 	@$(call pass_tests,slow)
 
-test-arm64: $(VENV)/.ready-dev ## compare the law in C on an emulated aarch64 with Python
+test-arm64: $(VENV)/.ready-dev ## compare the law in C, and all that needs no ROS, on an emulated aarch64 with this machine
 	@$(BIN)/python test/targets/law_in_c.py arm64
+	@$(BIN)/python test/targets/aarch64.py
 
 test-cortex-m: $(VENV)/.ready-dev ## compare the law in C on an emulated Cortex-M7 without a library with Python
 	@$(BIN)/python test/targets/law_in_c.py cortex-m

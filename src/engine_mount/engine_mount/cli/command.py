@@ -151,8 +151,8 @@ def main(arguments: list[str] | None = None) -> None:
         if error.name != 'rclpy':
             raise
         refuse(
-            'a running graph needs ROS 2 (rclpy), which is not installed; source a ROS 2 Jazzy installation, '
-            'or on x86-64 make setup; drive --core, replay, audit and report need none'
+            'a running graph needs ROS 2 (rclpy), which is not installed; source a ROS 2 Jazzy installation '
+            'or, on x86-64, call make setup; drive --core, replay, audit and report need none'
         )
         code = 2
     except (ValueError, GraphError, OSError) as error:
