@@ -174,10 +174,8 @@ def differing_numbers(name: str, a: np.ndarray, b: np.ndarray) -> list[str]:
     places = np.flatnonzero(a.view(np.uint64) != b.view(np.uint64))
     if not places.size:
         return []
-    first = places[0]
-    return [
-        f'{name}: {places.size} of {a.size} numbers differ, first number {first}: {a[first]!r}, {b[first]!r}'
-    ]
+    values = ', '.join(repr(each[places[0]].item()) for each in (a, b))
+    return [f'{name}: {places.size} of {a.size} numbers differ, first number {places[0]}: {values}']
 
 
 if __name__ == '__main__':
