@@ -24,7 +24,7 @@ SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test test-all test-arm64 test-cortex-m check faults experiments identify pages bench lint format setup setup-desk setup-dev clean
+.PHONY: help drive test test-all test-arm64 test-cortex-m check faults experiments identify pages bench lint format setup-core setup setup-desk setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -42,8 +42,9 @@ test: $(VENV)/.ready-dev ## pass the tests that take 5 minutes on two cores
 test-all: test ## pass these and all others, which take 10 minutes more
 	@$(call pass_tests,slow)
 
-test-arm64: $(VENV)/.ready-dev ## compare the law in C on an emulated aarch64 with Python
+test-arm64: $(VENV)/.ready-dev ## compare the law in C, and all that needs no ROS, on an emulated aarch64 with this machine
 	@$(BIN)/python test/targets/law_in_c.py arm64
+	@$(BIN)/python test/targets/aarch64.py
 
 test-cortex-m: $(VENV)/.ready-dev ## compare the law in C on an emulated Cortex-M7 without a library with Python
 	@$(BIN)/python test/targets/law_in_c.py cortex-m
@@ -67,7 +68,7 @@ identify: $(VENV)/.ready ## calibrate and identify on the simulated rack; writes
 pages: $(VENV)/.ready-dev ## write the pages of docs/reference that come from the code, and what the notebooks show
 	@for page in commands_page fleet_columns_page names_page parameters_page signals_page notebooks; do $(BIN)/python test/docs/$$page.py || exit 1; done
 
-bench: $(VENV)/.ready-desk ## performance figures as ratios, side by side in one run
+bench: $(VENV)/.ready $(VENV)/.ready-desk ## performance figures as ratios, side by side in one run
 	@$(BIN)/engine-mount dev bench
 
 lint: $(VENV)/.ready-dev ## style, types
@@ -79,8 +80,9 @@ format: $(VENV)/.ready-dev ## put the sources in shape
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
+setup-core: $(VENV)/.ready-core ## what a desk without ROS needs, as on aarch64: drive --core, replay, audit, report
 setup: $(VENV)/.ready ## what `make drive` needs
-setup-desk: $(VENV)/.ready-desk ## what the fleet, recordings by URI and files of others need besides
+setup-desk: $(VENV)/.ready-desk ## what the fleet, recordings by URI and files of others need besides; without ROS too
 setup-dev: $(VENV)/.ready-dev ## what `make test` needs
 
 clean: ## remove the environment and all that was built
@@ -91,20 +93,24 @@ $(VENV)/.created:
 	@$(PYTHON) -m venv $(VENV) || { echo 'No environment could be made in $(VENV) with $(PYTHON)'; rm -rf $(VENV); exit 1; }
 	@touch $@
 
-$(VENV)/.ready: $(VENV)/.created requirements.txt requirements-car.txt $(wildcard src/*/setup.py)
+$(VENV)/.ready-core: $(VENV)/.created requirements-core.txt $(wildcard src/*/setup.py)
 	@echo 'Setting up (once, about two minutes) ...'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-core.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --use-pep517 \
 		$(foreach package,$(PACKAGES),-e src/$(package))
 	@$(BIN)/engine-mount dev prepare
 	@touch $@
 
-$(VENV)/.ready-desk: $(VENV)/.ready requirements-desk.txt
+$(VENV)/.ready: $(VENV)/.ready-core requirements.txt requirements-car.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+$(VENV)/.ready-desk: $(VENV)/.ready-core requirements-desk.txt
 	@echo 'Setting up fleet, stores and formats (once, about half a minute) ...'
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-desk.txt
 	@touch $@
 
-$(VENV)/.ready-dev: $(VENV)/.ready-desk requirements-dev.txt
+$(VENV)/.ready-dev: $(VENV)/.ready $(VENV)/.ready-desk requirements-dev.txt
 	@echo 'Setting up tests and checks (once, about a minute) ...'
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements-dev.txt
 	@touch $@

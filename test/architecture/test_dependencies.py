@@ -34,7 +34,12 @@ def test_a_package_names_what_its_tests_import_besides(package):
 
 
 def test_where_there_is_no_ros_the_requirements_pin_what_the_code_imports_and_nothing_else():
-    assert pinned('requirements-desk.txt') == projects(code_of)
+    assert pinned('requirements.txt') | pinned('requirements-desk.txt') == projects(code_of)
+
+
+def test_a_desk_without_ros_lacks_only_what_has_no_wheels_for_aarch64():
+    assert pinned('requirements.txt') - pinned('requirements-core.txt') == {'autosar-e2e'}
+    assert pinned('requirements-car.txt') - pinned('requirements-core.txt') == {'autosar-e2e'}
 
 
 def test_the_requirements_of_tests_pin_what_tests_import():

@@ -1,4 +1,4 @@
-"""What needs no running graph works where ROS is not installed: drives in core, replays, audits, reports."""
+"""What needs no running graph works without ROS and a bus: drives in core, replays, audits, reports."""
 
 import json
 import subprocess
@@ -11,6 +11,7 @@ import importlib.util, json, sys, time
 
 class Hidden:
     packages = {'rclpy', 'rpyutils', 'launch', 'ament_index_python', 'rcl_interfaces', 'lifecycle_msgs'}
+    packages |= {'e2e'}  # the protection of frames on the bus
     packages |= {'std_msgs', 'sensor_msgs', 'geometry_msgs', 'diagnostic_msgs', 'std_srvs'}
 
     def find_spec(self, name, path=None, target=None):
@@ -36,14 +37,27 @@ print(json.dumps({
     'page': len(engine_mount.report('drive').html),
 }))
 """
+COMMAND = """
+from engine_mount.cli.command import main
+main(sys.argv[1:])
+"""
 
 
 @pytest.fixture
-def without_ros(tmp_path):
+def process_without_ros(tmp_path):
+    def run(code, *arguments):
+        return subprocess.run(
+            [sys.executable, '-P', '-c', HIDDEN + code, *arguments],
+            cwd=tmp_path, capture_output=True, text=True,
+        )  # fmt: skip
+
+    return run
+
+
+@pytest.fixture
+def without_ros(process_without_ros):
     def run(code):
-        done = subprocess.run(
-            [sys.executable, '-P', '-c', HIDDEN + code], cwd=tmp_path, capture_output=True, text=True
-        )
+        done = process_without_ros(code)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout.splitlines()[-1])
 
@@ -55,6 +69,16 @@ def test_a_desk_without_ros_drives_replays_audits_and_reports(without_ros):
     assert (found['samples'], found['held'], found['sound'], found['equal']) == (7000, True, True, False)
     assert found['table'] > 0.0
     assert found['page'] > 10_000
+
+
+def test_the_command_drives_in_core_and_refuses_a_graph_before_it_writes(process_without_ros, tmp_path):
+    options = ('drive', '--scenario', 'bench', '--duration', '0.1', '--out')
+    graph = process_without_ros(COMMAND, *options, 'graph')
+    assert graph.returncode == 2
+    assert 'needs ROS 2 (rclpy), which is not installed' in graph.stderr
+    assert not (tmp_path / 'graph').exists()
+    core = process_without_ros(COMMAND, *options, 'core', '--core')
+    assert core.returncode == 0, core.stderr
 
 
 def test_importing_the_desk_loads_nothing_heavy(without_ros):

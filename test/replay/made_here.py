@@ -1,7 +1,7 @@
 """Run as a process of its own: makes with this processor what must be the same bytes on every other.
 
-Arguments: a new folder, the references, recordings to replay. Prints how the libraries see the
-processor, and whether the recorded answers were met, as JSON.
+Arguments: a new folder, the references, recordings to replay. Prints as JSON what the libraries take the
+processor for, versions, hashes of the laws, and whether the recorded answers were met.
 """
 
 import hashlib
@@ -11,17 +11,28 @@ import platform
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 from numba.core.registry import cpu_target
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from threadpoolctl import threadpool_info
 
+import engine_mount
 from engine_mount.drives.loop.recording import record_core
-from engine_mount.drives.replay import replay
+from engine_mount.export.controller_in_c import built_in_sample, sequence_hash
+from engine_mount.recordings.compare import compare
+from engine_mount.settings.chosen import chosen_control
 from engine_mount.signals.excitation import build_excitation
+from mount_control.controller import ControlLaw, Controller
+from mount_control.policy.registry import POLICIES
+from mount_control.settings import ControlSettings
+from mount_models.arithmetic import elementary
+from mount_models.arithmetic.compiled import compiled
 from mount_models.damper import DAMPERS, damper_curve
 from mount_models.quantity import with_flattened
 from mount_recorder.session import session_text
+from mount_recorder.versions import versions
+from mount_ros.topics import EVENT, SESSION, TOPICS
 from mount_sim.parameters import SimParameters
 
 DRIVE = {
@@ -42,6 +53,8 @@ CONTROLS = {
     'continuous_viscous': {'policy': 'continuous_viscous'},
 }
 """What drives it, by the name of the recording."""
+LAW_SAMPLES = 20_000
+DATA = [topic for topic in TOPICS if topic not in (SESSION, EVENT) and not topic.name.startswith('/')]
 
 
 def make(folder: Path, references: Path, recordings: list[Path]) -> dict[str, bool]:
@@ -53,7 +66,7 @@ def make(folder: Path, references: Path, recordings: list[Path]) -> dict[str, bo
     np.savez(folder / 'numbers.npz', **numbers(folder))
     met = {}
     for each in [*sorted(path for path in references.iterdir() if path.is_dir()), *recordings]:
-        outcome = replay(each, out=folder / 'replays' / each.name)
+        outcome = engine_mount.replay(each, out=folder / 'replays' / each.name)
         met[each.name] = outcome.held
     return met
 
@@ -72,7 +85,50 @@ def numbers(folder: Path) -> dict[str, np.ndarray]:
         name: build_excitation(with_flattened(SimParameters(), {'scenario': name, **values})).values[:]
         for name, values in chosen.items()
     }
-    return {**shaken, **{name: damper_curve(name).table for name in DAMPERS}}
+    curves = {name: damper_curve(name).table for name in DAMPERS}
+    return {**shaken, **curves, **{policy: traces_of(policy) for policy in POLICIES}, **elementary_values()}
+
+
+def traces_of(policy: str) -> np.ndarray:
+    """Return all that a policy traces of the sequence that the law in C has built in."""
+    settings = settings_of(policy)
+    table = settings.table([0.5, 1.5, 3.0], [0.0, 100.0, 250.0], 0.5)
+    samples, random = np.empty(LAW_SAMPLES), 1
+    for n in range(LAW_SAMPLES):
+        random, _, samples[n], _ = built_in_sample(n, random)
+    return Controller(ControlLaw(settings, table)).run(samples)
+
+
+def settings_of(policy: str) -> ControlSettings:
+    return chosen_control({'mount_control': {'policy': policy}})
+
+
+def elementary_values() -> dict[str, np.ndarray]:
+    """Return the elementary functions of as many arguments."""
+    arguments = (np.arange(LAW_SAMPLES) - 0.5 * LAW_SAMPLES) * 3.7e-3
+    functions = {
+        'exp': elementary.exp, 'expm1': elementary.expm1, 'atan': elementary.atan, 'log': elementary.log
+    }  # fmt: skip
+    found = {
+        name: np.array([function(abs(x) if name == 'log' else x) for x in arguments])
+        for name, function in functions.items()
+    }
+    return {**found, 'sine': elementary.sines(arguments), 'cosine': elementary.cosines(arguments)}
+
+
+@compiled
+def sums_of_products(a, b, c):
+    """Return `a * b + c`, which a fused instruction would round once only."""
+    result = np.empty(a.size)
+    for k in range(a.size):
+        result[k] = a[k] * b[k] + c[k]
+    return result
+
+
+def fused(function) -> int:
+    """Return how many products a function of `a * b + c` does not round: 0 without fused instructions."""
+    a = 1.0 + np.arange(LAW_SAMPLES) / 7.0
+    return int(np.count_nonzero(function(a, a, -(a * a))))
 
 
 def seen_by_libraries() -> dict[str, object]:
@@ -88,7 +144,50 @@ def seen_by_libraries() -> dict[str, object]:
     }
 
 
+def differences_of(here: Path, there: Path, paths: list[str]) -> list[str]:
+    """Return which topics of recordings and which numbers are other bytes in the second folder, and where."""
+    told = []
+    for path in paths:
+        a, b = engine_mount.open(here / path), engine_mount.open(there / path)
+        names = [topic for topic in DATA if topic.name in a]
+        changed = [topic for topic in names if payloads(a, topic) != payloads(b, topic)]
+        if changed:
+            words = compare(a, b, topics=changed).difference_sentences()
+            told.append(f'{path}, {", ".join(topic.name for topic in changed)}: {"; ".join(words)}')
+    for file in sorted(here.rglob('numbers.npz')):
+        a, b = np.load(file), np.load(there / file.relative_to(here))
+        told += [text for name in a for text in differing_numbers(name, a[name], b[name])]
+    return told
+
+
+def payloads(recording, topic) -> list[bytes]:
+    return [bytes(payload) for payload in recording[topic.name].payloads]
+
+
+def differing_numbers(name: str, a: np.ndarray, b: np.ndarray) -> list[str]:
+    """Return the first difference of two arrays, or of each of their fields, in words."""
+    if a.dtype.names:
+        return [
+            text for each in a.dtype.names for text in differing_numbers(f'{name}.{each}', a[each], b[each])
+        ]
+    a, b = np.ascontiguousarray(a).ravel(), np.ascontiguousarray(b).ravel()
+    places = np.flatnonzero(a.view(np.uint64) != b.view(np.uint64))
+    if not places.size:
+        return []
+    values = ', '.join(repr(each[places[0]].item()) for each in (a, b))
+    return [f'{name}: {places.size} of {a.size} numbers differ, first number {places[0]}: {values}']
+
+
 if __name__ == '__main__':
     target, reference_folder, *replayed = map(Path, sys.argv[1:])
     result = make(target, reference_folder, replayed)
-    print(json.dumps({'met': result, 'seen': seen_by_libraries()}))
+    fast = numba.njit(fastmath=True)(sums_of_products.py_func)
+    said = {
+        'met': result,
+        'seen': seen_by_libraries(),
+        'versions': versions(),
+        'laws': {policy: f'{sequence_hash(settings_of(policy), LAW_SAMPLES):016x}' for policy in POLICIES},
+        'fused': fused(sums_of_products),
+        'fused_if_permitted': fused(fast),
+    }
+    print(json.dumps(said))

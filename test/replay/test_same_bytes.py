@@ -13,19 +13,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 from references import REFERENCES, REFERENCES_FOLDER
 
-import engine_mount
-from engine_mount.recordings.compare import compare
-from mount_ros.topics import EVENT, SESSION, TOPICS
-
-from .made_here import CONTROLS
+from .made_here import CONTROLS, differences_of
 
 LIMIT = 600.0  # s: only a hang takes so long; the first time a process compiles the laws for its processor
-DATA = [topic for topic in TOPICS if topic not in (SESSION, EVENT) and not topic.name.startswith('/')]
+RECORDINGS = [*CONTROLS, *(f'replays/{folder.name}/recording' for folder in REFERENCES)]
 
 NO_FEATURES = ' '.join(feature for feature in __cpu_dispatch__ if __cpu_features__[feature])
 BASELINE = 'Prescott, nothing but the baseline'
@@ -60,24 +55,6 @@ def made(folder: Path, emulation: dict[str, str], *recording: Path) -> dict[str,
     return json.loads(process.stdout.splitlines()[-1])
 
 
-def differences_of(here: Path, there: Path) -> list[str]:
-    """Return which topics and numbers are other bytes in the second folder, and by how much."""
-    told = []
-    for path in (*CONTROLS, *(f'replays/{folder.name}/recording' for folder in REFERENCES)):
-        a, b = engine_mount.open(here / path), engine_mount.open(there / path)
-        changed = [topic for topic in DATA if topic.name in a and payloads(a, topic) != payloads(b, topic)]
-        if changed:
-            words = compare(a, b, topics=changed).difference_sentences()
-            told.append(f'{path}, {", ".join(topic.name for topic in changed)}: {"; ".join(words)}')
-    a, b = np.load(here / 'numbers.npz'), np.load(there / 'numbers.npz')
-    distances = {name: np.abs(a[name] - b[name]) for name in a if a[name].tobytes() != b[name].tobytes()}
-    return told + [f'{name}: up to {np.max(distance):.3g} apart' for name, distance in distances.items()]
-
-
-def payloads(recording, topic) -> list[bytes]:
-    return [bytes(payload) for payload in recording[topic.name].payloads]
-
-
 def unmet(said: dict[str, Any]) -> list[str]:
     return [f'the replay of {name} is not what was recorded' for name, met in said['met'].items() if not met]
 
@@ -88,7 +65,7 @@ def test_every_processor_makes_and_repeats_the_same_bytes(tmp_path, names):
     told, seen = unmet(plain), {}
     for name, emulation in ((name, EMULATED[name]) for name in names):
         said = made(tmp_path / name, emulation, *(tmp_path / 'plain' / each for each in CONTROLS))
-        found = [*differences_of(tmp_path / 'plain', tmp_path / name), *unmet(said)]
+        found = [*differences_of(tmp_path / 'plain', tmp_path / name, RECORDINGS), *unmet(said)]
         told += [f'{name}: {text}' for text in found]
         seen[name] = said['seen']
     assert not told, '\n'.join(told)

@@ -12,10 +12,11 @@ from dataclasses import replace
 
 from mount_driver.bus import CanLinkError, Frame, Reception, may_have_frames, open_bus
 from mount_driver.can_library import can
+from mount_driver.can_messages import Setpoint, table_crc
 from mount_driver.clock import Clock
 from mount_driver.link import Counts, Fault, Link, Refusal, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import AliveCounter, MountCodec, Setpoint, table_crc
+from mount_driver.protocol import AliveCounter, MountCodec
 from mount_driver.watches.guard import Guard
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.ripple_law import RippleLaw

@@ -12,16 +12,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from mount_driver.can_messages import Measurement, OwnSetpoint, Setpoint, Status
 from mount_driver.clock import Clock
-from mount_driver.protocol import (
-    E2EReceiver,
-    Measurement,
-    MountCodec,
-    Outcome,
-    OwnSetpoint,
-    Setpoint,
-    Status,
-)
+from mount_driver.protocol import E2EReceiver, MountCodec, Outcome
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 
 _REMEMBERED = 64  # chosen: samples that a setpoint may name; those older than 20 ms are refused anyway

@@ -144,6 +144,14 @@ def main(arguments: list[str] | None = None) -> None:
         if sentence := _sentence(error):  # else the help of a group was printed
             refuse(sentence)
         code = error.exit_code
+    except ModuleNotFoundError as error:
+        if error.name != 'rclpy':
+            raise
+        refuse(
+            'a running graph needs ROS 2 (rclpy), which is not installed; source a ROS 2 Jazzy installation '
+            'or, on x86-64, call make setup; drive --core, replay, audit and report need none'
+        )
+        code = 2
     except (ValueError, GraphError, OSError) as error:
         refuse(error)
         code = 2 if isinstance(error, _UNUSABLE) and not isinstance(error, StoreAwayError) else 1

@@ -149,6 +149,8 @@ def drive(
         checked = check_drive(_with_file(values, excitation, Path(scratch)), core=core)
     for remark in (*(excitation.notes if excitation else ()), *checked.notes):
         screen.note(remark)
+    if not core:  # loads the middleware; where there is none, nothing is written
+        from engine_mount.drives.graph_drive import drive_graph
     folder = make_run_folder(Path(out) if out is not None else None, scenario)
     values = _with_file(values, excitation, folder.path / FOLDER)
     session = partial(_session, scenario, mode, values, excitation)
@@ -165,8 +167,6 @@ def drive(
         if core:
             figures, complaints = _drive_core(values, checked, folder, session, namespace, screen), []
         else:
-            from engine_mount.drives.graph_drive import drive_graph  # loads the middleware
-
             figures, complaints = drive_graph(settings, checked, folder, session, screen, lockstep=lockstep)
     beyond, first = figures.pop('beyond_range'), figures.pop('first_beyond_range')
     control_faults = figures.pop('control_faults')

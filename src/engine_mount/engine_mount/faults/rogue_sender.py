@@ -20,7 +20,8 @@ from rclpy.node import Node
 from mount_bringup.graph.domain import can_port
 from mount_driver.bus import MULTICAST_GROUP, Frame, open_bus
 from mount_driver.can_library import can
-from mount_driver.protocol import AliveCounter, Measurement, MountCodec, Setpoint
+from mount_driver.can_messages import Measurement, Setpoint
+from mount_driver.protocol import AliveCounter, MountCodec
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME, SAMPLE_TIME_NS
 from mount_ros import topics
 from mount_ros.data_path import DataPath

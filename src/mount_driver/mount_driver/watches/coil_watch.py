@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterable
 from typing import Annotated, NamedTuple
 
-from mount_driver.protocol import Measurement, Setpoint
+from mount_driver.can_messages import Measurement, Setpoint
 from mount_models.quantity import Quantity
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_TIME_NS, SETPOINT_TIMEOUT
 

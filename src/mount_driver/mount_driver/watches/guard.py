@@ -5,10 +5,11 @@ No bus here, and nothing is written to the link: each judgement is returned.
 
 from collections import deque
 
+from mount_driver.can_messages import Setpoint, Status
 from mount_driver.clock import Clock
 from mount_driver.link import Fault, Limits, Link, Stamped
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import MountCodec, Setpoint, Status
+from mount_driver.protocol import MountCodec
 from mount_driver.watches.coil_watch import CoilWatch
 from mount_driver.watches.heat_watch import HeatWatch
 from mount_driver.watches.message_watches import SenderWatch, StatusWatch

@@ -6,7 +6,7 @@ No bus and no clock here: times are ns by the clock that judges ages (`Clock.now
 from collections import deque
 from typing import Annotated, NamedTuple
 
-from mount_driver.protocol import Status
+from mount_driver.can_messages import Status
 from mount_models.quantity import Quantity
 
 _REMEDIES = {

@@ -9,15 +9,8 @@ from typing import NamedTuple
 
 from mount_driver.bus import Frame, Reception, may_have_frames
 from mount_driver.can_library import can
-from mount_driver.protocol import (
-    AliveCounter,
-    E2EReceiver,
-    Measurement,
-    MountCodec,
-    OwnSetpoint,
-    Setpoint,
-    Status,
-)
+from mount_driver.can_messages import Measurement, OwnSetpoint, Setpoint, Status
+from mount_driver.protocol import AliveCounter, E2EReceiver, mount_codec
 from mount_driver.watches.message_watches import SenderWatch
 from mount_models.sampling import SAMPLE_RATE, sample_time_ns
 from mount_sim.electronics.electronics import Reading
@@ -54,7 +47,7 @@ class CanEnd:
         self._sample_time = sample_time_ns(sample_rate)
         self._bus = bus
         self._reception = Reception()
-        self._codec = MountCodec()
+        self._codec = mount_codec()
         self.restart()
 
     def restart(self) -> None:

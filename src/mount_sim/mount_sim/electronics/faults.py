@@ -6,17 +6,19 @@ import zlib
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from mount_driver.bus import Frame
 from mount_driver.can_library import can
-from mount_driver.protocol import MountCodec
 from mount_models.quantity import ParameterError, nearest
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
 from mount_sim.electronics.vehicle_bus import IDENTIFIER as SPEED
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
+
+if TYPE_CHECKING:
+    from mount_driver.protocol import MountCodec
 
 Frames = list[can.Message]
 Change = Callable[['Fault', Any], Any] | None
@@ -107,13 +109,10 @@ _BLOCKING = 1e9  # N/m, chosen: stiffness of what lies between the halves
 
 # Of the bus and the counters.
 
-_CODEC = MountCodec()
 _EVERY = 3  # chosen: of so many samples one has damaged frames
 _REORDERED = 10  # chosen: of so many samples one overtakes the one before
 _REPLAYED = 100  # samples, chosen: age of the frames that are sent again
 _BABBLED = 5  # frames in each sample, chosen: about what a bus of 500 kbit/s and 2 Mbit/s can carry besides
-_OWN = {_CODEC.measurement.frame_id, _CODEC.setpoint.frame_id, _CODEC.status.frame_id, SPEED}
-_FOREIGN = [number for number in range(0x800) if number not in _OWN]
 _SPEED_ABSURD, _SPEED_WRONG = b'\xff\xff', (4 * 1500).to_bytes(2, 'little')  # chosen: 16383 and 1500 rpm
 _LENGTH_LESS = 4  # bytes; CAN FD knows 24 and 20
 _BUS_OFF = 0x40  # error class of a SocketCAN error frame, linux/can/error.h
@@ -121,6 +120,18 @@ _ERROR_BYTES = 8
 _CLOCK_DRIFT = 1000e-6  # 1; the driver follows a quartz of at most 500 ppm
 _WIDTH_SAMPLE, _WIDTH_MICROSECOND = 1 << 16, 1 << 32
 _US = 1e6  # us per s
+
+
+def _codec() -> 'MountCodec':
+    from mount_driver.protocol import mount_codec  # a run in core needs neither frames nor their protection
+
+    return mount_codec()  # the electronics have loaded it, so no sample waits for it
+
+
+@cache
+def _foreign_identifiers() -> list[int]:
+    own = {SPEED, *(each.frame_id for each in (_codec().measurement, _codec().setpoint, _codec().status))}
+    return [number for number in range(0x800) if number not in own]
 
 
 def _bus_off(fault, frames):
@@ -165,10 +176,11 @@ def _reordered(fault, frames):
 
 def _frozen_counter(fault, frames):
     """Give all measurements the same alive counter, with a check sum that is right."""
+    codec = _codec()
     for frame in frames:
-        if frame.arbitration_id == _CODEC.measurement.frame_id:
-            alive, measurement = _CODEC.measurement.decode(frame.data)
-            frame.data = _CODEC.encode_measurement(measurement, int(fault.keep(alive)))
+        if frame.arbitration_id == codec.measurement.frame_id:
+            alive, measurement = codec.measurement.decode(frame.data)
+            frame.data = codec.encode_measurement(measurement, int(fault.keep(alive)))
     return frames
 
 
@@ -203,9 +215,11 @@ def _replayed(fault, frames):
 
 def _babbling(fault, frames):
     """Add frames of another node, with identifiers that are none of this mount's."""
-    numbers = fault.random.uniform(_BABBLED)
-    foreign = (Frame(_FOREIGN[int(number * len(_FOREIGN))], number.tobytes()) for number in numbers)
-    return [*frames, *foreign]
+    foreign, numbers = _foreign_identifiers(), fault.random.uniform(_BABBLED)
+    return [
+        *frames,
+        *(Frame(foreign[int(number * len(foreign))], number.tobytes()) for number in numbers),
+    ]
 
 
 def _speed(sent):

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Iterator
 from math import nan
 
-from mount_driver.protocol import OwnSetpoint, TablePoint, table_crc
+from mount_driver.can_messages import OwnSetpoint, TablePoint, table_crc
 from mount_models.quantity import ParameterError
 from mount_models.sampling import SETPOINT_TIMEOUT
 

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +21,11 @@ from engine_mount.reports.sections.subject import Subject
 from engine_mount.settings.chosen import Parameters
 from engine_mount.settings.options import mounts_of
 from engine_mount.settings.run_folder import RunFolder, write_json
-from mount_bringup.graph.recovery import Restart
 from mount_recorder.folders import recordings_of
 from mount_sim.plant.mounts import without_friction
+
+if TYPE_CHECKING:
+    from mount_bringup.graph.recovery import Restart  # ROS, which a drive in core does without
 
 Figures = dict[str, Any]
 
@@ -189,7 +191,7 @@ def summary_table(figures: Figures, found: Losses, mount: str = '') -> Table:
     return Table(f'{mount}{figures["scenario"]}, {figures["mode"]}', 'll', rows)
 
 
-def _restart(restart: Restart, zero: int) -> Figures:
+def _restart(restart: 'Restart', zero: int) -> Figures:
     return {
         'time_s': (restart.time - zero) / 1e9,
         'nodes': [node.name for node in restart.nodes],
