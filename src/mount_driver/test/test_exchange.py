@@ -15,11 +15,12 @@ from ros_testing import LIMIT, wait_until
 from mount_driver import exchange as exchange_module
 from mount_driver.bus import open_bus
 from mount_driver.can_library import can
+from mount_driver.can_messages import Setpoint, TablePoint, table_crc
 from mount_driver.clock import CounterClock, ElectronicsClock
 from mount_driver.exchange import Exchange
 from mount_driver.link import Refusal
 from mount_driver.parameters import DriverParameters
-from mount_driver.protocol import AliveCounter, Setpoint, TablePoint, table_crc
+from mount_driver.protocol import AliveCounter
 
 OFF = Setpoint(0.0, 0xFFFF, False)
 RAISED = [can.CanOperationError('no buffer'), OSError('gone'), ValueError('what?'), KeyboardInterrupt()]

@@ -9,7 +9,8 @@ from c_controller import CController, built, exported
 from simulated_mounts import make_mount
 
 from mount_driver.can_library import can
-from mount_driver.protocol import AliveCounter, MountCodec, Setpoint, TablePoint, table_crc
+from mount_driver.can_messages import Setpoint, TablePoint, table_crc
+from mount_driver.protocol import AliveCounter, MountCodec
 from mount_models.quantity import ParameterError
 from mount_sim.electronics.can_end import CanEnd
 from mount_sim.electronics.own_law import OwnLaw
