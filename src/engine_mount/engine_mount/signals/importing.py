@@ -76,18 +76,21 @@ def import_file(
     parts, cuts = _parts_of(selection.signals)
     own = (note for signal in selection.signals.values() for note in signal.notes)
     notes = [*selection.notes, *own, *cuts]
+    selection = selection._replace(signals={})  # else an hour is held to the end
     shift = 0
     if parts[0][0] < SECOND:  # a replay dates the force table before the first sample
         shift = SECOND - min(parts[0][0], 0)
         notes.append(f'stamps are those of the file and {shift / SECOND:.3f} s')
-    written = []
-    for _, _, inside in parts:
+    imported, written = Imported(), []
+    while parts:
+        begin, end, inside = parts.pop(0)
         signals = {name: one._replace(begin=one.begin + shift) for name, one in inside.items()}
         channels, done = channels_of(signals, selection.quantities)
         notes += done
         written.append(channels)
-    notes = list(dict.fromkeys(notes))
-    imported = Imported(lengths=[(end - begin) / SECOND for begin, end, _ in parts], notes=notes)
+        imported.lengths.append((end - begin) / SECOND)
+    del inside, signals
+    imported.notes = list(dict.fromkeys(notes))
     for number, channels in enumerate(written):
         folder = Path(out)
         if len(written) > 1:

@@ -64,7 +64,7 @@ def select(
         raise SignalError(f'{source}: no column is named; say one as in {mapping.option}')
     measured = source if isinstance(source, Measured) else _read(source, mapping, timed=timed)
     uri = measured.provenance.uri
-    signals, quantities, columns = {}, {}, {}
+    signals, quantities, columns, chosen = {}, {}, {}, []
     for name, choice in mapping.choices.items():
         column = measured.column(choice.column)
         if name not in mapping.others:
@@ -81,6 +81,10 @@ def select(
             base, notes = times_of(measured, column, mapping.time)
         elif base is None:
             base = TimeBase(np.arange(column.values.size, dtype=np.float64), 0, _ROWS)
+        chosen.append((name, choice, wanted, column, base, notes))
+    measured = measured._replace(columns={})  # what the file holds of a column goes when it is converted
+    while chosen:
+        name, choice, wanted, column, base, notes = chosen.pop(0)
         where = f'{name_of(uri)}, column {column.name!r}'
         is_known = _known(where, column, base, whole=whole)
         own = replace(column, values=column.values[is_known])
@@ -96,7 +100,8 @@ def select(
         begin = base.begin + round(SECOND * float(times[0]))
         if missing := column.values.size - values.size:
             more.append(f'{column.name}: {missing} samples without a number are left out')
-        signals[name] = Signal(where, times - times[0], values, begin, base.told, (*notes, *more))
+        times = times - times[0] if missing else base.from_first
+        signals[name] = Signal(where, times, values, begin, base.told, (*notes, *more))
         columns[name] = {
             'column': where, 'unit': unit.symbol, 'factor': unit.factor * scale, 'to': wanted.unit.symbol,
             'times': base.told, 'samples': int(values.size),

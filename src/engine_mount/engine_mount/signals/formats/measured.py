@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from engine_mount.signals.signal import FloatArray, SignalError
@@ -30,7 +31,8 @@ class Provenance(NamedTuple):
         return {'file': name_of(self.uri), **uri, **own}
 
 
-class TimeBase(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class TimeBase:
     """When the samples of a column were taken: s after `begin` (ns since 1970, or 0), shape (n,).
 
     `told` says in words where these times come from. Columns that were sampled together share one. With
@@ -40,6 +42,11 @@ class TimeBase(NamedTuple):
     times: FloatArray
     begin: int
     told: str
+
+    @cached_property
+    def from_first(self) -> FloatArray:
+        """The times in s after the first, shared by the columns too."""
+        return self.times - self.times[0] if self.times[0] else self.times
 
 
 @dataclass(frozen=True)
