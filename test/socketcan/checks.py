@@ -51,6 +51,18 @@ def set_up_again():
     ip_link('set', CHANNEL, 'mtu', '72', 'up')
 
 
+class Electronics(CanEnd):
+    """Simulated electronics that go on where the bus is gone."""
+
+    def send_frame(self, frame):
+        with suppress(can.CanError):
+            super().send_frame(frame)
+
+    def newest(self):
+        with suppress(can.CanError):
+            return super().newest()
+
+
 class Rig:
     """Simulated electronics and driver, sample by sample, by a clock that the test moves."""
 
@@ -58,7 +70,7 @@ class Rig:
         self.samples, self.setpoints = [], []
         self._now, self._answer = 0, answer
         self._mount = make_mount(timeline__duration=3.0, faults=faults)
-        self.end = CanEnd(open_bus(interface, channel, receive=[CODEC.setpoint.frame_id]))
+        self.end = Electronics(open_bus(interface, channel, receive=[CODEC.setpoint.frame_id]))
         self.loop = ElectronicsLoop(
             self._mount, self.end, lambda _: self.setpoints.append(self._mount.truth['current_setpoint'])
         )
@@ -74,8 +86,7 @@ class Rig:
     def drive(self, samples):
         for _ in range(samples):
             self._now += MS
-            with suppress(can.CanError):  # electronics go on where the bus is gone
-                self.loop.send_sample()
+            self.loop.send_sample()
             self.loop.go_on()
             before = len(self.samples)
             while self.exchange.poll():

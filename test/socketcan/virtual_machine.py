@@ -79,8 +79,8 @@ def main() -> int:
     )
     subprocess.run([*PYTEST, '-q', ELECTRONICS], check=True, env=environment, cwd=REPOSITORY)
     if not boot(
-        [*PYTEST, '-v', '-s', '-p', 'over_vcan', HERE / 'checks.py', *TESTS],
         [*DRIVE, *OVER_VCAN, '--out', SHARE / 'socketcan'],
+        [*PYTEST, '-v', '-p', 'over_vcan', HERE / 'checks.py', *TESTS],
     ):
         return 1
     return subprocess.run(
@@ -110,7 +110,7 @@ def boot(*commands: list[str | Path]) -> bool:
     machine = [*MACHINE, *virtfs, '-kernel', kernel, '-initrd', initramfs()]
     begin = time.monotonic()
     subprocess.run(
-        [*machine, '-append', f'{KERNEL_OPTIONS} share={SHARE}'],
+        [*machine, '-append', KERNEL_OPTIONS],
         check=True, timeout=LIMIT, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     print(f'{kernel.name}: {time.monotonic() - begin:.0f} s on this machine')
@@ -145,6 +145,7 @@ def initramfs() -> Path:
     shutil.copy(str(shutil.which('busybox')), tree / 'bin' / 'busybox')
     shutil.copy(HERE / 'init', tree / 'init')
     (tree / 'init').chmod(0o755)
+    (tree / 'share').write_text(str(SHARE))
     files = {path.name.partition('.')[0].replace('-', '_'): path for path in LINUX.rglob('*.ko*')}
     order = dict.fromkeys(needed for name in MODULES for needed in load_order(name, files))
     for name in order:
