@@ -24,7 +24,7 @@ SPECIMEN := src/mount_models/mount_models/specimens/default.yaml
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help drive test test-all test-arm64 test-cortex-m check faults experiments identify pages bench lint format setup-core setup setup-desk setup-dev clean
+.PHONY: help drive test test-all test-arm64 test-cortex-m test-socketcan check faults experiments identify pages bench lint format setup-core setup setup-desk setup-dev clean
 
 help: ## list the commands
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /: /' | column -t -s:
@@ -48,6 +48,9 @@ test-arm64: $(VENV)/.ready-dev ## compare the law in C, and all that needs no RO
 
 test-cortex-m: $(VENV)/.ready-dev ## compare the law in C on an emulated Cortex-M7 without a library with Python
 	@$(BIN)/python test/targets/law_in_c.py cortex-m
+
+test-socketcan: $(VENV)/.ready-dev ## pass tests of the driver over SocketCAN, and a drive, in an emulated machine
+	@$(BIN)/python test/socketcan/virtual_machine.py
 
 check: $(VENV)/.ready ## drive the manoeuvre suite and judge it by its limits, before a change goes into the car
 	@$(BIN)/engine-mount check $(CHECK_OPTIONS)

@@ -14,6 +14,7 @@ ELSEWHERE = {
     'make test': 'it is what runs this',
     'make test-arm64': 'needs compilers and emulators; docs/explanation/same_bytes.md has the last result',
     'make test-cortex-m': 'needs compilers and emulators; docs/explanation/same_bytes.md has the last result',
+    'make test-socketcan': 'needs an emulator; src/mount_driver/README.md has the last result',
     'make check': 'the command of docs/how-to/check_a_change.md is the same',
     'make setup-dev': 'it made the environment that this runs in',
     'make lint': 'by .ci/run',

@@ -43,10 +43,13 @@ def _payloads(folder, topic):
     return [payloads[place] for place in np.argsort(series.stamps, kind='stable')]
 
 
-def _drive_both(command, *options):
-    """Drive in lock-step and in core: all data topics must be equal; return both results."""
+def _drive_both(command, *options, bus=()):
+    """Drive in lock-step and in core: all data topics must be equal; return both results.
+
+    `bus` are options of the drive in lock-step alone.
+    """
     options = ('--set', 'mount_sim.timeline.start=2.9', *options)
-    both = command.drive('--lockstep', *options), command.drive('--core', *options)
+    both = command.drive('--lockstep', *bus, *options), command.drive('--core', *options)
     assert [result.code for result in both] == [0, 0], both[0].output + both[1].output
     for topic in DATA_TOPICS:
         lockstep, core = (_payloads(result.folder, topic) for result in both)
@@ -69,6 +72,13 @@ def test_lockstep_repeats_itself_in_any_namespace_and_in_several_files_and_equal
     assert len(recording.files) > 1
     assert second.figures['lost_samples'] == 0
     assert losses(recording, audit(recording)).sound
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('bus', [('--apart',), ('--set', 'mount_driver.interface=udp_multicast')], ids=len)
+def test_lockstep_on_a_bus_with_sockets_equals_the_core_run(command, bus):
+    lockstep, _ = _drive_both(command, '--scenario', 'bench', '--duration', '1', bus=bus)
+    assert lockstep.figures['lost_samples'] == lockstep.figures['unanswered_samples'] == 0
 
 
 @pytest.mark.slow

@@ -184,7 +184,8 @@ def _check_socketcan(
         raise OSError('the interface is down')
     mtu = int((folder / 'mtu').read_text())
     if mtu != _CAN_FD_MTU and not any_rate:
-        raise OSError(f'the interface is not in CAN FD mode: its MTU is {mtu}, needed is {_CAN_FD_MTU}')
+        needed = f'needed is {_CAN_FD_MTU}: set it down, then up in that mode'
+        raise OSError(f'the interface is not in CAN FD mode: its MTU is {mtu}, {needed}')
 
 
 def _remedy(interface: str, channel: str, error: Exception) -> str:

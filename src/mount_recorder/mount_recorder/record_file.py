@@ -38,8 +38,12 @@ class RecordFile:
         """Hold back at least `size` bytes of disk space; raises `OSError` if the disk has no more."""
         if size > self._reserve:
             wanted = -(-size // RESERVE_STEP) * RESERVE_STEP
-            with self._reserve_path.open('ab') as file:
-                self._allocate(file.fileno(), wanted)
+            # Where the file system cannot allocate, the C library writes: not to a file opened to append.
+            handle = os.open(self._reserve_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            try:
+                self._allocate(handle, wanted)
+            finally:
+                os.close(handle)
             self._reserve = wanted
 
     def release_room(self) -> None:

@@ -24,6 +24,7 @@ from samples import PERIOD, RECORDED, START, sample
 from small_disk import small_disk
 
 from mount_recorder.bag_writer import BagWriter, RecordingError
+from mount_recorder.record_file import RESERVE_STEP, RecordFile
 from mount_recorder.schemas import SchemaError, schema_text, type_hash
 from mount_ros.topics import DISPLACEMENT, TOPICS
 
@@ -238,6 +239,15 @@ def test_room_for_the_end_grows_with_the_recording(tmp_path, monkeypatch):
     with (tmp_path / 'bag' / 'bag_0.mcap').open('rb') as file:
         summary = make_reader(file).get_summary()
     assert len(summary.chunk_indexes) == writer.kept > 1500
+
+
+def test_room_is_kept_where_the_c_library_must_write_it_for_the_file_system(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, 'posix_fallocate', lambda handle, _, size: os.pwrite(handle, b'\0', size - 1))
+    file = RecordFile(tmp_path / 'file')
+    for steps in (1, 3):
+        file.keep_room(steps * RESERVE_STEP)
+        assert (tmp_path / '.file.reserve').stat().st_size == steps * RESERVE_STEP
+    file.close()
 
 
 def test_broken_disk_leaves_whole_chunks(tmp_path):

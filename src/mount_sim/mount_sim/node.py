@@ -62,12 +62,6 @@ class MountSim(SafeLifecycleNode):
         self._counted: SlidingWindow[dict[str, Counted]] = SlidingWindow({})
 
     def configure(self) -> None:
-        interface = self.get_parameter('interface').value
-        if self.lockstep and interface != 'virtual':
-            raise ParameterError(
-                f'lock-step needs the virtual bus of one process; interface is {interface}: set it to '
-                'virtual, or drive with engine-mount drive --lockstep'
-            )
         self._settings = read(self, SimParameters())
         other = {name: self.get_parameter(name).value for name in (*_OF_ELECTRONICS, *self._own)}
         self._values = flattened(self._settings) | other

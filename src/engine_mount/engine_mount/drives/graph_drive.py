@@ -81,17 +81,22 @@ def _parameters(
     """Return the parameters of all nodes; the folder takes the array of the excitation."""
     chosen, mounts = settings.parameters, mounts_of(settings.parameters)
     together = settings.grouping is Grouping.TOGETHER
-    interface = {'interface': 'virtual' if together else 'udp_multicast'}
-    sim = dict(interface)
+    interface = 'virtual' if together else 'udp_multicast'
+    sim: dict[str, Any] = {}
     completed: dict[str, dict[str, Any]] = {}
     for mount, own in settings_of_mounts(chosen).items():
-        bus: dict[str, Any] = {'port': can_port(settings.domain, f'{settings.namespace}/{mount}')}
+        port = can_port(settings.domain, f'{settings.namespace}/{mount}')
+        bus: dict[str, Any] = {'interface': interface, 'port': port}
         if mount and together:
             bus['channel'] = f'can_{mount}'
-        sim |= {f'mount_{mount}.{name}' if mount else name: value for name, value in bus.items()}
+        driver = bus | own.get('mount_driver', {})
+        # The electronics are on the bus of the driver, also where a user chose it.
+        ends = {name: driver[name] for name in ('interface', 'channel', 'port') if name in driver}
+        sim['interface'] = ends.pop('interface')
+        sim |= {f'mount_{mount}.{name}' if mount else name: value for name, value in ends.items()}
         # Nothing but a stalled process may end a ramp in lock-step.
         init = {'silence_timeout': 10.0} if lockstep else {}
-        added = {'mount_driver': interface | bus, 'mount_init': init, 'mount_control': {}}
+        added = {'mount_driver': bus, 'mount_init': init, 'mount_control': {}}
         completed |= {
             f'{mount}/{node}'.lstrip('/'): {**values, **own.get(node, {})} for node, values in added.items()
         }
