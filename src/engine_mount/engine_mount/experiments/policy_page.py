@@ -271,7 +271,8 @@ The continuous law, one part changed at a time:
 ## Wear against effect
 
 No other point is better than these in all of ratio on a light road, both accelerations and wear \
-(random road). Choose one by its two parameters:
+(random road). Wear is the price: the pads take what leaves the motion, so points of about the same ratio \
+differ by a few per cent only. Choose one by its two parameters:
 
 | name | half amplitude (mm) | c (N s/m) | light road | strong road | acceleration | idling | J/km |
 |---|---|---|---|---|---|---|---|
