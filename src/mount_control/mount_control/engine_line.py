@@ -127,9 +127,7 @@ def step(line, factors, state, window, displacement, crank_frequency):
     elif state.samples >= _SEARCH:
         state.samples = 0
         _search(line, state, bank, phasors)
-    sine, cosine = sine_and_cosine(state.spacing)
-    _follow(line, state, phasors, share * line.following, seen, cosine, sine)
-    return _sum(line, state, phasors, share * _DOUBT * state.deviation_square, cosine, sine)
+    return _follow(line, state, phasors, share, seen)
 
 
 @compiled
@@ -141,37 +139,15 @@ def _set_spacing(state, phasors, turns):
 
 
 @compiled
-def _follow(line, state, phasors, following, seen, cosine, sine):
-    """Turn the lines by one sample and correct them by what was `seen` (m).
+def _follow(line, state, phasors, share, seen):
+    """Turn the lines by one sample, sum them, see `step`, and correct them by what was `seen` (m).
 
-    `cosine` and `sine` are those of the distance of the lines.
+    A line counts by its power over that power and doubt; `share` is that of the gain and of the doubt.
     """
-    expected, square = 0.0, 0.0
-    turn_real, turn_imaginary = 1.0, 0.0
-    for k in range(LINES):
-        turn_real, turn_imaginary = _turned(turn_real, turn_imaginary, cosine, sine)
-        real, imaginary = 0.0, 0.0
-        if line.lowest <= (k + 1) * state.spacing <= line.highest:
-            real, imaginary = _turned(phasors[k], phasors[LINES + k], turn_real, turn_imaginary)
-        phasors[k], phasors[LINES + k] = real, imaginary
-        expected += real
-        square += real * real + imaginary * imaginary
-    limit = 2.0 * math.sqrt(square) + _LARGEST_DEVIATION
-    deviation = min(max(seen - expected, -limit), limit)
-    change = deviation - state.deviation
-    state.deviation = deviation
-    state.deviation_square += line.noise_averaging * (deviation * deviation - state.deviation_square)
-    state.noise_square += line.noise_averaging * (0.5 * change * change - state.noise_square)
-    for place in range(LINES):
-        if line.lowest <= (place + 1) * state.spacing <= line.highest:
-            phasors[place] += following * deviation
-
-
-@compiled
-def _sum(line, state, phasors, doubt, cosine, sine):
-    """Return the sums over all lines, see `step`, each by its power over that power and `doubt` (m^2)."""
-    now, high, velocity, low_velocity = 0.0, 0.0, 0.0, 0.0
+    now, ahead, velocity, low_velocity, expected, square = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     of_displacement, of_velocity, of_acceleration, largest = 0.0, 0.0, 0.0, 0.0
+    doubt = share * _DOUBT * state.deviation_square + _SMALLEST_SQUARE
+    sine, cosine = sine_and_cosine(state.spacing)
     lead_sine, lead_cosine = sine_and_cosine(line.lead_samples * state.spacing)
     turn_real, turn_imaginary, lead_real, lead_imaginary = 1.0, 0.0, 1.0, 0.0
     for k in range(LINES):
@@ -179,28 +155,41 @@ def _sum(line, state, phasors, doubt, cosine, sine):
         lead_real, lead_imaginary = _turned(lead_real, lead_imaginary, lead_cosine, lead_sine)
         turns = (k + 1) * state.spacing
         if line.lowest <= turns <= line.highest:
-            real, imaginary = phasors[k], phasors[LINES + k]
+            real, imaginary = _turned(phasors[k], phasors[LINES + k], turn_real, turn_imaginary)
+            phasors[k], phasors[LINES + k] = real, imaginary
             power = real * real + imaginary * imaginary
-            share = power / (power + doubt + _SMALLEST_SQUARE)
-            real, imaginary = _unfiltered(line, share * real, share * imaginary, turn_real, turn_imaginary)
+            expected += real
+            square += power
+            clear = power / (power + doubt)
+            real, imaginary = _unfiltered(line, clear * real, clear * imaginary, turn_real, turn_imaginary)
             rate = 2.0 * math.pi * turns / line.sample_time
-            square = real * real + imaginary * imaginary
-            velocity_square = rate * rate * square
-            of_displacement += square
+            displacement_square = real * real + imaginary * imaginary
+            velocity_square = rate * rate * displacement_square
+            of_displacement += displacement_square
             of_velocity += velocity_square
             of_acceleration += rate * rate * velocity_square
             if velocity_square > largest:
                 largest, state.fastest = velocity_square, turns
-            ahead, quarter = _turned(real, imaginary, lead_real, lead_imaginary)
+            real_ahead, imaginary_ahead = _turned(real, imaginary, lead_real, lead_imaginary)
             low = line.lowest / turns * (line.lowest / turns)
             now += real
-            high += (1.0 - low) * ahead
-            velocity -= rate * quarter
-            low_velocity -= low * rate * quarter
+            ahead += (1.0 - low) * real_ahead
+            velocity -= rate * imaginary_ahead
+            low_velocity -= low * rate * imaginary_ahead
+        else:
+            phasors[k] = phasors[LINES + k] = 0.0
+    limit = 2.0 * math.sqrt(square) + _LARGEST_DEVIATION
+    deviation = min(max(seen - expected, -limit), limit)
+    for place in range(LINES):
+        phasors[place] += share * line.following * deviation
+    change = deviation - state.deviation
+    state.deviation = deviation
+    state.deviation_square += line.noise_averaging * (deviation * deviation - state.deviation_square)
+    state.noise_square += line.noise_averaging * (0.5 * change * change - state.noise_square)
     state.amplitude = math.sqrt(of_displacement)
     state.velocity += line.averaging * (math.sqrt(of_velocity) - state.velocity)
     state.acceleration += line.averaging * (math.sqrt(of_acceleration) - state.acceleration)
-    return now, high, velocity, low_velocity
+    return now, ahead, velocity, low_velocity
 
 
 @compiled
