@@ -93,10 +93,10 @@ def traces_of(policy: str) -> np.ndarray:
     """Return all that a policy traces of the sequence that the law in C has built in."""
     settings = settings_of(policy)
     table = settings.table([0.5, 1.5, 3.0], [0.0, 100.0, 250.0], 0.5)
-    samples, random = np.empty(LAW_SAMPLES), 1
+    samples, frequencies, random = np.empty(LAW_SAMPLES), np.empty(LAW_SAMPLES), 1
     for n in range(LAW_SAMPLES):
-        random, _, samples[n], _ = built_in_sample(n, random)
-    return Controller(ControlLaw(settings, table)).run(samples)
+        random, _, samples[n], frequencies[n], _ = built_in_sample(n, random)
+    return Controller(ControlLaw(settings, table)).run(samples, crank_frequency=frequencies)
 
 
 def settings_of(policy: str) -> ControlSettings:

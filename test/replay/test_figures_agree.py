@@ -140,7 +140,7 @@ def test_all_tell_the_same(kind, request):
         for pattern in (
             r'samples lost: (\d+ of \d+(?: \(\d+ messages of all topics\))?)',
             r'samples unanswered: (\d+ of \d+ while control was active)',
-            r'faults: (not judged: core has no watches|\d+: .* and \d+ more)',
+            r'faults: (not judged: core has no watches|\d+: .*; \d+ more)',
         )
     )
     for words in (f'samples lost {lost}', f'samples unanswered {unanswered}', f'faults {faults}'):

@@ -4,7 +4,6 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -185,7 +184,7 @@ def describe_measured(measured: Measured) -> Description:
     read_by = f'{origin.uri}, {origin.format}, read by {origin.reader}'
     heads = ('column', 'unit', 'samples', 'rate', 'span', 'range', 'mean')
     return Description(
-        {'provenance': asdict(origin), 'columns': columns, 'notes': measured.notes},
+        {'provenance': origin._asdict(), 'columns': columns, 'notes': measured.notes},
         [('file', read_by), ('SHA-256', origin.sha256)],
         [Table('Columns', 'llrrrrr', texts, heads)],
         measured.notes,
