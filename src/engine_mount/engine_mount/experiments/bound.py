@@ -48,6 +48,8 @@ LARGEST_FORCE = 300.0
 """N: what the magnet presses at its highest current."""
 DAMPINGS = (250.0, 500.0, 1000.0, 2000.0, 3000.0)
 """N s/m, chosen: ideal viscous dampers beside the optimum."""
+LATE = 2
+"""Samples, chosen: about the delay of the loop, 1.9 ms."""
 _SLEW = 40.0  # N/ms, chosen: 0.3 A/ms by the voltage of the coil, 150 N/A, coefficient 0.9
 _STEPS = round(SAMPLE_TIME / STEP_TIME)
 _DISPLACEMENT, _VELOCITY, *_CHASSIS = map(
@@ -61,7 +63,6 @@ _BANDS = (BELOW_ISOLATION, ACOUSTIC)
 _ORDER = 4  # of the band-passes, chosen
 _FIRST = 3000.0  # N s/m, chosen: the force of this ideal damper is improved
 _ITERATIONS = 150, 40, 40  # chosen; few at a time, so that the linear car stays near the simulation
-_EVERY, _HORIZON, _FEW = 5, 150, 8  # samples, samples, iterations, chosen
 _CURRENTS = np.linspace(HIGHEST_CURRENT, 0.1, 1000)  # A, chosen: while they fall the pads stay closed
 
 
@@ -160,40 +161,36 @@ class Window:
         self.beside = np.zeros((self.samples, 2))
         """What displacement and acceleration of the simulation have more than those here, at the samples."""
 
-    def cost(self, levels: FloatArray, first: int = 0) -> tuple[float, FloatArray]:
-        """Return the part of J up to the end of `levels`, which begin at sample `first`; and its gradient."""
-        last = first + len(levels)
-        part = slice(first * _STEPS, last * _STEPS + 1)
-        ride(self.matrix, self.law, levels, self.rows[part], self.pads[part])
-        total, wanted = 0.0, np.zeros((last, 2))
-        for what, states in enumerate((self.states + self.beside)[:last].T):
+    def cost(self, levels: FloatArray) -> tuple[float, FloatArray]:
+        """Return J and its gradient (1/N)."""
+        ride(self.matrix, self.law, levels, self.rows, self.pads)
+        total, wanted = 0.0, np.zeros((self.samples, 2))
+        for what, states in enumerate((self.states + self.beside).T):
             share = self.shares[what] / self.samples
             inside = passed(states, _BANDS[what])
             total += share * float(inside @ inside)
             wanted[:, what] = 2.0 * share * passed(inside[::-1], _BANDS[what])[::-1]
-        wanted = wanted[first:]
-        return total, gradient(self.transposed, self.law, levels, self.rows[part], self.pads[part], wanted)
+        return total, gradient(self.transposed, self.law, levels, self.rows, self.pads, wanted)
 
     @property
     def states(self) -> FloatArray:
         """Displacement (m) and acceleration (m/s^2) at the samples, (samples, 2)."""
         return self.rows[:-1:_STEPS, [_DISPLACEMENT, _ACCELERATION]]
 
-    def improved(self, levels: FloatArray, iterations: int, first: int = 0, held: int = 0) -> FloatArray:
-        """Return levels from sample `first` on with a lower J, found from these, of which some are `held`."""
+    def improved(self, levels: FloatArray, iterations: int) -> FloatArray:
+        """Return levels with a lower J, found from these."""
         from scipy.optimize import minimize
 
         def scaled(shares: FloatArray) -> tuple[float, FloatArray]:
-            total, found = self.cost(LARGEST_FORCE * shares, first)
+            total, found = self.cost(LARGEST_FORCE * shares)
             return total, LARGEST_FORCE * found
 
-        start = levels / LARGEST_FORCE
         found = minimize(
             scaled,
-            start,
+            levels / LARGEST_FORCE,
             jac=True,
             method='L-BFGS-B',
-            bounds=[*((share, share) for share in start[:held]), *[(0.0, 1.0)] * len(start[held:])],
+            bounds=[(0.0, 1.0)] * self.samples,
             options={'maxiter': iterations, 'maxcor': 20, 'ftol': 1e-6},
         )
         return LARGEST_FORCE * found.x
@@ -262,36 +259,19 @@ def of_ideal(truth: Truth, sim: SimParameters) -> Values:
 
 
 def best(weight: float, truth: Truth, sim: SimParameters) -> Values:
-    """Return `of_run` with the best currents that were found, and J of the linear car; w is the `weight`."""
+    """Return `of_run` with the best currents that were found; `late` with these `LATE` samples later."""
     window = Window(sim, weight, of_run(truth))
     levels = np.minimum(_FIRST * np.abs(np.gradient(window.damped(_FIRST)[1], SAMPLE_TIME)), LARGEST_FORCE)
-    found: list[Values] = []
+    found: list[tuple[float, FloatArray, Values]] = []
     for iterations in _ITERATIONS:
         levels = window.improved(levels, iterations)
-        model = window.cost(levels)[0]
-        setpoints = window.setpoints()
-        played = at_each_step(np.insert(setpoints, 0, 0.0), sim)[::_STEPS]
+        window.cost(levels)
+        setpoints = np.insert(window.setpoints(), 0, 0.0)
+        played = at_each_step(setpoints, sim)[::_STEPS]
         figures = of_run(played)
-        figures['cost'] = sum(
-            share * figures[name] for share, name in zip(window.shares, MEASURES, strict=True)
-        )
-        found.append(figures | {'model': model})
+        cost = sum(share * figures[name] for share, name in zip(window.shares, MEASURES, strict=True))
+        found.append((cost, setpoints, figures))
         window.beside = np.stack([played['displacement'], played['chassis_acceleration']], 1) - window.states
-    return min(found, key=lambda each: each['cost'])
-
-
-def foreseen(samples: int, delay: int, truth: Truth, sim: SimParameters) -> Values:
-    """Return J of the linear car where the road is known for so many `samples` ahead, then stays flat.
-
-    State and engine are known. The force is sought anew every few samples, and acts `delay` samples later.
-    """
-    window = Window(sim, 0.5, of_run(truth))
-    road, levels = window.rows[:, _ROAD].copy(), np.zeros(window.samples)
-    for first in range(0, window.samples, _EVERY):
-        known = (first + samples) * _STEPS
-        window.rows[known:, _ROAD] = road[known : known + 1]
-        part = slice(first, first + _HORIZON)
-        levels[part] = window.improved(levels[part], _FEW, first, delay)
-        window.rows[:, _ROAD] = road
-        window.cost(levels[first : first + _EVERY], first)
-    return {'cost': window.cost(levels)[0]}
+    _, setpoints, figures = min(found, key=lambda each: each[0])
+    later = np.concatenate([np.zeros(LATE), setpoints[:-LATE]])
+    return figures | {'late': of_run(at_each_step(later, sim)[::_STEPS])}

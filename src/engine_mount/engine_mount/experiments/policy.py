@@ -31,7 +31,6 @@ from engine_mount.experiments.policy_cases import (
     CONTINUOUS,
     DISTURBANCES,
     ENGINE_ROADS,
-    FORESIGHT,
     FRONT,
     GAP_TIME,
     HYDRO,
@@ -307,10 +306,7 @@ def bound_of(found: Found, name: str) -> Values:
     return {
         'mounts': {who: ratios(found['bound', who, name]) for who in COMPARED},
         'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
-        'foresight': {
-            'all known': found['bound', OFF, name, 0.5]['model'],
-            **{told: found['bound', OFF, name, *foresight]['cost'] for told, foresight in FORESIGHT.items()},
-        },
+        'late': ratios(found['bound', OFF, name, 0.5]['late']),
         'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
 

@@ -82,13 +82,6 @@ AMPLITUDES, FREQUENCIES = (0.002, 0.01, 0.03, 0.06), (6.0, 8.0, 11.0)
 """m, Hz, chosen: depths of a gap in a flat road, engines on their mounts: nothing may move a while later."""
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 BOUND_WEIGHTS = (0.2, 0.5, 0.8)  # chosen: of the displacement in J
-FORESIGHT = {
-    'known 100 ms ahead': (100, 0),
-    '20 ms ahead': (20, 0),
-    'not ahead': (0, 0),
-    'and 2 ms later': (0, 2),
-}
-"""{name: samples that the road is known ahead, samples until a force acts}, chosen."""
 _BOUND_SECONDS = 3.0  # s, chosen: all that the optimum is sought for is known ahead
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
 _PERIODS = 8  # evaluated on the rack
@@ -170,8 +163,6 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
             add(('bound', who, name), sim, bound.of_ideal if who == OFF else bound.of_run)
         for weight in BOUND_WEIGHTS:
             add(('bound', OFF, name, weight), sim, partial(bound.best, weight))
-        for foresight in FORESIGHT.values():
-            add(('bound', OFF, name, *foresight), sim, partial(bound.foreseen, *foresight))
     if not own.thorough:
         return cases
     for who in HYDROMOUNTS:
