@@ -136,6 +136,7 @@ def main() -> int:
     paths = [str(path.parent.relative_to(results[0])) for path in sorted(results[0].rglob('metadata.yaml'))]
     for name, each in said.items():
         known = {**each['versions'], 'numba for': each['seen']['numba'], **each['laws']}
+        known |= {'products not rounded': each['fused'], 'where permitted': each['fused_if_permitted']}
         print(f'{name}: {", ".join(f"{what} {value}" for what, value in known.items())}')
     found = [text for name, each in said.items() for text in complaints(name, each)]
     if said['x86_64']['laws'] != said['aarch64']['laws']:
