@@ -145,7 +145,7 @@ def initramfs() -> Path:
     shutil.copy(str(shutil.which('busybox')), tree / 'bin' / 'busybox')
     shutil.copy(HERE / 'init', tree / 'init')
     (tree / 'init').chmod(0o755)
-    (tree / 'share').write_text(str(SHARE))
+    (tree / 'writable').write_text(str(SHARE))
     files = {path.name.partition('.')[0].replace('-', '_'): path for path in LINUX.rglob('*.ko*')}
     order = dict.fromkeys(needed for name in MODULES for needed in load_order(name, files))
     for name in order:
