@@ -12,9 +12,9 @@ _open_bus = bus.open_bus
 
 
 def _open_instead(interface: str, channel: str, *, receive: Sequence[int] = (), port: int = 0) -> can.BusABC:
-    if interface == 'socketcan' or channel == UNCHANGED:
-        return _open_bus(interface, channel, receive=receive, port=port)
-    return _open_bus('socketcan', CHANNEL, receive=receive)
+    if interface in ('virtual', 'udp_multicast') and channel != UNCHANGED:
+        interface, channel = 'socketcan', CHANNEL
+    return _open_bus(interface, channel, receive=receive, port=port)
 
 
 bus.open_bus = _open_instead
