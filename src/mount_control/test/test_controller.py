@@ -236,11 +236,6 @@ def test_a_change_of_the_law_makes_no_jump(change, moment):
     # a filter of a higher frequency accelerates more from the same place, by the square of the ratio
     stiffer = max(1.0, (CHANGES[change].get('eigenfrequency', 8.0) / 8.0) ** 2)
     assert np.abs(np.diff(after['current'][:60])).max() <= stiffer * natural + farthest / (1e3 * FADE_TIME)
-    # displacement and velocity in the band have no jump either
-    for name, share in (('band_displacement', 1.02), ('band_velocity', 1.2 * stiffer)):
-        steps = np.abs(np.diff(np.r_[before[name], after[name]]))
-        natural = max(np.abs(np.diff(run[name][500:])).max() for run in (undisturbed, free))
-        assert steps[moment - 2 : moment + 2].max() <= share * natural
     # and in the end it does what a controller does that never knew anything else
     settled = after[-125:]
     np.testing.assert_allclose(settled['current'], free['current'][-125:], atol=2e-2)

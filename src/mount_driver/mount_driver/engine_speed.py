@@ -5,10 +5,10 @@ It only listens: no frame leaves on that bus. What goes wrong here is a sentence
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import nan, pi
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from mount_driver.bus import CanLinkError, Reception, may_have_frames, open_bus
 from mount_driver.can_library import Database, can, cantools
@@ -39,22 +39,6 @@ class SpeedSignal:
     """One signal of a DBC; raises `ParameterError` where it is not there or has no unit of a speed."""
 
     def __init__(self, parameters: EngineSpeedParameters):
-        self.message = self._message(parameters)
-        signals = {signal.name: signal for signal in self.message.signals}
-        if parameters.signal not in signals:
-            raise ParameterError(
-                f'engine_speed.signal: {parameters.signal!r} is no signal of {self.message.name}; '
-                f'{nearest(parameters.signal, signals)}'
-            )
-        self.signal = signals[parameters.signal]
-        if self.signal.unit not in RADIANS:
-            raise ParameterError(
-                f'engine_speed.signal: {parameters.signal} has the unit {self.signal.unit!r} in '
-                f'{parameters.dbc}; must be one of {", ".join(RADIANS)}: correct the DBC'
-            )
-
-    @staticmethod
-    def _message(parameters: EngineSpeedParameters) -> can.Message:
         try:
             database = cantools.database.load_string(
                 Path(parameters.dbc).read_text('cp1252'), 'dbc', strict=False
@@ -64,13 +48,13 @@ class SpeedSignal:
                 f'engine_speed.dbc: {parameters.dbc} is not readable ({error}); name a DBC, or leave it empty'
             ) from None
         assert isinstance(database, Database)
-        messages = {message.name: message for message in database.messages}
-        if parameters.message not in messages:
+        self.message = _named('message', parameters.message, database.messages, parameters.dbc)
+        self.signal = _named('signal', parameters.signal, self.message.signals, self.message.name)
+        if self.signal.unit not in RADIANS:
             raise ParameterError(
-                f'engine_speed.message: {parameters.message!r} is no message of {parameters.dbc}; '
-                f'{nearest(parameters.message, messages)}'
+                f'engine_speed.signal: {parameters.signal} has the unit {self.signal.unit!r} in '
+                f'{parameters.dbc}; must be one of {", ".join(RADIANS)}: correct the DBC'
             )
-        return messages[parameters.message]
 
     def carried_by(self, frame: can.Message) -> bool:
         """Return whether a frame is the message."""
@@ -91,6 +75,14 @@ class SpeedSignal:
         low, high = self.signal.minimum, self.signal.maximum
         known = (low is None or value >= low) and (high is None or value <= high)
         return value * RADIANS[self.signal.unit] if known else nan
+
+
+def _named(kind: str, name: str, among: Sequence[Any], owner: str) -> Any:
+    """Return the one of this name, or raise `ParameterError` with the nearest ones."""
+    known = {each.name: each for each in among}
+    if name not in known:
+        raise ParameterError(f'engine_speed.{kind}: {name!r} is no {kind} of {owner}; {nearest(name, known)}')
+    return known[name]
 
 
 class EngineSpeedReader:
