@@ -1,11 +1,11 @@
 """Gap curves with their uncertainty through ripple recorded at known gaps, and their inverses (Fig. 4)."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfit, polyval, polyvander
+from scipy.stats import linregress, sem
 
 from engine_mount.identification.fitting import FloatArray, rms, single_threaded
 from mount_models.coil.crossing import CrossingError, find_crossing
@@ -94,13 +94,10 @@ def _rest_inductance(z: FloatArray, values: FloatArray) -> tuple[float, float]:
     deviation = np.abs(values - np.median(values))
     kept = deviation <= max(4.0 * 1.4826 * np.median(deviation), 0.02 * abs(np.median(values)))
     z, values = z[kept], values[kept]
-    powers = np.stack([np.ones_like(z), z], axis=1)
-    if np.ptp(z) < 0.1:
-        powers = powers[:, :1]  # the current was held: nothing to be said of a slope
-    solution, *_ = np.linalg.lstsq(powers, values, rcond=None)
-    scatter = np.sum((values - powers @ solution) ** 2) / max(1, values.size - powers.shape[1])
-    spread = np.linalg.inv(powers.T @ powers)[0, 0]
-    return float(solution[0]), math.sqrt(scatter * spread)
+    if np.ptp(z) < 0.1:  # the current was held: nothing to be said of a slope
+        return float(values.mean()), float(sem(values))
+    line = linregress(z, values)
+    return float(line.intercept), float(line.intercept_stderr)
 
 
 @single_threaded

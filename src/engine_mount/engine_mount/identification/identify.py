@@ -5,7 +5,6 @@ that of `friction` a `specimen(name)` too. Its laws and its checks: `engine_moun
 """
 
 import functools
-import itertools
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +12,11 @@ from pathlib import Path
 from engine_mount.identification.fitting import IdentificationError, Progress, silent
 from engine_mount.identification.friction.coefficients import fit_coefficients
 from engine_mount.identification.friction.files import friction_mapping, read_recording
-from engine_mount.identification.friction.ladder import fit_ladder, law_error
+from engine_mount.identification.friction.ladder import fit_ladder
 from engine_mount.identification.friction.laws import all_laws
 from engine_mount.identification.friction.ramp_hold import fit_ramp_hold, mean_contact
 from engine_mount.identification.friction.recording import FrictionRecording
-from engine_mount.identification.friction.result import FrictionIdentification, Pair, validate
+from engine_mount.identification.friction.result import FrictionIdentification, validate
 from engine_mount.identification.friction.sawtooth import RAMP, SAWTOOTH, kind_of_motion, stroke_lines
 from engine_mount.identification.friction.screening import case_of, subtract_zero
 from engine_mount.identification.pads import pads as pads
@@ -35,7 +34,6 @@ def friction(
     train: Sequence[_Place] = (),
     held_out: Sequence[_Place] = (),
     *,
-    files: Sequence[_Place] = (),
     step: str = 'auto',
     clamp: str = 'sliding',
     zero: str = '',
@@ -46,21 +44,18 @@ def friction(
 ) -> FrictionIdentification:
     """Return the friction contact in recordings, and which law is worth its parameters.
 
-    Laws are fitted to `train` and judged by `held_out`; or trained on each of `files` and tried on each other
-    one. `step` is auto, or only ramp (step 1), sawtooth or ladder; `clamp` is the normal force of a damper's
-    JSON (sliding, rest, none), `zero` the source of the zero of the force (law, recorded; '' for the default
-    of each kind of file). `columns` is {quantity: 'COLUMN:UNIT'}. `base` is the specimen file that gives all
-    other values, the shipped one without. Raises `IdentificationError` and the readers' errors.
+    Laws are fitted to `train` and judged by `held_out`. `step` is auto, or only ramp (step 1), sawtooth or
+    ladder; `clamp` is the normal force of a damper's JSON (sliding, rest, none), `zero` the source of the
+    zero of the force (law, recorded; '' for the default of each kind of file). `columns` is {quantity:
+    'COLUMN:UNIT'}. `base` is the specimen file that gives all other values, the shipped one without. Raises
+    `IdentificationError` and the readers' errors.
     """
     if isinstance(columns, dict):
         columns = friction_mapping([f'{name}={text}' for name, text in columns.items()])
-    seen, unseen, others = ([Path(place) for place in places] for places in (train, held_out, files))
-    _check_order(seen, unseen, others, step)
+    seen, unseen = ([Path(place) for place in places] for places in (train, held_out))
+    _check_order(seen, unseen, step)
     result = FrictionIdentification(chosen_specimen(str(base)))
     read = functools.partial(_read, result, step=step, clamp=clamp, zero=zero, mapping=columns)
-    if others:
-        _try_pairs(result, _moving(read(others, 'both')), progress, seed)
-        return result
     training = read(seen, 'train')
     result.held_out = _moving(read(unseen, 'held out'))
     sawtooths = [each for each, kind in training if kind == SAWTOOTH]
@@ -80,18 +75,12 @@ def friction(
     return result
 
 
-def _check_order(train: Sequence[Path], held_out: Sequence[Path], files: Sequence[Path], step: str) -> None:
+def _check_order(train: Sequence[Path], held_out: Sequence[Path], step: str) -> None:
     """Raise `IdentificationError` for arguments that contradict each other."""
     if step not in STEPS:
         raise IdentificationError(f'--step {step!r} is unknown; {nearest(step, STEPS)}')
-    if files and (train or held_out):
-        raise IdentificationError(
-            '--file tries all pairs of its files; give it alone, or --train and --held-out'
-        )
-    if not files and not train:
-        raise IdentificationError(
-            '0 recordings to train with; give --train FILE..., or --file FILE... for all pairs'
-        )
+    if not train:
+        raise IdentificationError('0 recordings to train with; give --train FILE...')
     both = {each.resolve() for each in train} & {each.resolve() for each in held_out}
     if both:
         raise IdentificationError(
@@ -155,24 +144,3 @@ def _fit_coefficients(result: FrictionIdentification, sawtooths: Sequence[Fricti
     result.lines = [line for each in sawtooths for line in stroke_lines(each, contact)]
     result.fit = fit_coefficients(result.lines)
     result.validations = [validate(each, contact, result.fit.coefficients) for each in result.held_out]
-
-
-def _try_pairs(
-    result: FrictionIdentification, recordings: list[FrictionRecording], progress: Progress, seed: int
-) -> None:
-    if len(recordings) < 2:
-        raise IdentificationError(
-            f'{len(recordings)} of the recordings move to and fro; the ladder needs at least 2: '
-            'give another one'
-        )
-
-    ladders = [
-        fit_ladder(
-            all_laws([one]), [one], [],
-            lambda share, law, name=one.name: progress(share, f'{name}: {law}'), seed,
-        )
-        for one in recordings
-    ]  # fmt: skip
-    for (one, ladder), (other, _) in itertools.permutations(zip(recordings, ladders, strict=True), 2):
-        rungs = [each._replace(held_out_error=law_error(each.law, each.values, [other])) for each in ladder]
-        result.pairs.append(Pair(one.name, other, rungs))

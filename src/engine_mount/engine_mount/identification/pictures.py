@@ -120,9 +120,6 @@ def draw_friction(result: Any, file: Path) -> None:
         panels.append(Panel(f'held out: {measured.name}', 'time (s)', 'friction force (N)', curves))
     if result.rungs and result.held_out:
         panels.append(_prediction(result.held_out[0], best_rung(result.rungs)))
-    if result.pairs:
-        pair = min(result.pairs, key=lambda each: best_rung(each.rungs).error)
-        panels.append(_prediction(pair.recording, best_rung(pair.rungs)))
     _draw(file, panels, min(2, len(panels)))
 
 

@@ -43,7 +43,7 @@ def rack(tmp_path_factory):
 
 
 def test_several_paths_after_one_option_become_repeated_options():
-    words = ['identify', 'friction', '--train', 'a', 'b', '--json', 'd', '--file', 'e']
+    words = ['identify', 'friction', '--train', 'a', 'b', '--json', 'd', '--held-out', 'e']
     assert with_repeated_options(words) == [*words[:4], '--train', *words[4:]]
     assert with_repeated_options(['--train', 'a', '--', 'b']) == ['--train', 'a', '--', 'b']
     assert with_repeated_options(['--train=a', 'b']) == ['--train=a', 'b']
@@ -97,10 +97,6 @@ def test_bad_files_are_refused_and_nothing_is_written(suffix, content, words, tm
     targets = ('--json', tmp_path / 'f.json', '--out', tmp_path / 'f.yaml', '--figure', tmp_path / 'f2.png')
     assert words in refused('identify', 'friction', '--train', bad, *targets)
     assert list(tmp_path.iterdir()) == [bad]
-
-
-def test_one_file_alone_is_no_pair(rack):
-    assert 'the ladder needs at least 2' in refused('identify', 'friction', '--file', rack / '80.csv')
 
 
 def test_a_recording_of_the_rack_is_read_as_it_measured_and_identified(tmp_path):

@@ -30,7 +30,7 @@ FRICTION_EXAMPLES = (
 `engine-mount identify friction --train ramp.csv 40N.csv 120N.csv --held-out 80N.csv --base left.yaml
 --name left --out left.yaml` - into the specimen file that init and control load
 
-`engine-mount identify friction --file a.json b.json c.json` - trained on each, predicting each other one
+`engine-mount identify friction --train a.json --held-out b.json c.json` - trained on one, predicting others
 
 `engine-mount identify friction --train rig.mat --column friction_force=cell:lbf --step ladder` - any format
 
@@ -49,7 +49,6 @@ def friction(
     held_out: Annotated[
         list[str] | None, option('recordings that no fit uses, for judgement', 'FILE...')
     ] = None,
-    file: Annotated[list[str] | None, option('train on each, predict each other one', 'FILE...')] = None,
     step: Annotated[str, option('auto, or only: ramp (step 1), sawtooth, ladder')] = 'auto',
     column: Annotated[
         list[str] | None,
@@ -88,12 +87,10 @@ def friction(
     mapping = with_options(mapping_of(map_file), (), time, rate)
     columns = friction_mapping(column or [], mapping, stated(dbc, decimal, delimiter))
     screen = TerminalScreen()
-    training, unseen, files = (
-        [local(place, screen) for place in places or []] for places in (train, held_out, file)
-    )
+    training, unseen = ([local(place, screen) for place in places or []] for places in (train, held_out))
     with progress() as bar:
         result = identify.friction(
-            training, unseen, files=files, step=step, clamp=clamp, zero=zero, columns=columns, seed=seed,
+            training, unseen, step=step, clamp=clamp, zero=zero, columns=columns, seed=seed,
             base=base or '', progress=bar,
         )  # fmt: skip
     publish(result, json_file, figure, out, name)

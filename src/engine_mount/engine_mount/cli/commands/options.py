@@ -192,7 +192,7 @@ def stated(dbc: Path | None, decimal: str, delimiter: str) -> 'Stated':
     return Stated(dbc=dbc, decimal=decimal, delimiter=delimiter)
 
 
-SEVERAL = ('--train', '--held-out', '--file')
+SEVERAL = ('--train', '--held-out')
 
 
 def with_repeated_options(arguments: Sequence[str], several: Sequence[str] = SEVERAL) -> list[str]:

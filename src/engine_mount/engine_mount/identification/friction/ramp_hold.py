@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import approx_fprime, least_squares
 from scipy.signal import savgol_filter
 
 from engine_mount.identification.fitting import (
@@ -270,12 +270,8 @@ def _check_response(name: str, response: RampResponse, misfits: tuple[float, flo
 
 def _contact_covariance(response: RampResponse, covariance: FloatArray) -> FloatArray:
     """Return the covariance (3, 3) of c_R, d_R, c_Re by linear propagation."""
-    slopes = np.zeros((3, len(response)))
-    for place in range(5):
-        step = 1e-6 * abs(response[place])
-        sides = [np.array(response) + sign * step * (np.arange(7) == place) for sign in (1.0, -1.0)]
-        up, down = (np.array(RampResponse(*side).contact()) for side in sides)
-        slopes[:, place] = (up - down) / (2.0 * step)
+    values = np.array(response)
+    slopes = approx_fprime(values, lambda each: RampResponse(*each).contact(), 1e-7 * np.abs(values) + 1e-30)
     return slopes @ covariance @ slopes.T
 
 

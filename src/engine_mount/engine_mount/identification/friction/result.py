@@ -10,12 +10,12 @@ from scipy.signal import savgol_filter
 
 from engine_mount.identification.fitting import FloatArray, IdentificationError, rms
 from engine_mount.identification.friction.coefficients import CoefficientFit
-from engine_mount.identification.friction.ladder import Rung
+from engine_mount.identification.friction.ladder import Rung, best_rung
 from engine_mount.identification.friction.laws import pad_force
 from engine_mount.identification.friction.ramp_hold import RampHoldFit, mean_contact
 from engine_mount.identification.friction.recording import FrictionRecording, smoothed_displacement
 from engine_mount.identification.friction.sawtooth import StrokeLine, slip_regions
-from engine_mount.identification.friction.screening import Case, FirstLook, explained, ladder_case
+from engine_mount.identification.friction.screening import Case, FirstLook, ladder_case
 from engine_mount.identification.specimen import rounded, with_part
 from engine_mount.recordings.screen import Screen, Table
 from mount_models.friction.coefficient import FrictionCoefficients
@@ -60,14 +60,6 @@ def validate(
     return ModelValidation(recording, full, simplified, *errors)
 
 
-class Pair(NamedTuple):
-    """The ladder trained on one recording and tried on another."""
-
-    train: str
-    recording: FrictionRecording
-    rungs: list[Rung]
-
-
 @dataclass
 class FrictionIdentification:
     """All that was found; lists are empty where a step had no recordings.
@@ -85,35 +77,19 @@ class FrictionIdentification:
     validations: list[ModelValidation] = field(default_factory=list)
     rungs: list[Rung] = field(default_factory=list)
     held_out: list[FrictionRecording] = field(default_factory=list)
-    pairs: list[Pair] = field(default_factory=list)
     looks: dict[str, FirstLook] = field(default_factory=dict)
     cases: list[Case] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @functools.cached_property
     def ladder(self) -> dict[str, dict[str, Any]]:
-        """Errors and parameters of each law; over pairs the mean errors, and the worst."""
-        if not self.pairs:
-            return {each.law.name: each.figures() for each in self.rungs}
-        result = {}
-        for same in zip(*(pair.rungs for pair in self.pairs), strict=True):
-            held_out = [each.error for each in same]
-            result[same[0].law.name] = {
-                'train_error': float(np.mean([each.train_error for each in same])),
-                'held_out_error': float(np.mean(held_out)),
-                'worst_held_out_error': max(held_out),
-                'explained': float(np.mean([explained(error) for error in held_out])),
-                'parameters': {
-                    pair.train: each.parameters for pair, each in zip(self.pairs, same, strict=True)
-                },
-            }
-        return result
+        """Errors and parameters of each law."""
+        return {each.law.name: each.figures() for each in self.rungs}
 
     @property
     def best(self) -> str:
         """The law with the least error, held out if anything is."""
-        judged = 'held_out_error' if self.pairs or self.held_out else 'train_error'
-        return min(self.ladder, key=lambda name: self.ladder[name][judged])
+        return best_rung(self.rungs).law.name
 
     def all_cases(self) -> list[Case]:
         """Return the cases of the recordings and of the ladder."""
@@ -150,15 +126,6 @@ class FrictionIdentification:
             ]
         if self.ladder:
             result |= {'ladder': self.ladder, 'best': self.best}
-        if self.pairs:
-            result['pairs'] = [
-                {
-                    'train': pair.train,
-                    'held_out': pair.recording.name,
-                    'ladder': {each.law.name: each.figures() for each in pair.rungs},
-                }
-                for pair in self.pairs
-            ]
         return {**result, 'cases': [case._asdict() for case in self.all_cases()]}
 
     def report(self, screen: Screen) -> None:
@@ -193,8 +160,6 @@ class FrictionIdentification:
                 f'{each.simplified_error:.1%}; macroslip {each.full_macroslip_error:.1%}, '
                 f'{each.simplified_macroslip_error:.1%}'
             )
-        if self.pairs:
-            screen.table(self._pair_table())
         if self.ladder:
             screen.table(_ladder_table(self.ladder))
             screen.say(f'best: {self.best}')
@@ -245,19 +210,6 @@ class FrictionIdentification:
         from engine_mount.identification.pictures import draw_friction
 
         draw_friction(self, file)
-
-    def _pair_table(self) -> Table:
-        names = list(dict.fromkeys(pair.train for pair in self.pairs))
-        rows = [
-            (
-                f'{names.index(pair.train) + 1} -> {names.index(pair.recording.name) + 1}',
-                *(f'{each.error:.1%}' for each in pair.rungs),
-            )
-            for pair in self.pairs
-        ]
-        heads = ('held-out error', *(each.law.name for each in self.pairs[0].rungs))
-        caption = ', '.join(f'{number}: {name}' for number, name in enumerate(names, 1))
-        return Table('', 'l' + 'r' * (len(heads) - 1), rows, heads, caption)
 
 
 def _ramp_figures(fit: RampHoldFit) -> dict[str, Any]:

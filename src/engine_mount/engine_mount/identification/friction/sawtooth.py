@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import linregress
 from scipy.stats import t as student
 
 from engine_mount.identification.fitting import FloatArray, IdentificationError, rms
@@ -210,19 +211,10 @@ def _line(
         for values in (xi, force)
     )
     relief = rise / (span * contact.contact_stiffness)
-    centre, freedom = u.mean(), u.size - 2
-    matrix = np.column_stack([np.ones_like(u), u - centre])
-    (level, slope), *_ = np.linalg.lstsq(matrix, mu, rcond=None)
-    residual = mu - matrix @ np.array([level, slope])
-    variance = residual @ residual / freedom
-    slope_variance = variance / max(((u - centre) ** 2).sum(), 1e-300)
-    deviations = (
-        float(np.sqrt(variance / u.size + centre**2 * slope_variance)),
-        float(np.sqrt(slope_variance)),
-    )
-    factor = float(student.ppf(0.5 + 0.5 * CONFIDENCE, freedom))
+    line, factor = linregress(u, mu), float(student.ppf(0.5 + 0.5 * CONFIDENCE, u.size - 2))
+    deviations = float(line.intercept_stderr), float(line.stderr)
     return StrokeLine(
-        recording.name, velocity - creep / span - relief, clamp, float(level - slope * centre), float(slope),
+        recording.name, velocity - creep / span - relief, clamp, float(line.intercept), float(line.slope),
         factor * deviations[0], factor * deviations[1], *deviations, u, mu,
         velocity, slice(first, last), window,
     )  # fmt: skip
