@@ -1,5 +1,6 @@
 """The driver on an interface of SocketCAN, in the virtual machine: frames, losses, an interface that goes."""
 
+import itertools
 import subprocess
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -210,9 +211,14 @@ def test_a_driver_reports_that_its_interface_went_and_works_again_with_it(make_n
     set_up_again()
     far = FarEnd('socketcan', CHANNEL, 0)
     assert driver.trigger_activate() == SUCCESS
-    far.send(sample(0))
-    wait_until(lambda: driver._exchange.counts().samples, 'a sample')
-    assert driver._exchange.failure == ''
-    stamp = driver._exchange.link.latest.stamp
-    assert driver._exchange.send_setpoint(stamp, 1.0) or driver._exchange.link.last_refusal
+    exchange, numbers = driver._exchange, itertools.count()
+
+    def answered():
+        far.send(sample(next(numbers)))
+        latest = exchange.link.latest
+        return latest is not None and exchange.send_setpoint(latest.stamp, 1.0)
+
+    wait_until(answered, 'an answer in time')
+    assert far.setpoint_where(lambda setpoint: setpoint.enable).current == 1.0
+    assert exchange.failure == ''
     far.close()
