@@ -1,6 +1,7 @@
 """A fleet from the first to the last command: the same result from a disk, from S3 and from SFTP."""
 
 import json
+import re
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -70,7 +71,7 @@ def test_every_recording_has_a_row_and_the_damaged_ones_a_reason(local):
     told = {row['recording'].partition('/')[2]: row['reason'] for row in catalogue_of(local)[0].to_pylist()}
     assert 'without its footer' in told['19_truncated']
     assert 'metadata.yaml is missing' in told['19_no_metadata']
-    assert 'lost' in told['19_wrong_checksum']
+    assert re.search('lost|checksum', told['19_wrong_checksum'])  # in a chunk, or in an index between two
     done = [row for row in rows if not row['reason']]
     assert any(row['setpoints_differing'] for row in done)
     assert all(row['as_recorded'] for row in done if not row['recording'].endswith('18_middle'))  # too short
