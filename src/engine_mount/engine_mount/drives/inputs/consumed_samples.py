@@ -202,7 +202,7 @@ def _consumed(
             notes.append('the controller was not active in this recording: it starts after the air_gap here')
         after = stamps > gaps[0].stamp
         return stamps[after], values[after]
-    consumed = np.union1d(answered, _taken_without_answer(stamps, answered, answers, period, notes))
+    consumed = _union(answered, _taken_without_answer(stamps, answered, answers, period, notes))
     inside = stamps[(stamps >= consumed[0]) & (stamps <= consumed[-1])]
     late = inside[~places_in(consumed, inside)[0]]
     if late.size:
@@ -238,7 +238,7 @@ def _answered(
     by_init = np.sort(np.concatenate([np.empty(0, np.int64), *(ramp.stamps for ramp in ramps)]))
     setpoints = setpoints[~places_in(by_init, setpoints)[0]]
     beginning = min(gaps[0].stamp, int(traces[0]) - 1) if traces.size else gaps[0].stamp
-    answered = np.union1d(setpoints, traces)
+    answered = _union(setpoints, traces)
     answered = answered[answered > beginning]
     if not traces.size:
         return answered
@@ -313,5 +313,14 @@ def places_in(stamps: Times, wanted: Times) -> tuple[NDArray[np.bool_], NDArray[
     """
     if not len(stamps):
         return np.zeros(len(wanted), bool), np.zeros(len(wanted), np.intp)
+    begin = int(np.searchsorted(stamps, wanted[:1])[0]) if len(wanted) else 0
+    if np.array_equal(stamps[begin : begin + len(wanted)], wanted):  # as they mostly are: a tenth of the time
+        return np.ones(len(wanted), bool), np.arange(begin, begin + len(wanted))
     places = np.minimum(np.searchsorted(stamps, wanted), len(stamps) - 1)
     return stamps[places] == wanted, places
+
+
+def _union(stamps: Times, others: Times) -> Times:
+    """Return all of two rows of stamps; mostly the others are among the first."""
+    lacking = others[~places_in(stamps, others)[0]]
+    return np.union1d(stamps, lacking) if lacking.size else stamps
