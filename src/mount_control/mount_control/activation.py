@@ -8,7 +8,7 @@ from mount_control.control_loop import ControlLoop
 from mount_control.force_maker import ForceTableError
 
 _PATIENCE = 1.0  # s, chosen: latched messages may still be under way when control is activated
-_LOOK_PERIOD = 0.01  # s
+LOOK_PERIOD = 0.01  # s, between looks at what other threads bring
 _COUNTED = 50  # chosen: samples from which their rate is known
 _RATE_TOLERANCE = 0.2  # chosen: less than any other rate lies beside
 _REMEDY = 'activate mount_init (again)'
@@ -40,7 +40,7 @@ class Activation:
             try:
                 check_belongs(loop, table.stamp if table else None, air_gap.stamp if air_gap else None)
             except ForceTableError:
-                if time.monotonic() > limit or ending.wait(_LOOK_PERIOD):
+                if time.monotonic() > limit or ending.wait(LOOK_PERIOD):
                     raise
                 continue
             assert air_gap is not None

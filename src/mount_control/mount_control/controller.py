@@ -207,17 +207,17 @@ def _run(law, tables, state, window, traces, displacements, frequencies):
 def _step(mount, sound, numbers, trace, displacement, bridged_samples, crank_frequency):
     """Take one sample; `numbers` are those of `trace`, `sound`: whether all of the state are finite."""
     _, _, state, bits, _ = mount
-    known = _known(crank_frequency)
     if not abs(displacement) <= FARTHEST_DISPLACEMENT:  # also NaN
-        return _refuse(numbers, trace, displacement, known)
+        return _refuse(numbers, trace, displacement, crank_frequency)
     if not sound:
-        return _clear(mount, numbers, trace, displacement, known)
+        return _clear(mount, numbers, trace, displacement, crank_frequency)
+    known = _known(crank_frequency)
     rise = (displacement - state.displacement) / (bridged_samples + 1)
     for _ in range(bridged_samples):
         _advance(mount, trace, state.displacement + rise, known)
     trace.crank_frequency, trace.bridged_samples = known, bridged_samples
     if not (_advance(mount, trace, displacement, known) and _all_finite(bits)):
-        return _clear(mount, numbers, trace, displacement, known)
+        return _clear(mount, numbers, trace, displacement, crank_frequency)
     return trace.current
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
 
-from mount_control.activation import Activation, AirGap, check_rate
+from mount_control.activation import LOOK_PERIOD, Activation, AirGap, check_rate
 from mount_control.control_loop import OFF, ControlLoop, SampleCounts
 from mount_control.controller import load_compiled_law
 from mount_control.diagnosis import counted_since, verdict
@@ -43,7 +43,6 @@ _MEASURED_BEFORE = (
     ),
 )
 _LOADING = 5.0  # s, chosen: at 1 kHz electronics load the longest table, 1000 points, in 1 s
-_LOOK_PERIOD = 0.01  # s
 
 
 class MountControl(SafeLifecycleNode):
@@ -202,7 +201,7 @@ class MountControl(SafeLifecycleNode):
         self._send_law_table(law_table_message(points))
         limit = time.monotonic() + _LOADING
         while not self._electronics_loaded:
-            if time.monotonic() > limit or self.ending.wait(_LOOK_PERIOD):
+            if time.monotonic() > limit or self.ending.wait(LOOK_PERIOD):
                 raise ForceTableError(
                     f'the electronics have not loaded the table of their law within {_LOADING:g} s: set '
                     'mount_driver.shadow as mount_control.shadow; do they send MountOwnSetpoint?'

@@ -254,8 +254,9 @@ def of_run(truth: Any, *_: Any) -> Values:
 
 def of_ideal(truth: Truth, sim: SimParameters) -> Values:
     """Return `of_run` of the run without current, and {N s/m: the same with an ideal viscous damper}."""
-    own = Window(sim, 0.5, of_run(truth))
-    return of_run(truth) | {'ideal': {f'{damping:g}': own.damped(damping)[0] for damping in DAMPINGS}}
+    without = of_run(truth)
+    own = Window(sim, 0.5, without)
+    return without | {'ideal': {f'{damping:g}': own.damped(damping)[0] for damping in DAMPINGS}}
 
 
 def best(weight: float, truth: Truth, sim: SimParameters) -> Values:

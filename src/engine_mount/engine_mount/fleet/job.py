@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import yaml
 
-from engine_mount.fleet.places import Place
+from engine_mount.fleet.places import NEEDED_FOR, Place
 from engine_mount.fleet.runner import run_tasks
 from engine_mount.signals.signal import required
 from engine_mount.signals.sources.stores import local_copy
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 Rows = Mapping[str, Sequence[Row]]
 """{table: rows}."""
-NEEDED_FOR = 'a table of a fleet'
-"""What a missing library is needed for."""
 
 JOURNAL, ORDER = 'journal.jsonl', 'order.json'
 OUTAGES = 4

@@ -13,6 +13,8 @@ from engine_mount.signals.sources.stores import entries
 from engine_mount.signals.sources.uris import Entry, SourceError, is_uri, local_path, scheme_of, shown
 from mount_recorder.metadata import METADATA_NAME
 
+NEEDED_FOR = 'a table of a fleet'
+"""What a missing library is needed for."""
 _RECORDED = re.compile(r'(?P<stem>.+?)\.(mcap|db3)(\.(zstd|lz4|zst))?')
 _PIECE = re.compile(r'(?P<name>.+)_\d+')
 
@@ -70,7 +72,7 @@ def select_recordings(sources: Sequence[str]) -> list[Place]:
 
 
 def _of_catalogue(table: Path) -> list[Place]:
-    parquet = required('pyarrow.parquet', 'a table of a fleet')
+    parquet = required('pyarrow.parquet', NEEDED_FOR)
     columns = parquet.read_table(table, columns=['uri', 'recording', 'size_bytes', 'fingerprint']).to_pydict()
     rows = zip(*columns.values(), strict=True)  # one for each mount
     return list(dict.fromkeys(Place(uri, name, size or 0, mark or '') for uri, name, size, mark in rows))

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from engine_mount.fleet.job import COLUMNS, JOURNAL, NEEDED_FOR, ORDER
+from engine_mount.fleet.job import COLUMNS, JOURNAL, ORDER
+from engine_mount.fleet.places import NEEDED_FOR
 from engine_mount.signals.signal import required
 from mount_models.quantity import nearest
 

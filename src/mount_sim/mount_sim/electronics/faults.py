@@ -13,7 +13,7 @@ from mount_driver.bus import Frame
 from mount_driver.can_library import can
 from mount_models.quantity import ParameterError, nearest
 from mount_models.sampling import HIGHEST_CURRENT, SAMPLE_RATE
-from mount_sim.electronics.vehicle_bus import IDENTIFIER as SPEED
+from mount_sim.electronics.vehicle_bus import speed_signal
 from mount_sim.plant.ripple import REFERENCE_CELSIUS, TemperatureCoefficients
 from mount_sim.random_numbers import RandomNumbers
 
@@ -130,7 +130,8 @@ def _codec() -> 'MountCodec':
 
 @cache
 def _foreign_identifiers() -> list[int]:
-    own = {SPEED, *(each.frame_id for each in (_codec().measurement, _codec().setpoint, _codec().status))}
+    layouts = _codec().measurement, _codec().setpoint, _codec().status, speed_signal().message
+    own = {layout.frame_id for layout in layouts}
     return [number for number in range(0x800) if number not in own]
 
 
@@ -226,10 +227,11 @@ def _speed(sent):
     """Send these two bytes for the speed of the engine, or none of its messages."""
 
     def changed(fault, frames):
+        speed = speed_signal().message.frame_id
         for frame in frames:
-            if frame.arbitration_id == SPEED and sent:
+            if frame.arbitration_id == speed and sent:
                 frame.data[3:5] = sent
-        return [frame for frame in frames if sent or frame.arbitration_id != SPEED]
+        return [frame for frame in frames if sent or frame.arbitration_id != speed]
 
     return changed
 

@@ -1,21 +1,30 @@
 """What the simulated vehicle sends of its engine: `dbc/vehicle.dbc`, every 10 ms."""
 
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from mount_driver.bus import Frame
-from mount_driver.engine_speed import EngineSpeedParameters, SpeedSignal
-from mount_models.quantity import flattened
+if TYPE_CHECKING:
+    from mount_driver.bus import Frame
+    from mount_driver.engine_speed import SpeedSignal
 
-_PARAMETERS = EngineSpeedParameters(
-    dbc=str(Path(__file__).parents[1] / 'dbc' / 'vehicle.dbc'), message='EngineData', signal='EngineSpeed'
-)
-READ_BY_DRIVER: dict[str, Any] = flattened(_PARAMETERS, 'engine_speed')
+_DBC, _MESSAGE, _SIGNAL = str(Path(__file__).parents[1] / 'dbc' / 'vehicle.dbc'), 'EngineData', 'EngineSpeed'
+READ_BY_DRIVER = {
+    'engine_speed.dbc': _DBC,
+    'engine_speed.message': _MESSAGE,
+    'engine_speed.signal': _SIGNAL,
+}
 """{parameter: value} with which mount_driver reads the speed of the engine."""
 PERIOD = 0.01  # s
-_SIGNAL = SpeedSignal(_PARAMETERS)
-IDENTIFIER: int = _SIGNAL.message.frame_id
 _IGNITIONS = 2.0  # chosen: of four cylinders in a turn of the crankshaft
+
+
+@cache
+def speed_signal() -> 'SpeedSignal':
+    """Return the signal of the speed; its DBC is read on the first call."""
+    from mount_driver.engine_speed import EngineSpeedParameters, SpeedSignal  # loads the libraries of CAN
+
+    return SpeedSignal(EngineSpeedParameters(dbc=_DBC, message=_MESSAGE, signal=_SIGNAL))
 
 
 def sent_every(sample_rate: float) -> int:
@@ -23,14 +32,16 @@ def sent_every(sample_rate: float) -> int:
     return round(PERIOD * sample_rate)
 
 
-def speed_frame(ignition_frequency: float) -> Frame:
+def speed_frame(ignition_frequency: float) -> 'Frame':
     """Return the message of an engine that ignites so often (Hz)."""
-    rpm = 60.0 * ignition_frequency / _IGNITIONS
-    return Frame(IDENTIFIER, _SIGNAL.message.encode({'EngineSpeed': rpm}))
+    from mount_driver.bus import Frame
+
+    message, rpm = speed_signal().message, 60.0 * ignition_frequency / _IGNITIONS
+    return Frame(message.frame_id, message.encode({_SIGNAL: rpm}))
 
 
 def received_velocity(ignition_frequency: float) -> float:
     """Return the speed (rad/s) as mount_driver publishes it."""
-    velocity = _SIGNAL.velocity(speed_frame(ignition_frequency).data)
+    velocity = speed_signal().velocity(speed_frame(ignition_frequency).data)
     assert velocity is not None
     return velocity

@@ -169,15 +169,16 @@ class MountRun:
             samples.traced[part] = True
             samples.count += taken
             chain.loop.follow(int(samples.stamps[samples.count - 1]), taken)
-            for stamp in samples.stamps[part].tolist():
-                self._take_speed(stamp)
+            self._take_speed(self.stamp, taken)
             mount.skip(taken, last)
         return taken
 
-    def _take_speed(self, stamp: int) -> None:
-        """Let the control take what the vehicle sends with the sample of a stamp (ns)."""
-        if self._speed is not None and stamp % self._speed_period == 0:
-            self.chain.loop.engine_speed.take(stamp, self._speed, stamp)
+    def _take_speed(self, first: int, count: int = 1) -> None:
+        """Let the control take what the vehicle sends with `count` samples from the stamp `first` (ns) on."""
+        if self._speed is not None:
+            end, period = first + count * self.mount.sample_time, self._speed_period
+            for stamp in range(first + -first % period, end, period):
+                self.chain.loop.engine_speed.take(stamp, self._speed, stamp)
 
     def end(self) -> None:
         """Write the remaining samples, and 0 A as mount_control answers when it is deactivated."""
