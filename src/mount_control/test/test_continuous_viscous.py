@@ -89,9 +89,11 @@ def test_force_opposes_the_velocity_at_which_it_acts() -> None:
 
 
 def test_force_is_small_where_the_velocity_reverses() -> None:
-    answers, _ = followed(sine(8.0, 1e-3))
+    answers, traces = followed(sine(8.0, 1e-3))
     force, velocity, _ = answers[1000:].T
-    assert np.abs(force[np.abs(velocity) < 0.5e-3]).max() < 1.0
+    reversing = np.abs(traces['predicted_velocity'][1000:]) < 0.5e-3
+    assert np.abs(force[reversing]).max() < 1.6
+    assert np.abs(velocity[reversing]).min() > 1e-3  # else: large normal forces
 
 
 @pytest.mark.parametrize('crank_orders', [0.0, 0.5, 2.0, 6.0])

@@ -81,6 +81,18 @@ def test_the_idle_force_is_a_sine_with_its_second_harmonic(recording, scenario):
     np.testing.assert_array_equal(other.values[:], excitation.values[:])
 
 
+def test_cylinders_that_differ_shake_the_engine_at_half_orders_of_its_crank():
+    of_engine = {'timeline__duration': 2.0, 'idle__amplitude': 100.0, 'idle__frequency': 40.0}
+    even, uneven = (
+        build_excitation(parameters(**of_engine, idle__uneven_share=share)).engine_forces[:]
+        for share in (0, 0.3)
+    )
+    amplitudes = 2.0 * np.abs(np.fft.rfft(uneven - even)) / uneven.size
+    expected = np.zeros_like(amplitudes)
+    expected[[20, 40, 60, 100, 120]] = 30.0  # each 0.5 Hz; the crank turns 20 times a second
+    np.testing.assert_allclose(amplitudes, expected, atol=1e-6)
+
+
 def test_a_tip_in_lifts_the_engine_once_and_adds_to_the_idle_force():
     pushed = {'tip_in__force': 400.0, 'tip_in__time': 0.2, 'tip_in__rise': 0.1}
     alone = build_excitation(parameters(timeline__duration=0.5, **pushed)).engine_forces

@@ -16,6 +16,7 @@ current. The gradient comes from the adjoint of the steps. J has several minima,
 better. The force is then made by currents in the simulation with all its laws, and that counts.
 """
 
+import copy
 import functools
 from typing import Any
 
@@ -63,6 +64,7 @@ _BANDS = (BELOW_ISOLATION, ACOUSTIC)
 _ORDER = 4  # of the band-passes, chosen
 _FIRST = 3000.0  # N s/m, chosen: the force of this ideal damper is improved
 _ITERATIONS = 150, 40, 40  # chosen; few at a time, so that the linear car stays near the simulation
+_HORIZON, _ITERATIONS_AHEAD = 60, 8  # samples, chosen: half a period of the engine on its mounts
 _CURRENTS = np.linspace(HIGHEST_CURRENT, 0.1, 1000)  # A, chosen: while they fall the pads stay closed
 
 
@@ -157,6 +159,8 @@ class Window:
         self.pads = np.zeros((len(self.rows), 2))
         self.samples = len(excitation.values) // _STEPS
         self.law = _reached(sim, STEP_TIME), _SLEW / _STEPS, sim.contact.contact_stiffness * STEP_TIME
+        self.memories = [np.zeros((_ORDER, 2)) for _ in _BANDS]
+        """What the filters of both bands hold of the time before."""
         self.shares = weight / without['displacement'], (1.0 - weight) / without['acceleration']
         self.beside = np.zeros((self.samples, 2))
         """What displacement and acceleration of the simulation have more than those here, at the samples."""
@@ -167,9 +171,9 @@ class Window:
         total, wanted = 0.0, np.zeros((self.samples, 2))
         for what, states in enumerate((self.states + self.beside).T):
             share = self.shares[what] / self.samples
-            inside = passed(states, _BANDS[what])
+            inside, _ = passed(states, _BANDS[what], self.memories[what])
             total += share * float(inside @ inside)
-            wanted[:, what] = 2.0 * share * passed(inside[::-1], _BANDS[what])[::-1]
+            wanted[:, what] = 2.0 * share * passed(inside[::-1], _BANDS[what])[0][::-1]
         return total, gradient(self.transposed, self.law, levels, self.rows, self.pads, wanted)
 
     @property
@@ -194,6 +198,17 @@ class Window:
             options={'maxiter': iterations, 'maxcor': 20, 'ftol': 1e-6},
         )
         return LARGEST_FORCE * found.x
+
+    def ahead(self, now: int, preview: int) -> 'Window':
+        """Return the next `_HORIZON` samples from `now` on; the road stands still behind `preview`."""
+        part = slice(_STEPS * now, _STEPS * (now + _HORIZON) + 1)
+        window = copy.copy(self)
+        window.rows, window.pads = self.rows[part].copy(), self.pads[part].copy()
+        window.samples = (len(window.rows) - 1) // _STEPS
+        window.beside = self.beside[: window.samples]
+        road = window.rows[:, _ROAD]
+        road[_STEPS * preview :] = road[min(_STEPS * preview, len(road) - 1)]
+        return window
 
     def damped(self, damping: float) -> tuple[Values, FloatArray]:
         """Return `mean_squares` and displacement (m) at 1 kHz with an ideal viscous damper (N s/m)."""
@@ -232,17 +247,18 @@ def _filter(band: Band) -> Any:
     return butter(_ORDER, band, 'bandpass', fs=SAMPLE_RATE, output='sos')
 
 
-def passed(values: FloatArray, band: Band) -> FloatArray:
-    """Return what passes the filter of a band (Hz)."""
+def passed(values: FloatArray, band: Band, memory: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return what passes the filter of a band (Hz), and its memory, (order, 2), behind the values."""
     from scipy.signal import sosfilt
 
-    return np.asarray(sosfilt(_filter(band), values))
+    found = sosfilt(_filter(band), values, zi=np.zeros((_ORDER, 2)) if memory is None else memory)
+    return np.asarray(found[0]), np.asarray(found[1])
 
 
 def mean_squares(displacement: FloatArray, acceleration: FloatArray) -> Values:
     """Return the mean squares in their bands, in m^2 and m^2/s^4."""
     both = zip((displacement, acceleration), _BANDS, strict=True)
-    return dict(zip(MEASURES, (float(np.mean(passed(*each) ** 2)) for each in both), strict=True))
+    return dict(zip(MEASURES, (float(np.mean(passed(*each)[0] ** 2)) for each in both), strict=True))
 
 
 def of_run(truth: Any, *_: Any) -> Values:
@@ -257,6 +273,23 @@ def of_ideal(truth: Truth, sim: SimParameters) -> Values:
     without = of_run(truth)
     own = Window(sim, 0.5, without)
     return without | {'ideal': {f'{damping:g}': own.damped(damping)[0] for damping in DAMPINGS}}
+
+
+def foreseen(preview: int, truth: Truth, sim: SimParameters) -> Values:
+    """Return `mean_squares` of the linear car where the road is known only `preview` samples ahead.
+
+    Each level is the first of the best for the next `_HORIZON` samples; state and engine are known.
+    """
+    window = Window(sim, 0.5, of_run(truth))
+    levels = np.zeros(window.samples)
+    for now in range(window.samples):
+        coming = slice(now, now + _HORIZON)
+        levels[coming] = window.ahead(now, preview).improved(levels[coming], _ITERATIONS_AHEAD)
+        steps = slice(_STEPS * now, _STEPS * (now + 1) + 1)
+        ride(window.matrix, window.law, levels[now : now + 1], window.rows[steps], window.pads[steps])
+        now_states = window.states[now : now + 1].T
+        window.memories = [passed(*each)[1] for each in zip(now_states, _BANDS, window.memories, strict=True)]
+    return mean_squares(*window.states.T)
 
 
 def best(weight: float, truth: Truth, sim: SimParameters) -> Values:

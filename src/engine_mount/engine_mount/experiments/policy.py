@@ -31,6 +31,7 @@ from engine_mount.experiments.policy_cases import (
     CONTINUOUS,
     DISTURBANCES,
     ENGINE_ROADS,
+    FORESEEN,
     FRONT,
     GAP_TIME,
     HYDRO,
@@ -40,6 +41,7 @@ from engine_mount.experiments.policy_cases import (
     NOMINAL,
     OFF,
     POLICIES,
+    PREVIEWS,
     PULLS,
     ROADS,
     SHOCKS,
@@ -247,6 +249,16 @@ def figures_of(found: Found, own: PolicyParameters, axes: Axes) -> Values:
             number(1e6 * road): {who: of_engine(who, road) for who in (*COMPARED, KNOWN)}
             for road in ENGINE_ROADS
         },
+        'uneven': {
+            who: {
+                number(frequency): [
+                    over('acceleration', 'uneven', who, frequency, other=OFF),
+                    over('rms_m', 'uneven', who, frequency),
+                ]
+                for frequency in axes.engine_frequencies
+            }
+            for who in (*COMPARED, KNOWN)
+        },
         'hydromounts': {
             who: {other: over_hydromount(who, other) for other in HYDROMOUNTS} for who in POLICIES
         },
@@ -307,6 +319,10 @@ def bound_of(found: Found, name: str) -> Values:
         'mounts': {who: ratios(found['bound', who, name]) for who in COMPARED},
         'ideal': {damping: ratios(figures) for damping, figures in without['ideal'].items()},
         'late': ratios(found['bound', OFF, name, 0.5]['late']),
+        'foreseen': {
+            number(preview): ratios(found['bound', OFF, name, 'foreseen', preview])
+            for preview in (PREVIEWS if name == FORESEEN else ())
+        },
         'best': {number(weight): ratios(found['bound', OFF, name, weight]) for weight in BOUND_WEIGHTS},
     }
 

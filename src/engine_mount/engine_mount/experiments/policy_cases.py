@@ -71,6 +71,7 @@ ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
+_UNEVEN = 0.3  # chosen
 SHOCKS = (0.06, 0.1)  # m, chosen: depths of gaps beyond any in a road
 PULLS = {
     'tip-in': {'tip_in.force': 400.0},
@@ -82,6 +83,7 @@ AMPLITUDES, FREQUENCIES = (0.002, 0.01, 0.03, 0.06), (6.0, 8.0, 11.0)
 """m, Hz, chosen: depths of a gap in a flat road, engines on their mounts: nothing may move a while later."""
 _SHOWN_LEVELS, _SHOWN_DEPTH = (0.04, 0.12), 0.02
 BOUND_WEIGHTS = (0.2, 0.5, 0.8)  # chosen: of the displacement in J
+FORESEEN, PREVIEWS = 'class A', (5, 20, 40)  # ms, chosen
 _BOUND_SECONDS = 3.0  # s, chosen: all that the optimum is sought for is known ahead
 _SETTLING = 1.0  # s, chosen: a road fades in for so long
 _PERIODS = 8  # evaluated on the rack
@@ -163,6 +165,9 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
             add(('bound', who, name), sim, bound.of_ideal if who == OFF else bound.of_run)
         for weight in BOUND_WEIGHTS:
             add(('bound', OFF, name, weight), sim, partial(bound.best, weight))
+        if name == FORESEEN:
+            for preview in PREVIEWS:
+                add(('bound', OFF, name, 'foreseen', preview), sim, partial(bound.foreseen, preview))
     if not own.thorough:
         return cases
     for who in HYDROMOUNTS:
@@ -191,6 +196,9 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
     ):
         sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
         add(('engine', who, roughness, frequency, force), sim, of_road)
+    for frequency, who in product(axes.engine_frequencies, (*COMPARED, KNOWN)):
+        uneven = {'idle.frequency': frequency, 'idle.uneven_share': _UNEVEN}
+        add(('uneven', who, frequency), _road(_ROUGH, 6.0, 100.0) | uneven, of_road)
     for (road, roughness), noise, who in product(ROADS.items(), axes.noise, COMPARED):
         sim = _road(roughness, 6.0) | {'electronics.displacement_noise': 1e-6 * noise}
         add(('noise', who, road, noise), sim, of_road)

@@ -63,14 +63,16 @@ def page_of(figures: Values, pictures: Collection[str]) -> str:
 `engine-mount experiment policy` writes this page from its numbers. Two policies drive the
 same mount. `{PAPER}`, the paper's, waits until the magnitude has exceeded 0.8 mm for one period and then
 damps by a characteristic of the velocity in the band. `{CONTINUOUS}` engages a viscous damper with the
-amplitude in the band, by half at 0.13 mm, without waiting, takes the force from the unfiltered velocity,
+amplitude in the band, by half at 0.1 mm, without waiting, takes the force from the unfiltered velocity,
 and cancels the lines of the engine (`mount_control/policy/continuous_viscous.py`):
 
-    |F| = min(max(c g v_n sgn v - K x_l sgn v, 0), 2 c g |v|),  g -> A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2)
+    F = c g v_n - K (1 + r) x_l where that has the direction of v, else 0
+    g follows A^2 / (A^2 + A_0^2 + A A_l + A_n^2)
 
 v: velocity, v_n without lines of the engine; x_l: the lines when the force acts; A, A_l, A_n: amplitudes of
-motion in the band, lines and noise. `mount_control.policy` selects the policy. All figures are
-simulated; vehicle and hydromount are chosen, not measured.
+motion in the band, lines and noise; r: up to 0.5 where the lines turn the friction, so that half of each
+period is left. `mount_control.policy` selects the policy. All figures are simulated; vehicle and hydromount
+are chosen, not measured.
 
 All ratios are to the original hydromount (displacement) or to the same mount without current (acceleration):
 a ratio below 1 is better.
@@ -125,13 +127,15 @@ def best_force(windows: Values, picture: str) -> str:
     def cost(point: Values) -> float:
         return float(np.mean([point[measure] for measure in MEASURES]))
 
-    rows = {}
+    rows, foreseen = {}, ''
     for name, each in windows.items():
         best = each['best']['0.5']
         late = {f'{LATE} ms later': each['late']}
         ideal = {f'{damping} N s/m': point for damping, point in each['ideal'].items()}
         ratios = {who: cost(point) / cost(best) for who, point in (late | each['mounts'] | ideal).items()}
         rows[name] = {'J of the best': cost(best), 'its wear, W': best['wear_w']} | ratios
+        for preview, point in each['foreseen'].items():
+            foreseen += f'| {name} | {preview} | {cost(point) / cost(best):.2f} |\n'
     return f"""## The best force of the pads
 
 {picture}Road and engine are known for the whole window of 3 to 4 s. J is the mean of \
@@ -142,7 +146,14 @@ are from there. It is a local optimum, so at least this good. J of each mount ov
 
 {by_name('window', rows)}
 `{LATE} ms later`: the same currents, so much later, as the delay of the loop would make them. The ideal \
-dampers know the velocity at once and nothing else. The best force also knows what road and engine will do.
+dampers know the velocity at once and nothing else. The best force also knows what road and engine will do. \
+What that is worth: the best force for the next 60 ms, found anew at each sample of the linear car from its \
+exact state, where the road is known for so long and taken to stand still behind. J over J of the best:
+
+| window | road known ahead, ms | J |
+|---|---|---|
+{foreseen}
+Nothing in the car sees the road ahead of the wheel: the J of the law in the table above is without it.
 """
 
 
@@ -195,6 +206,10 @@ moves up to {moved.max():.2f} times as far as on the hydromount.
 def thorough(figures: Values, beaten: str) -> str:
     """Return the parts from other engines on; `beaten` holds the limits of any policy."""
     engine = front = ''
+    uneven = {
+        who: {f'{frequency} Hz': '{:.2f}, {:.2f}'.format(*values) for frequency, values in each.items()}
+        for who, each in figures['uneven'].items()
+    }
     for roughness, each in figures['engine'].items():
         for who, cases in each.items():
             worst = max(cases, key=lambda case: cases[case][0])
@@ -249,10 +264,14 @@ worst and the mean of all frequencies of the engine's line and forces; the line'
 | roughness | | acceleration: worst, at | mean | share above 1.05 | displacement: mean | worst |
 |---|---|---|---|---|---|---|
 {engine}
-The price of quiet: where a strong line meets a smooth road, the damper stays nearly off and the \
-engine moves more than on the hydromount, which transmits the line instead. `line_weight` weighs one \
-against the other. A bank of resonators finds the lines; `speed known`: the vehicle sends the speed of its \
-engine (`mount_sim.idle.speed_sent`).
+An engine whose cylinders differ, class A, 100 N: orders 0.5, 1, 1.5, 2.5 and 3 of the crankshaft have 0.3 \
+of the line's force. Acceleration and displacement as above, by frequency of the line:
+
+{by_name('', uneven)}
+The price of quiet: where a strong line meets a smooth road, its friction would be heard, so the damper is \
+released and the engine moves more than on the hydromount, which transmits the line instead. `line_weight` \
+weighs one against the other. A bank of resonators finds the lines; `speed known`: the vehicle sends the \
+speed of its engine (`mount_sim.idle.speed_sent`).
 
 ## Noise
 

@@ -113,6 +113,15 @@ def test_best_force_is_far_better_than_the_ideal_dampers():
     assert cost(found) < cost(found['late'])
 
 
+@pytest.mark.slow
+def test_knowledge_of_the_road_ahead_is_worth_much():
+    values = policy_cases.windows(0.0)['class A'] | {'mount': 'friction_off', 'timeline.duration': 1.5}
+    truth = truth_of_run({'mount_sim': values, 'mount_control': {}})
+    sim = with_flattened(SimParameters(), values)
+    known, unknown = (bound.foreseen(preview, truth, sim) for preview in (40, 2))
+    assert known['acceleration'] < 0.3 * unknown['acceleration']
+
+
 def test_first_extremum_is_the_first_clear_turning_point():
     time = SAMPLE_TIME * np.arange(1000)
     ringing = 0.02e-3 * np.sin(2.0 * np.pi * 90.0 * time) * (time < 0.02)

@@ -74,7 +74,7 @@ def test_gap_levels_motion_and_damping_are_told(shown):
     assert values['contact gap'].startswith('349.')
     assert values['no current: peak, rms'] > values['this mount: peak, rms']
     levels = shown.chart()['panels'][0]['levels']
-    assert [level['name'] for level in levels] == ['damping half engaged, 0.13 mm']
+    assert [level['name'] for level in levels] == ['damping half engaged, 0.1 mm']
 
 
 def test_a_malformed_message_is_no_end(drive):

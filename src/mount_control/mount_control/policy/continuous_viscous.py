@@ -1,20 +1,18 @@
 """A viscous damper that engages with the amplitude in the band, and cancels the engine's lines meanwhile.
 
-The force comes from the unfiltered velocity without the engine's lines, so that friction is small where the
-true velocity reverses; the band-pass only sets the degree of damping. While the slow motion fixes the
-direction of friction, its size is modulated against the force of the lines in the elastomer.
+    F = c g v_n - K (1 + r) x_l where that has the direction of v, else 0
+    g follows A^2 / (A^2 + A_0^2 + A A_l + A_n^2), fast up, slowly down
 
-    x_n = x - lines,  v_n = v_ab - T w0^2 x_b,  v = v_n + velocity of the lines
-    A = sqrt(x_b^2 + (v_b / w0)^2),  A_l = line_weight a_l / w0^2,  A_n = 50 times the noise
-    q = A^2 / (A^2 + A_0^2 + A_l^2 + A_n^2),  g follows q, fast up, slowly down
-    s = max((v_n + 0.5 v_low) sign v, 0),  D^2 = d^2 + (0.4 v_l)^2
-    |F| = min(max(c g (sqrt(s^2 + D^2) - D) - K x_high sign v, 0), 2 c g |v|)
+v is the velocity; v_n that without the lines, from an alpha-beta tracker and the acceleration -w0^2 x_b; x_l
+the displacement of the lines, all when the force acts. A = sqrt(x_b^2 + (v_b / w0)^2) is the amplitude in the
+band, index b; A_n is 60 times the noise. A_l is line_weight (w / w0)^2.5 times the amplitude of a line at w:
+of a faster line the elastomer passes less, so the friction that it turns is heard more.
 
-v_ab is the velocity of an alpha-beta tracker of x_n, index b the band-pass. T is the lead and the lag of the
-tracker. v_l and a_l are the amplitudes of the lines' velocity and acceleration; x_high and v_low are their
-displacement and velocity when the force acts, weighted as in `engine_line`: near 18 Hz the chassis and the
-harmonics of friction answer, so there a line is damped rather than cancelled. Figures:
-docs/explanation/policy.md.
+Friction can only oppose v. While the slow motion fixes its direction, K, that of the elastomer, cancels the
+force of the lines. Where they turn it, half of each period is left: r = 0.5 V_l^2 / (V_l^2 + V_0^2) with the
+amplitude V_l of their velocity and V_0^2 = w0^2 (A^2 + A_0^2). Near 18 Hz the chassis and the harmonics of
+friction answer: the low part of a line, see `engine_line`, is not cancelled, and half of it is damped.
+Figures: docs/explanation/policy.md.
 """
 
 import math
@@ -29,13 +27,14 @@ from mount_models.arithmetic.record import record_type
 from mount_models.quantity import Quantity
 from mount_models.sampling import SAMPLE_TIME
 
-_REVERSAL_SLOPE = 2.0
-"""So many times as steeply as the damper the force may rise where the whole velocity reverses (chosen)."""
+_SLOWEST = 0.0016
+"""m/s, chosen, about the error of the predicted velocity: below it the law of friction would ask for a large
+normal force, and friction be far too large wherever the velocity is larger than predicted."""
 _LEAST_DEGREE = 0.03
 """Degree of damping below which there is no current (chosen): the offset current alone would rub."""
-_NOISE_WEIGHT = 2500.0  # chosen: square of how much noise of the displacement releases the damper
-_LINE_DAMPING = 0.5  # chosen: share of the damper that a line at the lowest frequency feels
-_LINE_ROUNDING = 0.4  # chosen: share of the lines' velocity below which the force falls off
+_LOW_DAMPED = 0.5  # chosen: share of the low part of the lines that the damper feels
+_TURNED = 0.5  # chosen: so much more is cancelled where the lines turn the friction
+_NOISE_WEIGHT = 3600.0  # chosen: square of how much noise of the displacement releases the damper
 
 
 class Parameters(NamedTuple):
@@ -66,21 +65,17 @@ class Parameters(NamedTuple):
     ] = 0.6
     damping_coefficient: Annotated[
         float, Quantity('N s/m', 'c: force over velocity, fully engaged', 1.0, 1e4)
-    ] = 3000.0
-    rounding_velocity: Annotated[
-        float,
-        Quantity('m/s', 'd: below it the force falls off faster than the velocity', 1e-5, 0.1),
-    ] = 0.0009
+    ] = 2900.0
     half_amplitude: Annotated[
         float, Quantity('m', 'A_0: amplitude in the band at which damping is half engaged', 1e-6, 0.01)
-    ] = 0.00013
+    ] = 0.0001
     engaging_time: Annotated[
         float, Quantity('s', 'time constant by which the degree of damping rises', 0.001, 1.0)
-    ] = 0.01
+    ] = 0.008
     releasing_time: Annotated[float, Quantity('s', 'and by which it falls', 0.001, 10.0)] = 0.14
     line_weight: Annotated[
         float, Quantity('1', 'how much lines of the engine release the damper; 0: not at all', 0.0, 100.0)
-    ] = 0.28
+    ] = 0.17
     line_stiffness: Annotated[
         float, Quantity('N/m', 'K: force of the lines that friction cancels, by displacement', 0.0, 1e6)
     ] = 2e5
@@ -97,7 +92,6 @@ class Law(NamedTuple):
     velocity_share: float
     w0: float
     damping: float
-    rounding: float
     half_square: float
     engaging: float
     releasing: float
@@ -141,11 +135,10 @@ def design(parameters: Parameters, sample_time: float) -> Design:
             velocity_share=(lead_time + sample_time * (alpha / beta - 0.5)) * w0 * w0,
             w0=w0,
             damping=parameters.damping_coefficient,
-            rounding=parameters.rounding_velocity,
             half_square=parameters.half_amplitude * parameters.half_amplitude,
             engaging=min(sample_time / parameters.engaging_time, 1.0),
             releasing=min(sample_time / parameters.releasing_time, 1.0),
-            line_weight=parameters.line_weight / (w0 * w0),
+            line_weight=parameters.line_weight / (w0 * w0 * math.sqrt(w0)),
             line_stiffness=parameters.line_stiffness,
         ),
         engine_line.rotations(sample_time),
@@ -182,23 +175,24 @@ def transfer(law, new_law, state, window, new_window):
 def step(law, table, state, window, trace, displacement, crank_frequency):
     """Take one sample (m); return force (N), velocity (m/s) at which it acts, and the degree 0 .. 1."""
     lines = state.line
-    now, ahead, line_velocity, low_velocity = engine_line.step(
+    now, ahead, low_velocity, high_velocity = engine_line.step(
         law.line, table, lines, window, displacement, crank_frequency
     )
     engine = displacement - now
     banded, _, band_velocity = band_pass.step(law.band, state.band, engine)
     engine_velocity = _tracked(law, state, engine) - law.velocity_share * banded
-    velocity = engine_velocity + line_velocity
+    velocity = engine_velocity + low_velocity + high_velocity
 
     in_band = band_velocity / law.w0
     square = banded * banded + in_band * in_band
-    of_lines = law.line_weight * lines.acceleration
-    others = law.half_square + of_lines * of_lines + _NOISE_WEIGHT * lines.noise_square
-    wanted = square / (square + others)
+    amplitude = math.sqrt(square)
+    full = square + law.half_square
+    others = law.line_weight * lines.shaking * amplitude + _NOISE_WEIGHT * lines.noise_square
+    wanted = square / (full + others)
     state.degree += (law.engaging if wanted > state.degree else law.releasing) * (wanted - state.degree)
 
     trace.band_displacement = banded
-    trace.amplitude = math.sqrt(square)
+    trace.amplitude = amplitude
     trace.line_amplitude = lines.amplitude
     trace.line_frequency = lines.fastest / law.sample_time
     trace.engine_velocity = engine_velocity
@@ -206,15 +200,11 @@ def step(law, table, state, window, trace, displacement, crank_frequency):
     if state.degree < _LEAST_DEGREE:
         return 0.0, velocity, 0.0
     direction = -1.0 if velocity < 0.0 else 1.0
-    speed = max(direction * (engine_velocity + _LINE_DAMPING * low_velocity), 0.0)
-    of_lines = _LINE_ROUNDING * lines.velocity
-    rounding = math.sqrt(law.rounding * law.rounding + of_lines * of_lines)
-    damping = law.damping * state.degree
-    damper = damping * (math.sqrt(speed * speed + rounding * rounding) - rounding)
-    force = min(
-        max(damper - direction * law.line_stiffness * ahead, 0.0), _REVERSAL_SLOPE * damping * abs(velocity)
-    )
-    return direction * force, velocity, state.degree
+    line_square = lines.velocity * lines.velocity
+    turned = _TURNED * line_square / (line_square + law.w0 * law.w0 * full)
+    damped = law.damping * state.degree * (engine_velocity + _LOW_DAMPED * low_velocity)
+    force = max(direction * (damped - law.line_stiffness * (1.0 + turned) * ahead), 0.0)
+    return direction * force, direction * max(abs(velocity), _SLOWEST), state.degree
 
 
 @compiled

@@ -63,6 +63,7 @@ def read_excitation(file: str, seat: Seat) -> StreamedSeries:
 
 
 _DEFAULT_DURATION = 15.0  # s, chosen
+_UNEVEN_ORDERS = (0.5, 1.0, 1.5, 2.5, 3.0)  # of the crank, which turns once in two of the first harmonic
 
 
 def build_excitation(sim: SimParameters, made: tuple[str, StreamedSeries] | None = None) -> Excitation:
@@ -95,6 +96,9 @@ def _engine_force(idle: IdleForce, tip_in: TipIn, time: FloatArray) -> FloatArra
     if idle.amplitude != 0.0:
         turns = idle.frequency * time
         force += idle.amplitude * (sines(turns) + idle.second_share * sines(2.0 * turns))
+        if idle.uneven_share != 0.0:
+            for order in _UNEVEN_ORDERS:
+                force += idle.amplitude * idle.uneven_share * sines(0.5 * order * turns)
     if tip_in.force != 0.0:
         force += tip_in.force * np.clip((time - tip_in.time) / tip_in.rise, 0.0, 1.0)
     return force

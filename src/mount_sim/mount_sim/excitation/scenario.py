@@ -67,7 +67,7 @@ class SweepScenario(NamedTuple):
 
 
 class IdleForce(NamedTuple):
-    """Force of the idling engine on itself, a sine with its second harmonic; none on a bench."""
+    """Force of the idling engine on itself, sines at orders of its crank; none on a bench."""
 
     amplitude: Annotated[
         float, Quantity('N', 'F_i: amplitude of the first harmonic; 0: no idle force', 0.0, 2000.0)
@@ -78,6 +78,10 @@ class IdleForce(NamedTuple):
     second_share: Annotated[
         float, Quantity('1', 'amplitude of the second harmonic over that of the first', 0.0, 2.0)
     ] = 0.4
+    uneven_share: Annotated[
+        float,
+        Quantity('1', 'amplitude at orders 0.5, 1, 1.5, 2.5, 3 of the crank, over the same', 0.0, 2.0),
+    ] = 0.0
     speed_sent: Annotated[
         bool, Quantity('1', 'send the turns of the crank on the bus, and let mount_driver read them')
     ] = False
