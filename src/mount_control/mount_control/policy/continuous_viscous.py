@@ -30,7 +30,7 @@ from mount_models.sampling import SAMPLE_TIME
 _SLOWEST = 0.0016
 """m/s, chosen, about the error of the predicted velocity: below it the law of friction would ask for a large
 normal force, and friction be far too large wherever the velocity is larger than predicted."""
-_LEAST_DEGREE = 0.03
+_LEAST_DEGREE = 0.015
 """Degree of damping below which there is no current (chosen): the offset current alone would rub."""
 _LOW_DAMPED = 0.5  # chosen: share of the low part of the lines that the damper feels
 _TURNED = 0.5  # chosen: so much more is cancelled where the lines turn the friction
