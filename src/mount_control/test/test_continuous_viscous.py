@@ -122,6 +122,29 @@ def test_a_line_is_cancelled_by_the_size_of_the_force_while_the_slow_motion_has_
     assert phasor(45.0, cancelling - plain) == pytest.approx(-stiffness * ahead, rel=0.15)
 
 
+def test_half_orders_beside_the_fastest_line_are_found_without_the_speed_of_the_engine() -> None:
+    sizes = {60.0: 20e-6, 45.0: 10e-6, 75.0: 5e-6}  # m by Hz: orders 2, 1.5 and 2.5 of the crankshaft
+    _, traces = followed(sine(8.0, 0.5e-3) + sum(sine(*line) for line in sizes.items()))
+    for frequency, size in sizes.items():
+        assert abs(phasor(frequency, traces['engine_velocity'])) < 0.2 * 2.0 * np.pi * frequency * size
+
+
+@pytest.mark.parametrize(('swing', 'more'), [(3e-3, 1.0), (0.1e-3, 1.43)])
+def test_lines_that_turn_the_friction_are_cancelled_by_more(swing: float, more: float) -> None:
+    motion = sine(8.0, swing) + sine(45.0, 60e-6)
+    force = followed(motion, line_weight=0.0, damping_coefficient=1.0)[0][-1000:, 0]
+    ahead = (1.0 - (18.0 / 45.0) ** 2) * 60e-6
+    assert np.abs(force).max() == pytest.approx(more * policy.Parameters().line_stiffness * ahead, rel=0.07)
+
+
+def test_of_lines_of_equal_acceleration_the_faster_one_releases_the_damper_more() -> None:
+    slow, fast = (
+        followed(sine(8.0, 0.25e-3) + sine(frequency, 0.1e-3 * (27.0 / frequency) ** 2))[0][-1, 2]
+        for frequency in (27.0, 108.0)
+    )
+    assert fast < 0.8 * slow
+
+
 def test_a_line_of_the_engine_and_noise_release_the_damper() -> None:
     swing, line = sine(8.0, 0.25e-3), sine(24.0, 0.4e-3)
     noise = 2e-5 * np.random.default_rng(1).standard_normal(TIME.size)
