@@ -39,6 +39,7 @@ _DOUBT = 0.08  # chosen: share of the rest's mean square that a line must exceed
 _KNOWN = 0.5  # chosen: so much of `_FOLLOWING` and `_DOUBT` where the frequency is known
 _SMALLEST_SQUARE = 1e-18  # m^2: of 1 nm, keeps 0 / 0 away
 _SAME_SPEED = 0.1  # chosen: a larger jump of the crankshaft's frequency leaves no line where it was
+_LARGEST_DEVIATION = 2.5e-5  # m, chosen: a larger one is an impact
 _NOISE_TIME = 0.55  # s, chosen: longer than an impact
 
 
@@ -184,7 +185,7 @@ def _follow(line, state, phasors, share, high):
             high_velocity -= (1.0 - low) * rate * imaginary
         else:
             phasors[k] = phasors[LINES + k] = 0.0
-    deviation = high - expected
+    deviation = min(max(high - expected, -_LARGEST_DEVIATION), _LARGEST_DEVIATION)
     for place in range(LINES):
         phasors[place] += share * line.following * deviation
     change = deviation - state.deviation
