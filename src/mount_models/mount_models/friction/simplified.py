@@ -73,7 +73,8 @@ def speed_terms(coefs, velocity):
 @compiled
 def fade_weight(velocity):
     """Return 1 - exp(-(v/v_w)^2) for `velocity` in m/s."""
-    return -expm1(-((velocity / FADE_VELOCITY) ** 2))
+    share = velocity / FADE_VELOCITY
+    return -expm1(-(share * share))  # ** of plain Python rounds otherwise than that of the compiler
 
 
 @compiled
