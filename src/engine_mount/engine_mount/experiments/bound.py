@@ -51,6 +51,8 @@ DAMPINGS = (250.0, 500.0, 1000.0, 2000.0, 3000.0)
 """N s/m, chosen: ideal viscous dampers beside the optimum."""
 LATE = 2
 """Samples, chosen: about the delay of the loop, 1.9 ms."""
+HORIZON = 60
+"""Samples, chosen: half a period of the engine on its mounts."""
 _SLEW = 40.0  # N/ms, chosen: 0.3 A/ms by the voltage of the coil, 150 N/A, coefficient 0.9
 _STEPS = round(SAMPLE_TIME / STEP_TIME)
 _DISPLACEMENT, _VELOCITY, *_CHASSIS = map(
@@ -64,7 +66,7 @@ _BANDS = (BELOW_ISOLATION, ACOUSTIC)
 _ORDER = 4  # of the band-passes, chosen
 _FIRST = 3000.0  # N s/m, chosen: the force of this ideal damper is improved
 _ITERATIONS = 150, 40, 40  # chosen; few at a time, so that the linear car stays near the simulation
-_HORIZON, _ITERATIONS_AHEAD = 60, 8  # samples, chosen: half a period of the engine on its mounts
+_ITERATIONS_AHEAD = 8  # chosen
 _CURRENTS = np.linspace(HIGHEST_CURRENT, 0.1, 1000)  # A, chosen: while they fall the pads stay closed
 
 
@@ -200,12 +202,12 @@ class Window:
         return LARGEST_FORCE * found.x
 
     def ahead(self, now: int, preview: int) -> 'Window':
-        """Return the next `_HORIZON` samples from `now` on; the road stands still behind `preview`."""
-        part = slice(_STEPS * now, _STEPS * (now + _HORIZON) + 1)
+        """Return the next `HORIZON` samples from `now` on; the road stands still behind `preview`."""
+        part = slice(_STEPS * now, _STEPS * (now + HORIZON) + 1)
         window = copy.copy(self)
         window.rows, window.pads = self.rows[part].copy(), self.pads[part].copy()
         window.samples = (len(window.rows) - 1) // _STEPS
-        window.beside = self.beside[: window.samples]
+        window.beside = self.beside[now : now + HORIZON]
         road = window.rows[:, _ROAD]
         road[_STEPS * preview :] = road[min(_STEPS * preview, len(road) - 1)]
         return window
@@ -278,12 +280,12 @@ def of_ideal(truth: Truth, sim: SimParameters) -> Values:
 def foreseen(preview: int, truth: Truth, sim: SimParameters) -> Values:
     """Return `mean_squares` of the linear car where the road is known only `preview` samples ahead.
 
-    Each level is the first of the best for the next `_HORIZON` samples; state and engine are known.
+    Each level is the first of the best for the next `HORIZON` samples; state and engine are known.
     """
     window = Window(sim, 0.5, of_run(truth))
     levels = np.zeros(window.samples)
     for now in range(window.samples):
-        coming = slice(now, now + _HORIZON)
+        coming = slice(now, now + HORIZON)
         levels[coming] = window.ahead(now, preview).improved(levels[coming], _ITERATIONS_AHEAD)
         steps = slice(_STEPS * now, _STEPS * (now + 1) + 1)
         ride(window.matrix, window.law, levels[now : now + 1], window.rows[steps], window.pads[steps])

@@ -71,7 +71,7 @@ ROADS = {'random': _ROUGH, 'smooth': 2e-6}
 GAP_TIME, _GAP_SECONDS = 2.0, 4.0  # s
 _RACK = {'scenario': 'bench', 'bench.amplitude': 1e-3, 'timeline.duration': 3.5}
 _ROAD_SECONDS, SPEED = 12.0, 33.0  # s, m/s
-_UNEVEN = 0.3  # chosen
+UNEVEN, UNEVEN_FORCE = 0.3, 100.0  # chosen; N
 SHOCKS = (0.06, 0.1)  # m, chosen: depths of gaps beyond any in a road
 PULLS = {
     'tip-in': {'tip_in.force': 400.0},
@@ -197,8 +197,8 @@ def cases_of(order: Order, axes: Axes) -> dict[Key, Case]:
         sim = _road(roughness, 6.0, force) | {'idle.frequency': frequency}
         add(('engine', who, roughness, frequency, force), sim, of_road)
     for frequency, who in product(axes.engine_frequencies, (*COMPARED, KNOWN)):
-        uneven = {'idle.frequency': frequency, 'idle.uneven_share': _UNEVEN}
-        add(('uneven', who, frequency), _road(_ROUGH, 6.0, 100.0) | uneven, of_road)
+        uneven = {'idle.frequency': frequency, 'idle.uneven_share': UNEVEN}
+        add(('uneven', who, frequency), _road(_ROUGH, 6.0, UNEVEN_FORCE) | uneven, of_road)
     for (road, roughness), noise, who in product(ROADS.items(), axes.noise, COMPARED):
         sim = _road(roughness, 6.0) | {'electronics.displacement_noise': 1e-6 * noise}
         add(('noise', who, road, noise), sim, of_road)

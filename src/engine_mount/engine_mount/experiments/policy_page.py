@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from engine_mount.experiments.bound import LATE, MEASURES
+from engine_mount.experiments.bound import HORIZON, LATE, MEASURES
 from engine_mount.experiments.harness.experiment import PAPER, Values, table, table_rows
 from engine_mount.experiments.policy_cases import (
     CONTINUOUS,
@@ -12,6 +12,8 @@ from engine_mount.experiments.policy_cases import (
     HIGH_BANDS,
     POLICIES,
     STEPPED,
+    UNEVEN,
+    UNEVEN_FORCE,
 )
 from engine_mount.reports.drive.felt import FIGURES
 
@@ -147,7 +149,7 @@ are from there. It is a local optimum, so at least this good. J of each mount ov
 {by_name('window', rows)}
 `{LATE} ms later`: the same currents, so much later, as the delay of the loop would make them. The ideal \
 dampers know the velocity at once and nothing else. The best force also knows what road and engine will do. \
-What that is worth: the best force for the next 60 ms, found anew at each sample of the linear car from its \
+What that is worth: the best force for the next {HORIZON} ms, found anew at each sample of the linear car from its \
 exact state, where the road is known for so long and taken to stand still behind. J over J of the best:
 
 | window | road known ahead, ms | J |
@@ -264,8 +266,8 @@ worst and the mean of all frequencies of the engine's line and forces; the line'
 | roughness | | acceleration: worst, at | mean | share above 1.05 | displacement: mean | worst |
 |---|---|---|---|---|---|---|
 {engine}
-An engine whose cylinders differ, class A, 100 N: orders 0.5, 1, 1.5, 2.5 and 3 of the crankshaft have 0.3 \
-of the line's force. Acceleration and displacement as above, by frequency of the line:
+An engine whose cylinders differ, class A, {UNEVEN_FORCE:g} N: orders 0.5, 1, 1.5, 2.5 and 3 of the \
+crankshaft have {UNEVEN:g} of the line's force. Acceleration and displacement as above, by frequency of the line:
 
 {by_name('', uneven)}
 The price of quiet: where a strong line meets a smooth road, its friction would be heard, so the damper is \

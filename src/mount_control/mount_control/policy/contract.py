@@ -16,7 +16,7 @@ The names that each policy's module has:
     `record_type` of the memory, of `f8` and `i8`; the latter never negative, at least one field.
 `TRACE`
     {field: unit} of the policy's own intermediates, all `f8`, one of them `predicted_velocity`, the velocity
-    that `step` returns, and none that every policy has. Those in m or m/s are 0 at the first sample after
+    at which the force acts, and none that every policy has. Those in m or m/s are 0 at the first sample after
     `start` at its displacement: so a replay finds where the controller began.
 `design(parameters, sample_time) -> Design`
     Plain Python; what it makes has the same time constants at every `sample_time` (s). Raises a
@@ -31,8 +31,9 @@ and compiled, with the records of `Law` and `STATE`:
 `step(law, table, state, window, trace, displacement, crank_frequency) -> (force, velocity, active)`
     Take one sample (m) and fill the own fields of `trace`. `crank_frequency` (Hz): turns of the crankshaft
     in a second, 0.0 where they are not known, never NaN or negative. `force` (N) is the wanted friction
-    force, signed like `velocity` (m/s); `active` lies within 0 .. 1, and at exactly 0 the current is exactly
-    0 A.
+    force, signed like `velocity` (m/s), for which the law of friction is solved: that at which the force acts,
+    or a larger one where a reversal is near and the law would fade. `active` lies within 0 .. 1, and at exactly
+    0 the current is exactly 0 A.
 """
 
 from collections.abc import Callable, Mapping
