@@ -149,8 +149,9 @@ are from there. It is a local optimum, so at least this good. J of each mount ov
 {by_name('window', rows)}
 `{LATE} ms later`: the same currents, so much later, as the delay of the loop would make them. The ideal \
 dampers know the velocity at once and nothing else. The best force also knows what road and engine will do. \
-What that is worth: the best force for the next {HORIZON} ms, found anew at each sample of the linear car from its \
-exact state, where the road is known for so long and taken to stand still behind. J over J of the best:
+What that is worth: the best force for the next {HORIZON} ms, found anew at each sample of the linear car \
+from its exact state, where the road is known for so long and taken to stand still behind. J over J of the \
+best:
 
 | window | road known ahead, ms | J |
 |---|---|---|
@@ -267,7 +268,8 @@ worst and the mean of all frequencies of the engine's line and forces; the line'
 |---|---|---|---|---|---|---|
 {engine}
 An engine whose cylinders differ, class A, {UNEVEN_FORCE:g} N: orders 0.5, 1, 1.5, 2.5 and 3 of the \
-crankshaft have {UNEVEN:g} of the line's force. Acceleration and displacement as above, by frequency of the line:
+crankshaft have {UNEVEN:g} of the line's force. Acceleration and displacement as above, by frequency of the \
+line:
 
 {by_name('', uneven)}
 The price of quiet: where a strong line meets a smooth road, its friction would be heard, so the damper is \

@@ -31,9 +31,9 @@ and compiled, with the records of `Law` and `STATE`:
 `step(law, table, state, window, trace, displacement, crank_frequency) -> (force, velocity, active)`
     Take one sample (m) and fill the own fields of `trace`. `crank_frequency` (Hz): turns of the crankshaft
     in a second, 0.0 where they are not known, never NaN or negative. `force` (N) is the wanted friction
-    force, signed like `velocity` (m/s), for which the law of friction is solved: that at which the force acts,
-    or a larger one where a reversal is near and the law would fade. `active` lies within 0 .. 1, and at exactly
-    0 the current is exactly 0 A.
+    force, signed like `velocity` (m/s), for which the law of friction is solved: that at which the force
+    acts, or a larger one where a reversal is near and the law would fade. `active` lies within 0 .. 1, and
+    at exactly 0 the current is exactly 0 A.
 """
 
 from collections.abc import Callable, Mapping
